@@ -113,7 +113,7 @@ def execute_comparison(
     environment = next(iter(scenarios.values())).environment
     min_radius = min(scenario.team.min_radius for scenario in scenarios.values())
     runs: dict[str, Run] = {}
-    with create_result(out, "comparison", overwrite=settings.overwrite, parts=scenarios) as result:
+    with create_result(out, "comparison", overwrite=settings.overwrite, run_names=scenarios) as result:
         compile_kernels()
         cost = build_cost(environment, settings.lattice, radius=min_radius, quiet=settings.hide_progress)
         with Interruption() as interruption:

@@ -1,7 +1,9 @@
 """Files: strict reading, and atomic writing.
 
 - `strictjson`: JSON and TOML, with the line and the column of each issue
-- `array_files`: arrays in .npz files, and a cache of them
+- `json_positions`: lines and columns of keys and values in JSON
+- `documents`: JSON documents that are checked against models of their content
+- `array_files`: arrays in .npz files, and a cache for arrays
 - `csv_cells`: cells of CSV files
 - `writing`: files that are replaced atomically
 - `result_folder`: folders of results that are replaced atomically

@@ -1,4 +1,4 @@
-"""Arrays in .npz files: read only if their sizes are reasonable, and cached between runs."""
+"""Arrays in .npz files, which are read only if their sizes are reasonable, and a cache for arrays."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ from robocov.files.cache_folders import find_cache_root, is_private
 from robocov.files.writing import replace_file
 
 MAX_BYTES = 2_000_000_000
-"""Default limit for the arrays of one file: about the largest run that the application accepts."""
+"""Default limit for the total size of the arrays of one file: about the largest run that the application
+accepts."""
 _MAX_COMPRESSION_RATIO = 100
-"""Maximum size of the arrays relative to that of the file: more is a decompression bomb."""
+"""Largest size of the arrays relative to the size of the file. A larger ratio suggests a decompression
+bomb."""
 _RATIO_EXEMPT_BYTES = 256_000_000
 """Arrays up to this total size may have any compression ratio."""
 _MAX_READ_BYTES = 1 << 20
-"""Largest single read: the central directory of a zip file with arrays is short."""
+"""Largest single read. A longer one would be the central directory of a zip file with too many entries."""
 _DAMAGE_ERRORS = (
     ValueError,
     EOFError,
@@ -43,28 +45,31 @@ _DAMAGE_ERRORS = (
 )
 """Errors that zipfile, zlib and numpy raise for damaged files."""
 _SUFFIX = ".robocov"
+"""Suffix of the files of the cache."""
 _FORMAT = b"robocov arrays 1\n"
+"""Start of each file of the cache."""
 _DIGEST_BYTES = 16
-"""Length of the checksum between the format and the data of a cached file."""
-_STALE_S = 24 * 3600.0
-"""Age at which a partly written file counts as abandoned."""
+"""Length of the checksum, which follows the format. The arrays, as an .npz file, follow the checksum."""
+_ABANDONED_S = 24 * 3600.0
+"""Age from which a partly written file counts as abandoned."""
 
 
-def read_arrays(file: BinaryIO, where: str, max_bytes: int = MAX_BYTES) -> dict[str, NDArray[Any]]:
+def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) -> dict[str, NDArray[Any]]:
     """Read the arrays of an .npz file.
 
     Parameters
     ----------
     file : binary file
         Open for reading, and seekable.
-    where : str
-        Name of the file in messages.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     max_bytes : int
         Largest total size of the arrays.
 
     Returns
     -------
     dict of str to array
+        Arrays by name.
 
     Raises
     ------
@@ -83,22 +88,25 @@ def read_arrays(file: BinaryIO, where: str, max_bytes: int = MAX_BYTES) -> dict[
                 arrays[entry.filename.removesuffix(".npy")] = array
             return arrays
     except _DAMAGE_ERRORS as error:
-        raise InputError(f"{where}: cannot be read: {error or type(error).__name__}") from error
+        raise InputError(f"{source_name}: cannot be read: {error or type(error).__name__}") from error
 
 
 def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:
     """Raise ValueError if entries are too large, or have the same name."""
-    # No stream yields more than the size in its entry, regardless of its content.
-    total = sum(entry.file_size for entry in entries)
-    if total > min(max_bytes, max(_RATIO_EXEMPT_BYTES, _MAX_COMPRESSION_RATIO * file_size)):
-        raise ValueError(f"arrays too large: {total / 1e6:,.0f} MB, from a file of {file_size / 1e6:,.1f} MB")
+    # The sizes in the entries can be trusted: `zipfile` never decompresses more than the size in an entry.
+    total_size = sum(entry.file_size for entry in entries)
+    max_size = min(max_bytes, max(_RATIO_EXEMPT_BYTES, _MAX_COMPRESSION_RATIO * file_size))
+    if total_size > max_size:
+        raise ValueError(
+            f"arrays too large: {total_size / 1e6:,.0f} MB, from a file of {file_size / 1e6:,.1f} MB"
+        )
     for name, count in Counter(entry.filename for entry in entries).items():
         if count > 1:
             raise ValueError(f"duplicate entry {name!r}")
 
 
 class _LimitedReader:
-    """A file that refuses large reads, such as that of a directory with millions of entries."""
+    """A file that refuses any single read of more than `_MAX_READ_BYTES`, such as of a large directory."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -107,32 +115,35 @@ class _LimitedReader:
         return getattr(self._file, name)
 
     def read(self, size: int = -1) -> bytes:
+        # `zipfile` omits the size only near the end of the file, where at most 64 KiB follow.
         if size > _MAX_READ_BYTES:
             raise zipfile.BadZipFile("its directory is too large")
         return self._file.read(size)
 
 
 class ArrayCache:
-    """A folder of cached arrays, whose keys identify the inputs of the computation.
+    """A folder with cached results of computations, which are arrays. Keys identify the inputs.
 
-    An entry that is damaged, not private or unreadable counts as missing, and errors on writing are ignored.
-    Any number of processes may use a folder at the same time.
+    An entry that is damaged, unreadable or writable by other users counts as missing. Errors on writing are
+    ignored. Any number of processes may use a folder at the same time.
 
     Parameters
     ----------
     folder : Path
-        Created by the first `save`.
+        Folder of the cache, which the first `save` creates.
     max_bytes : int
-        Largest total size of the files. Beyond it, the least recently used ones are removed.
+        Largest total size of the files. If they become larger, the least recently used files are removed.
 
     Attributes
     ----------
     folder : Path
+        Folder of the cache.
     max_bytes : int
+        Largest total size of the files.
 
     See Also
     --------
-    find_optimum : Its results are worth caching.
+    find_optimum : A slow computation, whose results can be cached.
 
     Examples
     --------
@@ -159,23 +170,24 @@ class ArrayCache:
         Returns
         -------
         ArrayCache or None
-            None if the environment variable is empty.
+            The cache. None if the environment variable is set but empty.
         """
         folder = find_cache_root()
         return None if folder is None else cls(folder)
 
     @staticmethod
     def compute_key(*parts: bytes | str | float) -> str:
-        """Compute a key for arrays from the inputs that determine them.
+        """Compute a key from the inputs of a computation.
 
         Parameters
         ----------
         *parts : bytes, str, int or float
+            Inputs that determine the arrays, in a fixed order.
 
         Returns
         -------
         str
-            A digest of the types and exact values.
+            A digest of the types and exact values of the inputs.
         """
         digest = hashlib.blake2b(digest_size=20)
         for part in parts:
@@ -199,10 +211,10 @@ class ArrayCache:
         Returns
         -------
         dict of str to array, or None
-            Read-only arrays; None if there is no intact entry.
+            Read-only arrays by name. None if there is no intact entry.
         """
         path = self.folder / f"{key}{_SUFFIX}"
-        # Even intact arrays may be unreadable if a newer version of numpy wrote them.
+        # Reading an intact file may also fail, for example if a newer version of numpy wrote it.
         with suppress(OSError, InputError):
             if path.stat().st_size > self.max_bytes or not is_private(path):
                 return None
@@ -216,7 +228,7 @@ class ArrayCache:
             for array in arrays.values():
                 array.setflags(write=False)
             with suppress(OSError):
-                os.utime(path)  # It is the most recently used file now.
+                os.utime(path)  # The time of modification tells when a file was last used.
             return arrays
         return None
 
@@ -237,29 +249,32 @@ class ArrayCache:
             return
         with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
-            with replace_file(self.folder / f"{key}{_SUFFIX}", durable=False) as path:
-                path.write_bytes(b"".join([_FORMAT, _compute_digest(payload), payload]))
-                path.chmod(0o600)  # `load` ignores files that others may have written.
+            with replace_file(self.folder / f"{key}{_SUFFIX}", durable=False) as temporary:
+                temporary.write_bytes(b"".join([_FORMAT, _compute_digest(payload), payload]))
+                temporary.chmod(0o600)  # `load` ignores files to which other users may have written.
             self._remove_old_files()
 
     def _remove_old_files(self) -> None:
         """Remove the least recently used files beyond the limit, and abandoned temporary files."""
         entries: list[tuple[float, int, Path]] = []
         for path in self.folder.glob(f"*{_SUFFIX}"):
-            with suppress(OSError):  # Another process may have removed it.
+            with suppress(OSError):  # Another process may have removed the file.
                 status = path.stat()
-                if not path.name.startswith("."):
+                # The temporary files of `replace_file` are hidden.
+                is_temporary = path.name.startswith(".")
+                if not is_temporary:
                     entries.append((status.st_mtime, status.st_size, path))
-                elif status.st_mtime < time.time() - _STALE_S:
+                elif status.st_mtime < time.time() - _ABANDONED_S:
                     path.unlink()
-        total = sum(size for _, size, _ in entries)
+        total_size = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):
-            if total <= self.max_bytes:
+            if total_size <= self.max_bytes:
                 break
             with suppress(OSError):
                 path.unlink()
-            total -= size
+            total_size -= size
 
 
 def _compute_digest(payload: bytes | memoryview) -> bytes:
+    """Return the checksum of the arrays in a file of the cache."""
     return hashlib.blake2b(payload, digest_size=_DIGEST_BYTES).digest()

@@ -12,13 +12,17 @@ from pathlib import Path
 import platformdirs
 
 CACHE_VARIABLE = "ROBOCOV_CACHE"
-"""Environment variable with another cache folder; empty for none."""
+"""Environment variable with the path of another cache folder. If it is set but empty, no cache is used."""
 
 
 def find_cache_root() -> Path | None:
-    """Return the folder for caches; None to use no cache.
+    """Find the folder for caches.
 
-    It is the folder in the environment variable `CACHE_VARIABLE`, or by default the user's cache folder.
+    Returns
+    -------
+    Path or None
+        The folder that the environment variable `CACHE_VARIABLE` names, or else the user's cache folder. None
+        if no cache is to be used.
     """
     configured = os.environ.get(CACHE_VARIABLE)
     if configured == "":
@@ -29,17 +33,18 @@ def find_cache_root() -> Path | None:
 
 
 def open_private_folder(folder: Path) -> Path | None:
-    """Create a folder that only this user may write to, or check that it is one.
+    """Create a folder that only this user may write to, or check an existing one.
 
     Parameters
     ----------
     folder : Path
+        Folder that may not exist yet.
 
     Returns
     -------
     Path or None
-        The folder; None if it cannot be created or written to, belongs to another user, may be written to by
-        others, or lies in a folder in which others could replace it.
+        The folder. None if it cannot be created or written to, belongs to another user, is writable by other
+        users, or lies in a folder in which other users could replace it.
     """
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -51,17 +56,17 @@ def open_private_folder(folder: Path) -> Path | None:
 
 
 def is_private(path: Path) -> bool:
-    """Return whether a file or folder belongs to this user, and no other user can have changed it.
-
-    Always true on systems without file owners and modes, such as Windows, which separate users themselves.
+    """Return whether a file or folder belongs to this user and cannot have been changed by other users.
 
     Parameters
     ----------
     path : Path
+        An existing file or folder.
 
     Returns
     -------
     bool
+        Always True on Windows, where each user has a cache folder that other users cannot access.
 
     Raises
     ------

@@ -8,13 +8,14 @@ from typing import Any
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n＝＋－＠]")
 """Start of a text that a spreadsheet may evaluate, or that has already been quoted."""
 _QUOTED_FORMULA = re.compile(r"'+[=+\-@\t\r\n＝＋－＠]")
+"""Start of a text that has been quoted."""
 
 
 def quote_cell(value: Any) -> Any:
     """Quote the content of a CSV cell, so that no spreadsheet evaluates it.
 
-    A text that starts with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe, the
-    mark that spreadsheets themselves use for text.
+    A text that starts with ``=``, ``+``, ``-``, ``@``, a tab or a line break gets a leading apostrophe. In
+    spreadsheets, an apostrophe marks a cell as text.
 
     Parameters
     ----------
@@ -42,10 +43,12 @@ def unquote_cell(text: str) -> str:
     Parameters
     ----------
     text : str
+        Text of a cell, quoted or not.
 
     Returns
     -------
     str
+        Text without the apostrophe of the quotation.
 
     Examples
     --------

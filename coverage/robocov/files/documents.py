@@ -1,4 +1,4 @@
-"""JSON documents that robocov has written, read through models of their content."""
+"""JSON documents that robocov has written, which are checked against pydantic models of their content."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robocov.errors import Issue, MapError, quote_json
 from robocov.files.strictjson import parse_json, read_bytes
 
 _EXPECTED_ERROR = "expected"
-"""Type of pydantic's error that `expect` raises; its message describes the expected value."""
+"""Type of the pydantic error that `expect` raises. The message of the error describes the expected value."""
 _EXPECTED_BY_ERROR_TYPE = {
     "string_type": "a string",
     "bool_type": "true or false",
@@ -21,10 +21,11 @@ _EXPECTED_BY_ERROR_TYPE = {
     "dict_type": "an object",
     "model_type": "an object",
 }
+"""Descriptions of the expected value for types of pydantic errors."""
 
 
 class Document(BaseModel):
-    """An object in a file of results: known keys are checked strictly, unknown ones are not checked."""
+    """An object in a file of results. Known keys are checked strictly; unknown keys are accepted."""
 
     model_config = ConfigDict(extra="allow", strict=True)
 
@@ -38,11 +39,12 @@ def expect(description: str) -> WrapValidator:
     Parameters
     ----------
     description : str
-        Such as ``a number above 0 (s)``.
+        The expected value, such as ``a number above 0 (s)``.
 
     Returns
     -------
     WrapValidator
+        Annotation for the type of the field.
     """
 
     def validate(value: Any, handler: Callable[[Any], Any]) -> Any:
@@ -60,6 +62,7 @@ def read_document(path: Path, model: type[DocumentType], format_name: str, versi
     Parameters
     ----------
     path : Path
+        File to read.
     model : type
         Model of the content, a subclass of `Document`.
     format_name : str
@@ -77,20 +80,21 @@ def read_document(path: Path, model: type[DocumentType], format_name: str, versi
     MapError
         If the file cannot be read, or is not a document of this format.
     """
-    where = str(path)
-    document = parse_json(read_bytes(path), where)
-    check_header(document, where, format_name, version)
-    return validate_document(document, where, model)
+    source_name = str(path)
+    document = parse_json(read_bytes(path), source_name)
+    check_header(document, source_name, format_name, version)
+    return validate_document(document, source_name, model)
 
 
-def validate_document(document: object, where: str, model: type[DocumentType]) -> DocumentType:
+def validate_document(document: object, source_name: str, model: type[DocumentType]) -> DocumentType:
     """Check a JSON document against its model.
 
     Parameters
     ----------
     document : object
-    where : str
-        Name of the document in messages.
+        Parsed content of a JSON file.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     model : type
         Model of the content, a subclass of `Document`.
 
@@ -107,17 +111,18 @@ def validate_document(document: object, where: str, model: type[DocumentType]) -
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        raise build_document_error(error, where, _build_issue) from None
+        raise build_document_error(error, source_name, _build_issue) from None
 
 
-def check_header(document: object, where: str, format_name: str, version: int) -> None:
+def check_header(document: object, source_name: str, format_name: str, version: int) -> None:
     """Check the format and the version of a document.
 
     Parameters
     ----------
     document : object
-    where : str
-        Name of the document in messages.
+        Parsed content of a JSON file.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     format_name : str
         Expected value of the key ``format``.
     version : int
@@ -131,7 +136,7 @@ def check_header(document: object, where: str, format_name: str, version: int) -
     if not isinstance(document, dict):
         expected = f"a JSON object with a {format_name.removeprefix('robocov-')}"
         issue = Issue((), f"expected {expected}, got {quote_json(document)}")
-        raise MapError.from_issues(where, [issue])
+        raise MapError.from_issues(source_name, [issue])
     for key, expected_value in (("format", format_name), ("version", version)):
         value = document.get(key)
         if type(value) is type(expected_value) and value == expected_value:
@@ -139,23 +144,25 @@ def check_header(document: object, where: str, format_name: str, version: int) -
         message = describe_mismatch(quote_json(expected_value), value, is_missing=key not in document)
         if key == "version" and type(value) is int and value > version:
             message += "; it was written by a newer robocov"
-        raise MapError.from_issues(where, [Issue.at_path((key,), message)])
+        raise MapError.from_issues(source_name, [Issue.at_path((key,), message)])
 
 
 def describe_mismatch(expected: str, value: object, *, is_missing: bool = False) -> str:
-    """Return the message for a JSON value that is not as expected.
+    """Describe how a JSON value differs from the expected one.
 
     Parameters
     ----------
     expected : str
         Description of the expected value.
     value : object
+        The value in the document.
     is_missing : bool
-        Whether the value is missing.
+        Whether the document has no such value.
 
     Returns
     -------
     str
+        Message without the place of the value.
 
     Examples
     --------
@@ -166,30 +173,34 @@ def describe_mismatch(expected: str, value: object, *, is_missing: bool = False)
 
 
 def build_document_error(
-    error: ValidationError, where: str, build_issue: Callable[[ErrorDetails], Issue]
+    error: ValidationError, source_name: str, build_issue: Callable[[ErrorDetails], Issue]
 ) -> MapError:
     """Build the error for a document that does not fit its model.
 
     Parameters
     ----------
     error : ValidationError
-    where : str
-        Name of the document in messages.
+        Error of pydantic, with details of all issues.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     build_issue : callable
-        Returns the issue for an error of pydantic.
+        Converts the details of one issue to an `Issue`.
 
     Returns
     -------
     MapError
+        Error with the first few issues, and the number of the others.
     """
     details = error.errors(include_url=False, include_context=False)
-    # A misspelled key is also a missing one. It is more helpful to name the key that is there.
+    # If a required key is misspelled, pydantic reports a missing key and an unknown one. The unknown key is
+    # listed first, because its message is more helpful.
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     issues = [build_issue(detail) for detail in details[: MapError.MAX_LISTED]]
-    return MapError.from_issues(where, issues, len(details) - len(issues))
+    return MapError.from_issues(source_name, issues, len(details) - len(issues))
 
 
 def _build_issue(detail: ErrorDetails) -> Issue:
+    """Convert the details of one issue in a `Document`."""
     path = tuple(step for step in detail["loc"] if step != "[key]")
     if detail["type"] == "missing":
         return Issue.at_path(path, "missing")

@@ -9,15 +9,16 @@ from pathlib import Path
 
 from robocov.errors import OutputError, describe_error
 
-_UNSUPPORTED = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP})
-"""Errors of file systems that cannot lock files."""
+_UNSUPPORTED_ERRORS = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP})
+"""Error numbers of file systems that cannot lock files."""
 
 
 @contextmanager
 def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> Iterator[None]:
-    """Lock a folder within a ``with`` block, or until this process ends, however it ends.
+    """Lock a folder within a ``with`` block.
 
-    On file systems that cannot lock files, the block runs without a lock.
+    The lock is also released when the process ends for any reason. On file systems that cannot lock files,
+    the block runs without a lock.
 
     Parameters
     ----------
@@ -26,18 +27,18 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
     name : str
         Name of the lock file in the folder.
     remove : bool
-        Remove the lock file at the end.
+        Whether to remove the lock file at the end.
 
     Raises
     ------
     OutputError
-        If another process has locked the folder, or it cannot be written to.
+        If another process has locked the folder, or the folder cannot be written to.
     """
-    # Imported only now, because it takes a tenth of a second and most commands lock nothing.
+    # Importing the package takes a tenth of a second, and most commands lock nothing.
     from filelock import FileLock, Timeout
 
     path = folder / name
-    # Not local to a thread: whichever thread leaves the block releases the lock.
+    # The thread that leaves the block may differ from the one that entered it.
     lock = FileLock(path, mode=0o644, timeout=0, thread_local=False)
     try:
         lock.acquire()
@@ -46,7 +47,7 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
             f"{folder}: another process is using this folder; wait until it has ended"
         ) from None
     except OSError as error:
-        if error.errno not in _UNSUPPORTED:
+        if error.errno not in _UNSUPPORTED_ERRORS:
             raise OutputError(f"{folder}: cannot be written to: {describe_error(error)}") from error
     except NotImplementedError:
         pass  # The file system cannot lock files.
@@ -54,7 +55,7 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
         yield
     finally:
         if remove:
-            # Removed while it is locked: a process that waits for this file notices that its name is gone.
+            # The file is removed while it is locked, so that no other process holds a lock on it.
             with suppress(OSError):
                 path.unlink()
         lock.release()

@@ -1,7 +1,7 @@
 """Positions of keys and values in the text of JSON documents.
 
-The parser does not record positions, so valid files cost nothing. After an error, the text is scanned
-along the path to the issue, and everything else is skipped by the parser.
+The JSON parser does not record positions, so that valid files are read fast. After an error, the text is
+scanned along the path to the issue. A decoder skips all other values.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _WHITESPACE = re.compile(r"[ \t\n\r]*")
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _STRING_OR_BRACKET = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
 
-# Skipped numbers may have any number of digits, because their values are not computed.
+# Numbers may have any number of digits, because `len` replaces the conversion of digits to a value.
 _SKIPPING_DECODER = json.JSONDecoder(parse_float=len, parse_int=len, parse_constant=len, strict=False)
 
 
@@ -25,15 +25,17 @@ def find_offset(text: str, path: Sequence[str | int], *, at_key: bool = False) -
     Parameters
     ----------
     text : str
+        Text of the document.
     path : sequence of str and int
-        Path of the value. If an object has a key twice, its last value counts, as for the parser.
+        Keys and indices that lead to the value. If an object has a key twice, the last value counts, as in
+        Python's JSON decoder.
     at_key : bool
-        Find the last key of the path, rather than its value.
+        Whether to find the start of the last key of the path, rather than of its value.
 
     Returns
     -------
     int
-        If the value is missing, the start of the innermost existing value of the path.
+        Offset in the text. If the value is missing, the start of the innermost value on the path that exists.
     """
     value_offset = _skip_whitespace(text, 0)
     key_offset = value_offset
@@ -46,7 +48,7 @@ def find_offset(text: str, path: Sequence[str | int], *, at_key: bool = False) -
 
 
 def _find_member(text: str, offset: int, step: str | int) -> tuple[int, int] | None:
-    """Return where a member's key and value start in an object or list; None if there is no such member."""
+    """Return the offsets of the key and the value of a member of an object or list; None if it is missing."""
     if text[offset] not in "{[":
         return None
     members = _iterate_members(text, offset)
@@ -61,7 +63,7 @@ def _find_member(text: str, offset: int, step: str | int) -> tuple[int, int] | N
 
 
 def _iterate_members(text: str, offset: int) -> Iterator[tuple[str | int, int, int]]:
-    """Yield the key or index of each member of an object or list, and where its key and value start."""
+    """Yield the key or index of each member of an object or list, and the offsets of its key and value."""
     is_object = text[offset] == "{"
     offset = _skip_whitespace(text, offset + 1)
     for index in count():
@@ -81,18 +83,19 @@ def _iterate_members(text: str, offset: int) -> Iterator[tuple[str | int, int, i
 
 
 def find_deep_nesting(text: str, max_depth: int) -> int:
-    """Find where lists and objects are first nested deeper than a limit.
+    """Find the first bracket at which lists and objects are nested deeper than a limit.
 
     Parameters
     ----------
     text : str
-        It need not be valid JSON.
+        Text of a document, which need not be valid JSON.
     max_depth : int
+        Allowed number of nested lists and objects.
 
     Returns
     -------
     int
-        The offset of the bracket; the length of the text if there is none.
+        Offset of the bracket; the length of the text if there is no such bracket.
     """
     depth = 0
     for token in _STRING_OR_BRACKET.finditer(text):
@@ -111,12 +114,14 @@ def find_line_and_column(text: str, offset: int) -> tuple[int, int]:
     Parameters
     ----------
     text : str
+        Text with line breaks of any kind.
     offset : int
+        Index of a character in the text.
 
     Returns
     -------
     line, column : int
-        Counted from 1, the column in characters.
+        Line and column of the character, both counted from 1.
 
     Examples
     --------

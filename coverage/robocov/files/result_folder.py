@@ -1,11 +1,13 @@
-"""Result folders: each contains either the old result or the new one, and no other file is changed.
+"""Result folders, whose results are replaced completely or not at all.
 
-A result is written to a hidden staging folder inside its folder. To commit it, robocov writes a journal,
-which lists the files of the new result, and the files of the old one to remove. Once the
-journal has been renamed into place, the new result is valid: if the process is interrupted, the next one that
-opens the folder completes the remaining steps (`complete_commit`). At the end, the journal becomes the
-manifest, which lists the files of the result. Files that are not in the manifest were not written by
-robocov, and are neither replaced nor removed. Links inside the folder are not followed.
+A result is written to a hidden staging folder inside its folder. To commit the result, robocov writes a
+journal in the staging folder. The journal lists the files of the new result, and the files of the old result
+that are to be removed. Then the journal is moved to the folder. From then on, the new result is valid: if the
+process is interrupted, the next process that opens the folder completes the remaining steps
+(`complete_commit`). At the end, the journal becomes the manifest, which lists the files of the result.
+
+Files that are not in the manifest were not written by robocov. They are neither replaced nor removed. Links
+inside the folder are not followed.
 """
 
 import json
@@ -40,11 +42,13 @@ from robocov.files.result_names import (
 from robocov.files.writing import flush_to_disk, replace_file
 
 ResultKind: TypeAlias = Literal["run", "comparison", "replay", "story"]
+"""Kind of a result. A story is a branch of a session that consists of several runs."""
 MANIFEST_FILE = ".robocov.json"
 _JOURNAL_FILE = ".robocov-commit.json"
 _STAGING_FOLDER = ".robocov-new"
 _LOCK_FILE = ".robocov.lock"
 _HEADER = {"format": "robocov-folder", "version": 1}
+"""Format and version of manifests and journals."""
 _FIGURE_FILES = tuple(
     figure + suffix for figure in (TRAJECTORIES_FIGURE, COST_FIGURE) for suffix in FIGURE_SUFFIXES
 )
@@ -54,22 +58,24 @@ _MAIN_FILES: dict[ResultKind, str] = {
     "replay": REPLAY_FILE,
     "story": STORY_FILE,
 }
-"""Files that mark a folder as that of a result of each kind."""
+"""File that marks a folder as the folder of a result, for each kind of result."""
 _FILES: dict[ResultKind, tuple[str, ...]] = {
     "comparison": (COMPARISON_FILE, COMPARISON_TABLE_FILE, COMPARISON_VIDEO_FILE, *_FIGURE_FILES),
     "run": (RUN_FILE, RECORD_FILE, COST_FILE, RUN_VIDEO_FILE, *_FIGURE_FILES),
     "replay": (REPLAY_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
     "story": (STORY_FILE, SESSION_FILE, COST_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
 }
-"""Files of a result of each kind, in addition to ``frames/`` and the folders of a comparison's runs."""
+"""Files of each kind of result, except for ``frames/`` and the folders of the runs of a comparison."""
 _KNOWN_NAMES = {
     MANIFEST_FILE,
     METRICS_FILE,
     REPORT_FILE,
     *(name for names in _FILES.values() for name in names),
 }
+"""Names of all files of results, except for the frames of videos."""
 _FRAME_NAME = re.compile(r"\d{6}\.png")
 _FILE_NAME = re.compile(r"(?!\.{1,2}$)[^/\\:\0]+")
+"""Name of a file, without separators and other than ``.`` and ``..``."""
 _SIGNATURES = {
     **{
         main_file: re.compile(rf'"format":\s*"robocov-{kind}"'.encode())
@@ -78,24 +84,24 @@ _SIGNATURES = {
     METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
     REPORT_FILE: re.compile(rb'<meta name="generator" content="robocov'),
 }
-"""Patterns in the first bytes of files that robocov has written."""
+"""Patterns that the first bytes of a file contain if robocov has written it, by the name of the file."""
 _SIGNATURE_BYTES = 4096
 """Number of bytes at the start of a file that are searched for its signature."""
 
 
 class ResultFolder:
-    """A folder whose result is being written; see `create_result` and `extend_result`.
+    """A folder to which a result is written; see `create_result` and `extend_result`.
 
     Parameters
     ----------
     path : Path
-        The folder; it must exist.
+        The folder, which must exist.
     owned_files : set of str
-        Files of the result in the folder, which may be replaced.
+        Files of the earlier result in the folder, which may be replaced.
     replaces : bool
-        Whether the first commit removes the files of the earlier result that are not replaced.
-    part : str
-        Name of the run to which files are added, in the folder of a comparison.
+        Whether the first commit replaces the whole earlier result. If not, it adds files to it.
+    run_name : str
+        Name of the run of a comparison to which files are added; empty for the result itself.
 
     Attributes
     ----------
@@ -105,10 +111,10 @@ class ResultFolder:
         Hidden folder to which the files of the result are written.
     """
 
-    def __init__(self, path: Path, owned_files: set[str], *, replaces: bool, part: str = "") -> None:
+    def __init__(self, path: Path, owned_files: set[str], *, replaces: bool, run_name: str = "") -> None:
         self.path = path
-        self.staging = path / _STAGING_FOLDER / part
-        self._prefix = f"{part}/" if part else ""
+        self.staging = path / _STAGING_FOLDER / run_name
+        self._prefix = f"{run_name}/" if run_name else ""
         self._owned_files = owned_files
         self._replaces = replaces
         with report_folder_errors(path):
@@ -120,11 +126,14 @@ class ResultFolder:
         Parameters
         ----------
         name : str
+            Path of the file, relative to the folder of the result.
         """
         self._owned_files.add(self._prefix + name)
 
     def save_progress(self) -> None:
-        """Commit the files written so far; keep an earlier result until all of its replacement is complete.
+        """Commit the files written so far, unless they replace an earlier result.
+
+        An earlier result is kept until the new one is complete.
 
         Raises
         ------
@@ -143,7 +152,7 @@ class ResultFolder:
             If the folder cannot be written to, or a file not written by robocov is in the way.
         """
         with report_folder_errors(self.path):
-            # `self.staging` is a folder in this one if the result is one run of a comparison.
+            # If files are added to a run of a comparison, `self.staging` is a folder inside this one.
             staging_root = self.path / _STAGING_FOLDER
             staged_paths = [path for path in staging_root.rglob("*") if not path.is_dir()]
             new_files = {path.relative_to(staging_root).as_posix() for path in staged_paths}
@@ -174,25 +183,28 @@ class ResultFolder:
 
 @contextmanager
 def create_result(
-    folder: Path, kind: ResultKind = "run", *, overwrite: bool, parts: Iterable[str] = ()
+    folder: Path, kind: ResultKind = "run", *, overwrite: bool, run_names: Iterable[str] = ()
 ) -> Iterator[ResultFolder]:
     """Create a result in a folder, and commit it at the end of the ``with`` block.
 
-    If the block raises, nothing is committed. A missing folder is created, and removed again if it remains
-    empty.
+    If the block raises an error, nothing is committed. A missing folder is created, and removed again if it
+    remains empty.
 
     Parameters
     ----------
     folder : Path
+        Folder of the result.
     kind : {"run", "comparison", "replay", "story"}
+        Kind of the result.
     overwrite : bool
-        Replace a result that is already there.
-    parts : iterable of str
-        Names of the folders of a comparison's runs.
+        Whether to replace a result that is already in the folder.
+    run_names : iterable of str
+        Names of the runs of a comparison, each of which has a folder.
 
     Yields
     ------
     ResultFolder
+        Folder to whose `staging` folder the files are to be written.
 
     Raises
     ------
@@ -210,7 +222,8 @@ def create_result(
             with report_folder_errors(folder):
                 replaced_files = _find_replaced_files(folder, overwrite=overwrite)
                 owned_files = replaced_files or set()
-                for name in sorted(_list_possible_files(folder, kind, parts) | owned_files):
+                possible_files = _list_possible_files(folder, kind, run_names)
+                for name in sorted(possible_files | owned_files):
                     _require_replaceable(folder, name, owned_files)
             result = ResultFolder(folder, owned_files, replaces=replaced_files is not None)
             yield result
@@ -221,11 +234,11 @@ def create_result(
                 folder.rmdir()  # Fails, as it should, if the folder is not empty.
 
 
-def _list_possible_files(folder: Path, kind: ResultKind, parts: Iterable[str]) -> set[str]:
-    """Return the files that a result may have; of the frames, the first one and those that exist."""
+def _list_possible_files(folder: Path, kind: ResultKind, run_names: Iterable[str]) -> set[str]:
+    """List the files that a result may have: of the frames, the first one and all that exist already."""
     names = {*_FILES[kind], f"{FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
-    for part in parts:
-        names.update(f"{part}/{name}" for name in _FILES["run"])
+    for run_name in run_names:
+        names.update(f"{run_name}/{name}" for name in _FILES["run"])
     return names
 
 
@@ -241,6 +254,7 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
     Yields
     ------
     ResultFolder
+        Folder to whose `staging` folder the files are to be written.
 
     Raises
     ------
@@ -257,7 +271,7 @@ def extend_result(folder: Path) -> Iterator[ResultFolder]:
             owned_files = _list_owned_files(result_root)
         if owned_files is None:
             raise InputError(f"{folder}: expected a folder with a robocov result, found none")
-        result = ResultFolder(result_root, owned_files, replaces=False, part=run_name)
+        result = ResultFolder(result_root, owned_files, replaces=False, run_name=run_name)
         yield result
         result.commit()
 
@@ -291,10 +305,12 @@ def is_report(path: Path) -> bool:
     Parameters
     ----------
     path : Path
+        Any path, which may not exist.
 
     Returns
     -------
     bool
+        False also if the file cannot be read.
     """
     return _has_signature(path, REPORT_FILE)
 
@@ -306,6 +322,7 @@ def report_folder_errors(folder: Path) -> Iterator[None]:
     Parameters
     ----------
     folder : Path
+        Folder that the message names.
 
     Raises
     ------
@@ -319,7 +336,10 @@ def report_folder_errors(folder: Path) -> Iterator[None]:
 
 
 def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
-    """Return the files in a manifest or journal, and the removed ones; None if there is no such file."""
+    """Read the names of files in a manifest or journal; return None if there is no such file.
+
+    The first set contains the files of the result, the second one the files to remove.
+    """
     if not os.path.lexists(path):
         return None
     try:
@@ -350,13 +370,14 @@ def _require_result_file(name: str) -> None:
 
 
 def _carry_out_journal(folder: Path) -> None:
-    """Complete the steps in the journal of a folder, and make the journal the manifest."""
+    """Complete the steps in the journal of a folder, if there is one, and make the journal the manifest."""
     journal = _read_file_lists(folder / _JOURNAL_FILE)
     if journal is None:
         return
     files, removed_files = journal
+    # The journal must be on the disk before the first file is removed.
     flush_to_disk([folder])
-    # If an earlier attempt was interrupted, some of the files are already removed or moved.
+    # If an earlier attempt was interrupted, some of the files have already been removed or moved.
     for name in removed_files:
         path = _resolve_inside(folder, name)
         if _is_file_or_link(path):
@@ -385,8 +406,8 @@ def _open_folder(folder: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            # A journal is left by an interrupted commit. The staged files remain, from which the next opening
-            # completes it.
+            # A journal was left by an interrupted commit. The staged files must then remain, so that the
+            # commit can be completed when the folder is opened next.
             if not os.path.lexists(folder / _JOURNAL_FILE):
                 with suppress(OSError):
                     _discard_staging(folder)
@@ -398,7 +419,10 @@ def _discard_staging(folder: Path) -> None:
 
 
 def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
-    """Return the files of the result that is to be replaced; None if the folder is empty."""
+    """Return the files of the result that is to be replaced; None if the folder is empty.
+
+    Raise an error if the content of the folder must not be replaced.
+    """
     if not {path.name for path in folder.iterdir()} - {_LOCK_FILE, _STAGING_FOLDER, MANIFEST_FILE}:
         return None
     if not overwrite:
@@ -416,11 +440,11 @@ def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
 
 
 def _find_result_root(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
-    """Return the folder of the whole result to which a folder belongs, and the name of the run in it.
+    """Return the folder of the whole result to which a folder belongs, and the name of the run.
 
-    For the folder of one run of a comparison, these are the folder of the comparison, where the manifest or
-    journal `list_name` lists the files of the run, and the name of the run. For any other folder, they are
-    the folder itself and "".
+    The folder of one run of a comparison belongs to the folder of the comparison, whose manifest or journal
+    lists the files of the run. `list_name` is the file name of this manifest or journal. Any other folder
+    belongs to itself, and the name of the run is empty.
     """
     if os.path.lexists(folder / list_name):
         return folder, ""
@@ -437,7 +461,8 @@ def _find_result_root(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Pat
 def _list_owned_files(folder: Path) -> set[str] | None:
     """Return the files of the result in a folder; None if there is no result.
 
-    Without a readable manifest, for example in a copy without hidden files, the names identify the files.
+    If there is no readable manifest, for example in a copy without hidden files, the files are identified by
+    their names.
     """
     # A damaged manifest still shows that robocov wrote the folder.
     with suppress(InputError):
@@ -451,14 +476,15 @@ def _list_owned_files(folder: Path) -> set[str] | None:
     names = {name for name in _FILES[kind or "run"] if _is_file_or_link(folder / name)}
     names |= {name for name in (METRICS_FILE, REPORT_FILE) if _has_signature(folder / name, name)}
     if kind == "comparison":
-        for part in _list_parts(folder):
-            part_names = {*(_list_owned_files(part) or ()), MANIFEST_FILE}
-            names |= {f"{part.name}/{name}" for name in part_names if _is_file_or_link(part / name)}
+        for run_folder in _list_run_folders(folder):
+            run_files = {*(_list_owned_files(run_folder) or ()), MANIFEST_FILE}
+            existing_files = {name for name in run_files if _is_file_or_link(run_folder / name)}
+            names |= {f"{run_folder.name}/{name}" for name in existing_files}
     return names | _list_frames(folder)
 
 
 def _identify_kind(folder: Path) -> ResultKind | None:
-    """Return the kind of the result in a folder without a manifest; None if there is none."""
+    """Return the kind of the result in a folder without a manifest; None if there is no result."""
     for kind, main_file in _MAIN_FILES.items():
         if _has_signature(folder / main_file, main_file):
             return kind
@@ -472,20 +498,20 @@ def _list_frames(folder: Path) -> set[str]:
     return {f"{FRAMES_FOLDER}/{path.name}" for path in frames.iterdir() if _FRAME_NAME.fullmatch(path.name)}
 
 
-def _list_parts(folder: Path) -> list[Path]:
-    """Return the folders of the runs of a comparison without a manifest."""
+def _list_run_folders(folder: Path) -> list[Path]:
+    """List the folders of the runs of a comparison without a manifest."""
     try:
         names = [str(name) for name in json.loads((folder / COMPARISON_FILE).read_bytes())["folders"]]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
-    # Any other name could lead out of the folder.
+    # Other names could lead out of the folder.
     plain_names = [name for name in names if name != ".." and Path(name).name == name]
-    parts = [folder / name for name in plain_names]
-    return [part for part in parts if part.is_dir() and not part.is_symlink()]
+    run_folders = [folder / name for name in plain_names]
+    return [path for path in run_folders if path.is_dir() and not path.is_symlink()]
 
 
 def _has_signature(path: Path, name: str) -> bool:
-    """Return whether a file begins with the signature of the files that robocov writes under a name."""
+    """Return whether a file has the signature of the files that robocov writes under the given name."""
     try:
         if not path.is_file():
             return False
@@ -500,7 +526,7 @@ def _is_file_or_link(path: Path) -> bool:
 
 
 def _require_replaceable(folder: Path, name: str, owned_files: set[str]) -> None:
-    """Raise an error if the file of a result would replace a file not written by robocov."""
+    """Raise an error if a file of a result would replace a file that was not written by robocov."""
     path = _resolve_inside(folder, name)
     if not os.path.lexists(path):
         return

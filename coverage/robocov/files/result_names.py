@@ -1,7 +1,7 @@
 """Names of the files and folders in the folder of a result or a sweep.
 
-A run has `RUN_FILE` and `RECORD_FILE`, from which it can be loaded again. The other files are for people and
-other programs: tables, figures, videos and reports.
+A run can be loaded again from `RUN_FILE` and `RECORD_FILE`. The other files, such as tables, figures, videos
+and reports, are for people and other programs.
 """
 
 RUN_FILE = "run.json"
@@ -9,7 +9,7 @@ RUN_FILE = "run.json"
 RECORD_FILE = "record.npz"
 """Arrays of the record of a run."""
 COST_FILE = "cost.csv"
-"""Coverage cost of a run over time; in the folder of a branch, that of all of its parts."""
+"""Coverage cost over time, of a run or of a branch with all of its parts."""
 METRICS_FILE = "metrics.csv"
 """Metrics of a run over time."""
 RUN_VIDEO_FILE = "run.mp4"
@@ -39,14 +39,14 @@ SWEEP_PARQUET_FILE = "results.parquet"
 RUNS_FOLDER = "runs"
 """Folder of a sweep that contains the folders of its runs."""
 ERROR_FILE = "error.json"
-"""Error of a run of a sweep that failed; such a run has no `RUN_FILE`."""
+"""Error of a failed run of a sweep, which has no `RUN_FILE`."""
 
 TRAJECTORIES_FIGURE = "trajectories"
-"""Figure of the trajectories of one or several runs, without a suffix."""
+"""Name, without a suffix, of the figure of the trajectories of one or several runs."""
 COST_FIGURE = "cost"
-"""Figure of the coverage cost of one or several runs over time, without a suffix."""
+"""Name, without a suffix, of the figure of the coverage cost of one or several runs over time."""
 FIGURE_SUFFIXES = (".png", ".svg")
-"""Suffixes of each figure's files."""
+"""Suffixes of the files of each figure."""
 FRAMES_FOLDER = "frames"
 """Folder of the frames of a video, as PNG files."""
 REPORT_FILE = "report.html"

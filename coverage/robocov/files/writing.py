@@ -1,4 +1,4 @@
-"""Write files that appear whole or not at all."""
+"""Writing of files, each of which appears completely or not at all."""
 
 from __future__ import annotations
 
@@ -13,29 +13,31 @@ from robocov.errors import OutputError, describe_error, quote
 
 _SPECIAL_FILES = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """Kinds of files that are not regular, by the first character of the mode."""
-_MAX_SUFFIX_LENGTH = 16
-"""Characters. Writers choose a format by the suffix; a longer ending is not a suffix."""
+_MAX_SUFFIX_CHARACTERS = 16
+"""Length from which the ending of a file name does not count as the suffix of a format."""
 _FLUSH_THREADS = 8
+"""Number of threads that flush files at the same time."""
 
 
 @contextmanager
 def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
     """Provide a temporary file that replaces the target when the ``with`` block ends.
 
-    If the ``with`` block raises, the temporary file is removed and `target` stays as it was. A link stays a
-    link: the file that it points to is replaced. An existing file keeps its permissions.
+    If the ``with`` block raises an error, the temporary file is removed and the target does not change. If
+    the target is a link, the file to which it points is replaced. An existing file keeps its permissions.
 
     Parameters
     ----------
     target : Path
         The file to create or replace.
     durable : bool
-        Flush the file to the disk before it replaces the target.
+        Whether to flush the file to the disk before it replaces the target.
 
     Yields
     ------
     Path
-        The temporary file, next to `target` and with its suffix, for writers that choose a format by it.
+        The temporary file, next to the target. It has the suffix of the target, by which writers may choose a
+        format.
 
     Raises
     ------
@@ -53,7 +55,7 @@ def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
     'complete'
     """
     real_target = resolve_target(target)
-    suffix = target.suffix if len(target.suffix) < _MAX_SUFFIX_LENGTH else ""
+    suffix = target.suffix if len(target.suffix) < _MAX_SUFFIX_CHARACTERS else ""
     temporary = real_target.with_name(f".robocov-{secrets.token_hex(6)}.part{suffix}")
     try:
         yield temporary
@@ -65,26 +67,27 @@ def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
     except OSError as error:
         raise _build_error(target, f"cannot be written: {describe_error(error)}") from error
     finally:
-        with suppress(OSError):  # It was renamed, or never existed.
+        with suppress(OSError):  # Fails if the file has been renamed, or was never written.
             temporary.unlink()
 
 
 def resolve_target(target: Path) -> Path:
-    """Return the file that writing to a path would replace, which is another one if the path is a link.
+    """Find the file that would be replaced by writing to a path.
 
     Parameters
     ----------
     target : Path
-        A file that may not exist yet.
+        A file that may not exist yet, or a link to a file.
 
     Returns
     -------
     Path
+        The file. It differs from `target` if this is a link.
 
     Raises
     ------
     OutputError
-        If it is not a regular file, or a broken link, or cannot be accessed.
+        If the path is a broken link or not a regular file, or cannot be accessed.
     """
     try:
         real_target = target.resolve(strict=True) if target.is_symlink() else target
@@ -103,7 +106,7 @@ def resolve_target(target: Path) -> Path:
 
 
 def flush_to_disk(paths: Iterable[Path]) -> None:
-    """Flush files and folders to the disk, all at the same time.
+    """Flush files and folders to the disk, several at the same time.
 
     Parameters
     ----------
@@ -112,7 +115,7 @@ def flush_to_disk(paths: Iterable[Path]) -> None:
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    # Flushing is mostly waiting, so many files take about as long as one.
+    # A thread that flushes a file mostly waits for the disk.
     with ThreadPoolExecutor(_FLUSH_THREADS) as threads:
         list(threads.map(_flush, paths))
 

@@ -26,13 +26,11 @@ from robocov.environment import (
 from robocov.errors import StartError, format_count, format_path, summarize_names
 
 MANY_VERTICES = 5000
-"""Maps with more vertices get a warning about computing time."""
+"""Number of vertices above which there is a warning about the computing time of a map."""
 _SECONDS_PER_SQUARED_VERTEX = 6.1e-8
-"""Measured time to set up a `robocov.cost.CoverageCost`, divided by the squared number of vertices."""
+"""Measured time to set up a `robocov.cost.CoverageCost`, divided by the square of the number of vertices."""
 _MAX_EQUAL_DISTANCE_M = 1e-6
-"""Vertices closer than this are probably meant to be the same."""
-
-
+"""Distance below which two vertices are probably meant to be the same."""
 _INTERIORS_INTERSECT = "T********"
 """DE-9IM pattern of two shapes whose interiors have points in common."""
 
@@ -43,6 +41,7 @@ class StartReport(NamedTuple):
     Attributes
     ----------
     name : str
+        Name of the start in the map.
     kind : str
         ``disc``, ``uniform`` or ``points``.
     capacity : int
@@ -61,21 +60,25 @@ class MapReport:
     Attributes
     ----------
     name : str
+        Name of the map.
     area : float, m²
         Area inside the boundary.
     free_area : float, m²
         Area inside the boundary and outside every obstacle.
-    vertex_count, obstacle_count : int
-        Numbers in the file; circles have no vertices.
+    vertex_count : int
+        Number of vertices in the file of the map. Circles have none.
+    obstacle_count : int
+        Number of obstacles.
     components : tuple of float, m²
         Areas of the connected components of the free space, the largest first.
     narrowest_gap : Gap or None
-        See `robocov.environment.find_narrowest_gap`.
+        Narrowest passage of the free space; see `robocov.environment.find_narrowest_gap`.
     starts : tuple of StartReport
+        Starts in the file of the map.
     warnings : tuple of str
         Likely mistakes, one line each.
     density : str or None
-        Kind of the density.
+        Kind of the density; None if the map has no density.
     density_range : pair of float or None
         Smallest and largest value of the density.
     mean_density : float
@@ -97,7 +100,7 @@ class MapReport:
 
     @property
     def free_fraction(self) -> float:
-        """Free area as a fraction of the area."""
+        """Fraction of the area that is free."""
         return self.free_area / self.area
 
     def to_dict(self) -> dict[str, Any]:
@@ -106,6 +109,7 @@ class MapReport:
         Returns
         -------
         dict
+            Values by key.
         """
         gap = self.narrowest_gap
         return {
@@ -139,10 +143,11 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     Returns
     -------
     MapReport
+        Measures and warnings.
 
     See Also
     --------
-    load_map : Load a map; the maps that it returns are valid.
+    load_map : Load a map, and check that it is valid.
 
     Examples
     --------
@@ -177,10 +182,11 @@ def _build_start_report(environment: Environment, name: str, radius: float) -> S
 
 
 def _find_maximum(density: Density) -> float:
-    """Return the largest value of a density; `max_value` is only a bound if peaks overlap."""
+    """Return the largest value of a density."""
     if not isinstance(density, Gaussians) or len(density.peaks) < 2:
         return density.max_value
-    # Imported only now, because loading it takes longer than checking most maps.
+    # If peaks overlap, `max_value` is only an upper bound, and the maximum is found by optimization.
+    # Importing the package takes longer than checking most maps.
     from scipy.optimize import minimize
 
     def evaluate_negative(point: Array) -> float:
@@ -190,29 +196,33 @@ def _find_maximum(density: Density) -> float:
 
 
 def count_vertices(environment: Environment) -> int:
-    """Count the vertices in the file of a map; circles have none.
+    """Count the vertices in the file of a map.
 
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
     int
+        Number of vertices of the boundary, polygons and walls. Circles have none.
     """
     return sum(len(ring) for _, ring in _iterate_rings(environment))
 
 
 def describe_vertex_count(vertex_count: int) -> str:
-    """Return the warning about the computing time of a map with many vertices.
+    """Build the warning about the computing time of a map with many vertices.
 
     Parameters
     ----------
     vertex_count : int
+        Number of vertices of the map.
 
     Returns
     -------
     str
+        One sentence, without a period.
     """
     seconds = _SECONDS_PER_SQUARED_VERTEX * vertex_count * vertex_count
     time = f"{seconds:.0f} seconds" if seconds < 90.0 else f"{seconds / 60:.0f} minutes"
@@ -223,7 +233,7 @@ def describe_vertex_count(vertex_count: int) -> str:
 
 
 def _iterate_rings(environment: Environment) -> Iterator[tuple[str, Ring]]:
-    """Yield the lists of vertices of the file, with their paths."""
+    """Yield each list of vertices in the file of a map, with its JSON path."""
     yield "boundary", environment.boundary
     for k, obstacle in enumerate(environment.obstacles):
         path = format_path(("obstacles", k))
@@ -252,7 +262,7 @@ def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> 
 
 
 def _find_shape_warnings(environment: Environment) -> Iterator[str]:
-    """Yield warnings about duplicate vertices and obstacles outside the boundary."""
+    """Yield warnings about duplicate vertices, and about obstacles outside the boundary."""
     for path, ring in _iterate_rings(environment):
         points = np.asarray(ring)
         edge_lengths = compute_lengths(np.roll(points, -1, axis=0) - points)
@@ -268,6 +278,7 @@ def _find_shape_warnings(environment: Environment) -> Iterator[str]:
 
 def _find_path_warnings(environment: Environment) -> Iterator[str]:
     """Yield warnings about obstacles that move through fixed ones or through the boundary."""
+    # Polygons of the obstacles that do not move, by their indices.
     fixed = {k: shape.polygon for k, shape in enumerate(environment.obstacles) if shape.path is None}
     for k, obstacle in enumerate(environment.obstacles):
         if obstacle.path is None:
@@ -282,29 +293,31 @@ def _find_path_warnings(environment: Environment) -> Iterator[str]:
 
 
 def _format_obstacle(environment: Environment, k: int) -> str:
+    """Return the JSON path of an obstacle, with its name if it has one."""
     path = format_path(("obstacles", k))
     name = environment.obstacles[k].name
     return f"{path} ({name})" if name else path
 
 
 def _find_component_warnings(environment: Environment, radius: float) -> Iterator[str]:
-    """Yield warnings about components of the free space that the largest one does not reach."""
-    footprint = math.pi * radius * radius
-    pockets = []
+    """Yield warnings about components of the free space that are not connected to the largest one."""
+    robot_area = math.pi * radius * radius
+    pocket_areas = []
     # The largest component comes first.
     _, *other_components = environment.free.geoms
     for component in other_components:
-        if component.area < footprint:
-            pockets.append(component.area)
+        if component.area < robot_area:
+            pocket_areas.append(component.area)
             continue
         point = component.representative_point()
         yield f"sealed room of {component.area:.3g} m² around [{point.x:.4g}, {point.y:.4g}]"
-    if pockets:
-        pocket_count = format_count(len(pockets), "sealed pocket")
-        yield f"{pocket_count} smaller than a robot, {sum(pockets):.2g} m² in total"
+    if pocket_areas:
+        pockets = format_count(len(pocket_areas), "sealed pocket")
+        yield f"{pockets} smaller than a robot, {sum(pocket_areas):.2g} m² in total"
 
 
 def _find_start_warnings(environment: Environment, radius: float) -> Iterator[str]:
+    """Yield warnings about starts with given positions at which robots of the given radius do not fit."""
     for name, start in environment.starts.items():
         if isinstance(start, PointsStart):
             try:

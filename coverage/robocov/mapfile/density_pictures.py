@@ -10,7 +10,7 @@ from robocov.density import MAX_RASTER_SIZE
 from robocov.errors import InputError, describe_error, to_one_line
 
 MAX_PICTURE_BYTES = 8_000_000
-"""Largest image file."""
+"""Largest size of an image file."""
 _WHITE_8_BIT = 255.0
 """Gray level of white in images with 8 bits per pixel."""
 _WHITE_16_BIT = 65535.0
@@ -18,18 +18,19 @@ _WHITE_16_BIT = 65535.0
 
 
 def read_picture_file(name: str, folder: Path | None) -> bytes:
-    """Read an image file in a folder or below it.
+    """Read an image file in the folder of a map, or in a folder inside it.
 
     Parameters
     ----------
     name : str
-        Path relative to the folder.
+        Path of the image, relative to the folder of the map.
     folder : Path or None
-        None if the map did not come from a file.
+        Folder of the map; None if the map was not loaded from a file.
 
     Returns
     -------
     bytes
+        Content of the file.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def read_picture_file(name: str, folder: Path | None) -> bytes:
 
 
 def _resolve_inside(name: str, folder: Path) -> Path:
-    """Return the path of a file in a folder; raise an error if it is outside the folder."""
+    """Return the path of a file in a folder; raise an error if the path leads out of the folder."""
     path = None
     # On some systems, a drive, a root or a backslash leads out of the folder.
     if "\0" not in name and "\\" not in name and not PureWindowsPath(name).anchor:
@@ -71,11 +72,12 @@ def read_gray_levels(content: bytes) -> Array:
     Parameters
     ----------
     content : bytes
+        Content of the image file.
 
     Returns
     -------
     (rows, columns) array
-        From 0 (black) to 1 (white), the top row first.
+        Gray levels from 0 (black) to 1 (white), the top row first.
 
     Raises
     ------

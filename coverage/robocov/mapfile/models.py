@@ -1,6 +1,7 @@
-"""The map JSON, version 1, as pydantic models, and its JSON Schema.
+"""Pydantic models of the map JSON, version 1, and its JSON Schema.
 
-The models of obstacles, starts and densities are derived from the classes that they describe.
+The models of obstacles, starts and densities are built from the fields of the classes that they describe,
+such as `CircleObstacle`, and from the table `KEYS`.
 """
 
 from collections.abc import Mapping
@@ -17,41 +18,50 @@ from robocov.environment import Repeat
 FORMAT = "robocov-map"
 VERSION = 1
 HEADER: Mapping[str, Any] = {"format": FORMAT, "version": VERSION}
+"""First keys of every map file."""
 MIN_SPEED_M_S = 1e-3
 MAX_SPEED_M_S = 10.0
-"""Range of the speed of an obstacle."""
+"""Smallest and largest speed of an obstacle."""
 MIN_SIZE_M = 1e-3
 MAX_SIZE_M = 1e4
-"""Range of all lengths and extents."""
+"""Smallest and largest length or extent."""
 MAX_COORDINATE_M = 1e7
-"""Large enough for the coordinates of national grids, and small enough to distinguish micrometers."""
+"""Largest absolute value of a coordinate: large enough for the coordinates of national grids, and small
+enough to distinguish micrometers."""
 MIN_WEIGHT = 1e-9
-"""Smaller weights are read as 0, because they are written as 0."""
+"""Smallest weight above 0. Smaller weights are read as 0, because they would be written as 0."""
 MAX_LABEL_CHARACTERS = 100
+"""Largest number of characters of a name."""
 MAX_DESCRIPTION_CHARACTERS = 10_000
+"""Largest number of characters of the description of a map."""
 _MAX_FILE_NAME_CHARACTERS = 500
+"""Largest number of characters of the path of an image."""
 _MAX_VARIANCE_M2 = 1e8
-_TINY_M = 1e-100
-"""Smaller coordinates are read as 0, because quotients of such numbers overflow."""
+"""Largest absolute value in a covariance matrix."""
+_MIN_COORDINATE_M = 1e-100
+"""Smallest absolute value of a coordinate. Smaller coordinates are read as 0, because quotients of such
+numbers overflow."""
 _MAX_FEATURES = 10_000
 """Largest number of peaks or areas of a density."""
 _MAX_INTEGER_FLOAT = 1e15
-"""Larger floats are always whole, and would be long as integers."""
+"""Value below which whole floats are written as integers. Larger floats would have many digits as
+integers."""
 _LABEL_PATTERN = r"^[^\x00-\x1f\x7f]+$"
+"""Pattern of a name: no control characters, and so no line breaks."""
 
 
-def _limit(minimum: float, maximum: float, description: str | None = None) -> Any:
-    """Return the field of a number in a range."""
+def _limit_number(minimum: float, maximum: float, description: str | None = None) -> Any:
+    """Build the field of a number in a range."""
     return Field(strict=True, allow_inf_nan=False, ge=minimum, le=maximum, description=description)
 
 
 Coordinate: TypeAlias = Annotated[
     float,
-    _limit(-MAX_COORDINATE_M, MAX_COORDINATE_M, "meters"),
-    AfterValidator(lambda value: 0.0 if -_TINY_M < value < _TINY_M else value),
+    _limit_number(-MAX_COORDINATE_M, MAX_COORDINATE_M, "meters"),
+    AfterValidator(lambda value: 0.0 if -_MIN_COORDINATE_M < value < _MIN_COORDINATE_M else value),
 ]
-Size: TypeAlias = Annotated[float, _limit(MIN_SIZE_M, MAX_SIZE_M)]
-Speed: TypeAlias = Annotated[float, _limit(MIN_SPEED_M_S, MAX_SPEED_M_S)]
+Size: TypeAlias = Annotated[float, _limit_number(MIN_SIZE_M, MAX_SIZE_M)]
+Speed: TypeAlias = Annotated[float, _limit_number(MIN_SPEED_M_S, MAX_SPEED_M_S)]
 Vertex: TypeAlias = Annotated[
     list[Coordinate], Field(min_length=2, max_length=2, examples=[[1.5, 2]]), AfterValidator(tuple)
 ]
@@ -62,7 +72,7 @@ FileName: TypeAlias = Annotated[Text, Field(min_length=1, max_length=_MAX_FILE_N
 Label: TypeAlias = Annotated[
     str, Field(strict=True, min_length=1, max_length=MAX_LABEL_CHARACTERS, pattern=_LABEL_PATTERN)
 ]
-RasterValue: TypeAlias = Annotated[float, _limit(0.0, MAX_WEIGHT)]
+RasterValue: TypeAlias = Annotated[float, _limit_number(0.0, MAX_WEIGHT)]
 Weight: TypeAlias = Annotated[
     RasterValue, AfterValidator(lambda weight: weight if weight >= MIN_WEIGHT else 0.0)
 ]
@@ -71,18 +81,18 @@ Positions: TypeAlias = Annotated[list[Vertex], Field(min_length=1)]
 Row: TypeAlias = Annotated[list[RasterValue], Field(min_length=1, max_length=MAX_RASTER_SIZE)]
 Rows: TypeAlias = Annotated[list[Row], Field(min_length=1, max_length=MAX_RASTER_SIZE)]
 Extent: TypeAlias = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
-Variance: TypeAlias = Annotated[float, _limit(-_MAX_VARIANCE_M2, _MAX_VARIANCE_M2)]
+Variance: TypeAlias = Annotated[float, _limit_number(-_MAX_VARIANCE_M2, _MAX_VARIANCE_M2)]
 Variances: TypeAlias = Annotated[list[Variance], Field(min_length=2, max_length=2)]
 Matrix: TypeAlias = Annotated[list[Variances], Field(min_length=2, max_length=2)]
 
 
 class Model(BaseModel):
-    """An object of a map JSON, in which unknown keys are errors.
+    """Base class of models of JSON objects, in which unknown keys are errors.
 
     Attributes
     ----------
     described_class : type
-        Class of the described object, with fields of the same names.
+        Class that the model describes. It has fields of the same names.
     """
 
     model_config = ConfigDict(extra="forbid", populate_by_name=False)
@@ -90,17 +100,19 @@ class Model(BaseModel):
     described_class: ClassVar[Any] = None
 
     def build(self) -> Any:
-        """Build the described object.
+        """Build an object of the described class.
 
         Returns
         -------
         object
+            An obstacle, start or density, or part of one of these.
         """
         names = type(self).model_fields.keys() - {"kind"}
         return self.described_class(**{name: _build_value(getattr(self, name)) for name in names})
 
 
 def _build_value(value: Any) -> Any:
+    """Convert the value of a key: models to the objects that they describe, and lists to tuples."""
     if isinstance(value, Model):
         return value.build()
     if isinstance(value, list):
@@ -108,8 +120,8 @@ def _build_value(value: Any) -> Any:
     return value
 
 
-def _describe(description: str, example: Any, default: Any = ..., alias: str | None = None) -> Any:
-    """Return a field with a description and an example for editors."""
+def _build_field(description: str, example: Any, default: Any = ..., alias: str | None = None) -> Any:
+    """Build a field with a description and an example for text editors."""
     return Field(default, description=description, examples=[example], alias=alias)
 
 
@@ -118,7 +130,7 @@ WEIGHT_EXPECTED = f"a number from 0 to {MAX_WEIGHT:.0f}"
 _SIZE_EXPECTED = f"a number from {MIN_SIZE_M:g} to {MAX_SIZE_M:.0f} (m)"
 _SPEED_EXPECTED = f"a number from {MIN_SPEED_M_S:g} to {MAX_SPEED_M_S:g} (m/s)"
 COORDINATE_EXPECTED = f"a number from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} (m)"
-# Descriptions of an expected value, of its items, of their items, and so on.
+# Each tuple describes an expected value, then its items if it is a list, then the items of these, and so on.
 _POINT_EXPECTED = ("a point [x, y] in meters", COORDINATE_EXPECTED)
 RING_EXPECTED = ("a list of at least 3 points [x, y]", *_POINT_EXPECTED)
 _LINE_EXPECTED = ("a list of at least 2 points [x, y]", *_POINT_EXPECTED)
@@ -135,17 +147,19 @@ _EXAMPLE_DENSITY = {"kind": "gaussians", "floor": 0.2, "peaks": [_EXAMPLE_PEAK]}
 
 
 class KeySpecification(NamedTuple):
-    """A key of the objects of a map.
+    """A key of the objects in a map.
 
     Attributes
     ----------
     type : object
-        Annotation of its value.
+        Type annotation of the value.
     description : str
-        Description for editors.
+        Description for text editors.
     example : object
+        Example of a value, for text editors.
     expected : tuple of str
-        Descriptions for messages, of the value, of its items, of their items, and so on.
+        Descriptions for messages: of the value, of its items if it is a list, of the items of these, and so
+        on.
     """
 
     type: Any
@@ -197,37 +211,44 @@ KEYS = {
     "floor": KeySpecification(Weight, "Weight of all points without the peaks", 0.2, (WEIGHT_EXPECTED,)),
     "background": KeySpecification(Weight, "Weight of the points outside all areas", 1, (WEIGHT_EXPECTED,)),
 }
-"""Keys that several kinds of objects have; `PARTS` adds those with objects as values."""
+"""Keys of obstacles, starts and densities. Keys whose values are objects are added below."""
 
 
 def _build_model(described_class: Any, kind: str | None = None) -> type[Model]:
-    """Build the model of a class from its fields; those with a default are optional."""
+    """Build the model of a class from those of its fields that are in `KEYS`.
+
+    Fields with a default are optional. `kind` is the value of an additional key, by which the model is
+    chosen.
+    """
     defaults = {field.name: field.default for field in fields(described_class)}
     members: dict[str, Any] = {}
     if kind is not None:
-        members["kind"] = (Literal[kind], _describe("Kind, which determines the other keys", kind))
+        members["kind"] = (Literal[kind], _build_field("Kind, which determines the other keys", kind))
     for name, key in KEYS.items():
         if name not in defaults:
             continue
+        # For pydantic, a field with the default `...` is required.
         default = ... if defaults[name] is MISSING else defaults[name]
-        content = key.type | None if default is None else key.type
-        members[name] = (content, _describe(key.description, key.example, default))
+        annotation = key.type | None if default is None else key.type
+        members[name] = (annotation, _build_field(key.description, key.example, default))
     summary = str(described_class.__doc__).partition("\n")[0]
     model = create_model(described_class.__name__, __base__=Model, __doc__=summary, **members)
     model.described_class = described_class
     return model
 
 
-PARTS = {
+NESTED_MODELS = {
     "path": _build_model(environment.ObstaclePath),
     "peaks": _build_model(density.Gaussian),
     "areas": _build_model(density.WeightedArea),
 }
-"""Models of the objects at these keys, or in the lists at these keys."""
+"""Models of objects inside obstacles and densities, by the key of the object or of the list that contains
+it."""
 
 
-def _specify_list(name: str, description: str, example: object) -> KeySpecification:
-    model: Any = PARTS[name]
+def _specify_list_key(name: str, description: str, example: object) -> KeySpecification:
+    """Build the specification of a key whose value is a list of objects."""
+    model: Any = NESTED_MODELS[name]
     return KeySpecification(
         type=Annotated[list[model], Field(max_length=_MAX_FEATURES)],
         description=description,
@@ -237,35 +258,35 @@ def _specify_list(name: str, description: str, example: object) -> KeySpecificat
 
 
 KEYS["path"] = KeySpecification(
-    PARTS["path"],
+    NESTED_MODELS["path"],
     "Movement of the obstacle; none by default",
     _EXAMPLE_PATH,
     ("an object with points and speed",),
 )
-KEYS["peaks"] = _specify_list("peaks", "Peaks, which are added up", _EXAMPLE_PEAK)
-KEYS["areas"] = _specify_list(
+KEYS["peaks"] = _specify_list_key("peaks", "Peaks, which are added up", _EXAMPLE_PEAK)
+KEYS["areas"] = _specify_list_key(
     "areas", "Polygons, the later ones on top", {"vertices": _EXAMPLE_CORNERS, "weight": 5}
 )
 
 
 class RasterModel(Model, title="raster density"):
-    """A density given by rows of numbers, or by an image file."""
+    """A density on a grid of cells, given by rows of numbers or by an image file."""
 
-    kind: Literal["raster"] = _describe("Kind, which determines the other keys", "raster")
-    extent: Extent | None = _describe(
+    kind: Literal["raster"] = _build_field("Kind, which determines the other keys", "raster")
+    extent: Extent | None = _build_field(
         "Covered rectangle [x_min, y_min, x_max, y_max] in m; the bounding box of the boundary by default",
         [0, 0, 10, 6],
         None,
     )
-    interpolation: Interpolation = _describe(
+    interpolation: Interpolation = _build_field(
         "Bilinear between the centers of the cells, or constant in each cell", "bilinear", "bilinear"
     )
-    rows: Rows | None = _describe("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
-    picture: FileName | None = _describe(
+    rows: Rows | None = _build_field("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
+    picture: FileName | None = _build_field(
         "Instead of rows, a gray PNG or PGM file in the folder of the map", "density.png", None
     )
-    black: Weight | None = _describe("Weight of black; 0 by default", 0.1, None)
-    white: Weight | None = _describe("Weight of white; 1 by default", 5, None)
+    black: Weight | None = _build_field("Weight of black; 0 by default", 0.1, None)
+    white: Weight | None = _build_field("Weight of white; 1 by default", 5, None)
 
 
 _CLASSES: dict[str, dict[str, Any]] = {
@@ -289,48 +310,52 @@ MODELS_BY_KIND = {
     key: {kind: _build_model(described_class, kind) for kind, described_class in classes.items()}
     for key, classes in _CLASSES.items()
 }
-"""Models of obstacles, starts and densities by the key of the map and their kind."""
+"""Models of obstacles, starts and densities, by the key of the map and by their kind."""
 MODELS_BY_KIND["density"]["raster"] = RasterModel
 _MODELS_BY_CLASS = {
     model.described_class: model for model in Model.__subclasses__() if model.described_class is not None
 }
+"""Models by the class that they describe."""
 
 
-def _choose_by_kind(key: str, description: str) -> Any:
+def _build_union(key: str, description: str) -> Any:
+    """Build the annotation of an object whose kind determines its model."""
     models = tuple(MODELS_BY_KIND[key].values())
     return Annotated[Union[models], Field(discriminator="kind", description=description)]  # noqa: UP007
 
 
-ObstacleModel: Any = _choose_by_kind("obstacles", "An obstacle")
-StartModel: Any = _choose_by_kind("starts", "A start of a team")
-DensityModel: Any = _choose_by_kind("density", "The weights of the points of a map")
+ObstacleModel: Any = _build_union("obstacles", "An obstacle")
+StartModel: Any = _build_union("starts", "A start of a team")
+DensityModel: Any = _build_union("density", "The weights of the points of a map")
 
 
 class MapModel(Model, title="robocov map"):
     """A map of robocov: the outer boundary, obstacles, and named starts of the robots, in meters."""
 
-    schema_: Text | None = _describe(
+    schema_: Text | None = _build_field(
         "Address of the schema, for text editors", "./map.json", None, alias="$schema"
     )
-    format: Literal["robocov-map"] = _describe("Format of the file", FORMAT)
-    version: Literal[1] = _describe("Version of the format", VERSION)
-    name: Label = _describe("Displayed name of the map", "Two rooms")
-    description: Description = _describe("Description of the map", "A wall with one door.", "")
-    boundary: VertexRing = _describe(
+    format: Literal["robocov-map"] = _build_field("Format of the file", FORMAT)
+    version: Literal[1] = _build_field("Version of the format", VERSION)
+    name: Label = _build_field("Displayed name of the map", "Two rooms")
+    description: Description = _build_field("Description of the map", "A wall with one door.", "")
+    boundary: VertexRing = _build_field(
         "Outer boundary, convex or not; robots know its convex hull", [[0, 0], [10, 0], [10, 6], [0, 6]]
     )
-    obstacles: list[ObstacleModel] = _describe(
+    obstacles: list[ObstacleModel] = _build_field(
         "Obstacles, which may overlap, touch, and extend beyond the boundary", [_EXAMPLE_WALL], []
     )
-    starts: dict[Label, StartModel] = _describe("Named starts; the first is the default", _EXAMPLE_STARTS, {})
-    density: DensityModel | None = _describe(
+    starts: dict[Label, StartModel] = _build_field(
+        "Named starts; the first is the default", _EXAMPLE_STARTS, {}
+    )
+    density: DensityModel | None = _build_field(
         "Weights of the points; all the same by default", _EXAMPLE_DENSITY, None
     )
-    extra: dict[str, Any] = _describe("Your own keys, which are preserved", {"author": "Ada"}, {})
+    extra: dict[str, Any] = _build_field("Your own keys, which are preserved", {"author": "Ada"}, {})
 
 
 def to_json_value(value: Any) -> Any:
-    """Convert an obstacle, start or density, or a part of one, to a JSON value.
+    """Convert an obstacle, start or density, or a part of one of these, to a JSON value.
 
     Parameters
     ----------
@@ -340,7 +365,7 @@ def to_json_value(value: Any) -> Any:
     Returns
     -------
     object
-        Whole numbers are integers; keys with empty values are left out.
+        JSON value. Whole numbers are integers. Keys with empty values are left out.
 
     Examples
     --------
@@ -368,11 +393,12 @@ def to_json_value(value: Any) -> Any:
 
 
 def build_map_schema() -> dict[str, Any]:
-    """Build the JSON Schema (2020-12) of map files, with descriptions and examples for editors.
+    """Build the JSON Schema (2020-12) of map files, with descriptions and examples for text editors.
 
     Returns
     -------
     dict
+        The schema as a JSON document.
 
     See Also
     --------
@@ -385,7 +411,8 @@ def build_map_schema() -> dict[str, Any]:
     ['format', 'version', 'name', 'boundary']
     """
     schema = MapModel.model_json_schema(by_alias=True)
-    # pydantic's schema constrains only starts whose names match the pattern, and allows anything elsewhere.
+    # The schema of pydantic checks only starts whose names match the pattern, and accepts any other names.
+    # This change checks all starts, and their names too.
     starts = schema["properties"]["starts"]
     ((pattern, start),) = starts.pop("patternProperties").items()
     starts["additionalProperties"] = start

@@ -1,4 +1,4 @@
-"""Read maps from files, strings and JSON documents, and find the bundled ones."""
+"""Reading of maps from files, texts and JSON documents, and the bundled maps."""
 
 import json
 from contextlib import suppress
@@ -27,8 +27,8 @@ from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import NO_WEIGHT, validate_document
 
-_GRAY_DIGITS = 6
-"""Decimal places of the weights of gray levels, so that a map that is saved again stays short."""
+_WEIGHT_DECIMALS = 6
+"""Decimal places of the weights that are read from an image. They keep the file short if the map is saved."""
 
 
 def load_map(source: str | Path) -> Environment:
@@ -37,16 +37,18 @@ def load_map(source: str | Path) -> Environment:
     Parameters
     ----------
     source : str or Path
-        Path of a map file, or the name of a bundled map, which is a str without suffix or separator.
+        Path of a map file; or the name of a bundled map, which is a str without a suffix or separator.
 
     Returns
     -------
     Environment
+        The map, which is valid.
 
     Raises
     ------
     MapError
-        If the map cannot be read; the message has line, column and JSON path of the first issue.
+        If the map cannot be read or is not valid. The message contains the line, the column and the JSON path
+        of each issue.
 
     See Also
     --------
@@ -70,12 +72,12 @@ def find_map_file(source: str | Path) -> Path:
     Parameters
     ----------
     source : str or Path
-        See `load_map`.
+        Path of a map file, or the name of a bundled map; see `load_map`.
 
     Returns
     -------
     Path
-        It may not exist.
+        Path of the file, which may not exist.
 
     Raises
     ------
@@ -101,11 +103,11 @@ def list_bundled_maps() -> dict[str, Path]:
     Returns
     -------
     dict of str to Path
-        Files by name, sorted: those in the installed package, otherwise those in the checkout.
+        Files by the name of the map, sorted by name.
 
     See Also
     --------
-    load_map : Load one of them.
+    load_map : Load a map by name or from a file.
 
     Examples
     --------
@@ -114,65 +116,72 @@ def list_bundled_maps() -> dict[str, Path]:
     >>> maps["rooms"].name
     'rooms.json'
     """
-    here = Path(__file__).resolve()
-    in_package = sorted((here.parents[1] / "maps").glob("*.json"))
-    in_checkout = sorted((here.parents[3] / "maps").glob("*.json"))
-    return {file.stem: file for file in in_package or in_checkout}
+    module_path = Path(__file__).resolve()
+    # An installed package contains the maps. In a checkout, they are in a folder next to the sources.
+    installed_files = sorted((module_path.parents[1] / "maps").glob("*.json"))
+    checkout_files = sorted((module_path.parents[3] / "maps").glob("*.json"))
+    return {file.stem: file for file in installed_files or checkout_files}
 
 
-def parse_map(text: str | bytes, where: str, folder: Path | None = None) -> Environment:
+def parse_map(text: str | bytes, source_name: str, folder: Path | None = None) -> Environment:
     """Parse the text of a map file.
 
     Parameters
     ----------
     text : str or bytes
-    where : str
-        Name of the file in messages.
+        Text of the file.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     folder : Path or None
-        Folder of the images named in the map; None if the map does not come from a file.
+        Folder of the images that the map names; None if the map was not loaded from a file.
 
     Returns
     -------
     Environment
+        The map, which is valid.
 
     Raises
     ------
     MapError
-        See `load_map`.
+        If the text is not a valid map; see `load_map`.
     """
-    document = parse_json(text, where)
+    document = parse_json(text, source_name)
     try:
-        return _build_environment(document, to_one_line(where), folder)
+        return _build_environment(document, to_one_line(source_name), folder)
     except MapError as error:
-        raise locate_issues(error, text, where) from None
+        raise locate_issues(error, text, source_name) from None
 
 
-def from_json(document: dict[str, Any], where: str = "map", folder: Path | None = None) -> Environment:
+def from_json(document: dict[str, Any], source_name: str = "map", folder: Path | None = None) -> Environment:
     """Build the map that a JSON document describes.
 
     Parameters
     ----------
     document : dict
-    where : str
-        Name of the document in messages.
+        Content of a map file.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     folder : Path or None
-        Folder of the images named in the map; None if the map does not come from a file.
+        Folder of the images that the map names; None if the map was not loaded from a file.
 
     Returns
     -------
     Environment
+        The map, which is valid.
 
     Raises
     ------
     MapError
         If the document is not a valid map.
     """
-    where = to_one_line(where)
-    require_json(document, where)
-    return _build_environment(document, where, folder)
+    source_name = to_one_line(source_name)
+    require_json(document, source_name)
+    return _build_environment(document, source_name, folder)
 
 
-def parse_density(value: object, boundary: Ring, where: str = "map", folder: Path | None = None) -> Density:
+def parse_density(
+    value: object, boundary: Ring, source_name: str = "map", folder: Path | None = None
+) -> Density:
     """Build the density that a JSON value describes.
 
     Parameters
@@ -181,14 +190,15 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
         Value of the key ``density`` of a map.
     boundary : (k, 2) sequence, m
         Boundary of the map.
-    where : str
-        Name of the map in messages.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
     folder : Path or None
-        Folder of the image that the density may name; None if it does not come from a file.
+        Folder of the image that the density may name; None if the map was not loaded from a file.
 
     Returns
     -------
     Density
+        The density.
 
     Raises
     ------
@@ -197,18 +207,19 @@ def parse_density(value: object, boundary: Ring, where: str = "map", folder: Pat
     """
     # The density is validated as part of a map.
     document = {**HEADER, "name": "map", "boundary": [[0, 0], [1, 0], [1, 1]], "density": value}
-    model = validate_document(document, where)
-    density: Density = _build_density(model.density, boundary, folder, where)
+    model = validate_document(document, source_name)
+    density: Density = _build_density(model.density, boundary, folder, source_name)
     return density
 
 
-def _build_environment(document: object, where: str, folder: Path | None) -> Environment:
-    model = validate_document(document, where)
+def _build_environment(document: object, source_name: str, folder: Path | None) -> Environment:
+    """Build and check the map that a document describes."""
+    model = validate_document(document, source_name)
     boundary: Any = model.boundary
     density = None
     if model.density is not None:
-        density = _build_density(model.density, boundary, folder, where)
-    # A copy with plain dicts, which does not share mutable objects with the document.
+        density = _build_density(model.density, boundary, folder, source_name)
+    # Make a copy of plain dicts that shares no objects with the document.
     extra = json.loads(json.dumps(model.extra))
     environment = Environment(
         name=model.name,
@@ -220,32 +231,32 @@ def _build_environment(document: object, where: str, folder: Path | None) -> Env
         schema=model.schema_,
         density=density,
     )
-    check_rules(environment, where)
+    check_rules(environment, source_name)
     return environment
 
 
-def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, where: str) -> Any:
-    """Return the density that a model describes.
+def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, source_name: str) -> Any:
+    """Build the density that a model describes.
 
-    A raster without an extent covers the bounding box of the boundary. `folder` contains the map and its
-    picture; it is None if the map did not come from a file.
+    A raster without an extent covers the bounding box of the boundary. The folder contains the map and its
+    image; it is None if the map was not loaded from a file.
     """
     if not isinstance(model, RasterModel):
         return model.build()
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
-        # Weights of pictures are rounded when they are read, so none of them is as small as this.
+        # The weights of an image need no such limit, because they are rounded to fewer decimal places.
         values[values < MIN_WEIGHT] = 0.0
     else:
-        values = _read_weights(model, folder, where)
+        values = _read_weights(model, folder, source_name)
     x, y = zip(*boundary, strict=True)
     x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
     # A map lists the top row first, a `Raster` the lowest one.
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 
-def _read_weights(model: RasterModel, folder: Path | None, where: str) -> Array:
-    """Return the weights of the pixels of a picture, (rows, columns), the top row first."""
+def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> Array:
+    """Read the weights of the pixels of an image, (rows, columns), the top row first."""
     path = ("density", "picture")
     black = 0.0 if model.black is None else model.black
     white = 1.0 if model.white is None else model.white
@@ -253,8 +264,8 @@ def _read_weights(model: RasterModel, folder: Path | None, where: str) -> Array:
         gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
     except InputError as error:
         issue = Issue.at_path(path, f"{quote_json(model.picture)}: {error}")
-        raise MapError.from_issues(where, [issue]) from None
-    weights = np.round(black + (white - black) * gray_levels, _GRAY_DIGITS)
+        raise MapError.from_issues(source_name, [issue]) from None
+    weights = np.round(black + (white - black) * gray_levels, _WEIGHT_DECIMALS)
     if not weights.max() > 0.0:
-        raise MapError.from_issues(where, [Issue.at_path(path, NO_WEIGHT)])
+        raise MapError.from_issues(source_name, [Issue.at_path(path, NO_WEIGHT)])
     return np.asarray(weights)

@@ -26,29 +26,31 @@ from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
 
 _MIN_HULL_AREA_RATIO = 1e-9
-"""A ring counts as a line if the area of its hull, relative to its squared extent, is smaller."""
+"""Smallest area of the convex hull of a ring, relative to its squared extent. A ring with a smaller hull
+counts as a line."""
 _MEETING_DISTANCE_M = 1e-6
-"""Largest distance of an edge from a point at which it meets another one."""
+"""Largest distance between an edge and a point on it, because of rounding errors."""
 _MAX_MEETING_EDGES = 6
-"""Number of nearest edges among which the two that meet are searched for."""
+"""Number of edges, nearest to a point, among which the two that meet there are searched for."""
 _START_MARGIN_M = 0.01
-"""Clearance in addition to that of a start, so that sampling certainly succeeds."""
+"""Clearance beyond the minimum at a start, with which sampling a position certainly succeeds."""
 
 
-def check_rules(environment: Environment, where: str) -> None:
+def check_rules(environment: Environment, source_name: str) -> None:
     """Check the geometric rules of a map.
 
     Parameters
     ----------
     environment : Environment
-    where : str
-        Name of the map in messages.
+        The map to check.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
 
     Raises
     ------
     MapError
-        With the issues in obstacles, boundary and density; if there are none, with the issues of the map
-        as a whole.
+        If the map breaks a rule. The error lists the issues of the boundary, obstacles and density; if there
+        are none, the issues in their combination.
     """
     issues = list(_find_ring_issues(("boundary",), environment.boundary))
     for k, obstacle in enumerate(environment.obstacles):
@@ -65,7 +67,7 @@ def check_rules(environment: Environment, where: str) -> None:
     if not issues:
         issues = list(_find_space_issues(environment))
     if issues:
-        raise MapError.from_issues(where, issues)
+        raise MapError.from_issues(source_name, issues)
 
 
 def _find_ring_issues(path: JsonPath, ring: Ring) -> Iterator[Issue]:
@@ -85,7 +87,7 @@ def _find_ring_issues(path: JsonPath, ring: Ring) -> Iterator[Issue]:
         yield Issue.at_path(path, message)
         return
     polygon = Polygon(points)
-    # The area of a ring that crosses itself may vanish; that of its hull does not.
+    # The area of a ring that crosses itself may be 0, while the area of its hull is not.
     if shapely.convex_hull(polygon).area <= _MIN_HULL_AREA_RATIO * float(extent.max()) ** 2:
         message = f"expected points that are not on one line, got an area of {polygon.area:g} m²"
         yield Issue.at_path(path, message)
@@ -107,9 +109,9 @@ def _find_line_issues(path: JsonPath, line: Ring, noun: str) -> Iterator[Issue]:
 
 
 def _build_crossing_issue(path: JsonPath, points: Array, polygon: Polygon) -> Issue:
-    """Build the issue for a ring that crosses or touches itself; it names the two edges."""
+    """Build the issue for a ring that crosses or touches itself, with the two edges that meet."""
     reason = shapely.is_valid_reason(polygon)
-    # The reason ends with the point, as in "Self-intersection[5 5]".
+    # The reason ends with the coordinates of a point, as in "Self-intersection[5 5]".
     x, y = (float(number) for number in reason[reason.index("[") + 1 : -1].split())
     ends = np.roll(points, -1, axis=0)
     edges = shapely.linestrings(np.stack([points, ends], axis=1))
@@ -118,7 +120,7 @@ def _build_crossing_issue(path: JsonPath, points: Array, polygon: Polygon) -> Is
     nearest_edges = np.argsort(distances, kind="stable")[:_MAX_MEETING_EDGES].tolist()
     first = nearest_edges[0]
     second = nearest_edges[1]
-    # Neighbors in the ring always meet. If another edge passes through the point as well, it is named.
+    # Two consecutive edges always meet. If another edge passes through the point as well, name this one.
     for edge in nearest_edges:
         is_neighbor = (edge - first) % len(points) in (0, 1, len(points) - 1)
         if not is_neighbor and distances[edge] <= _MEETING_DISTANCE_M:
@@ -131,13 +133,14 @@ def _build_crossing_issue(path: JsonPath, points: Array, polygon: Polygon) -> Is
 
 
 def _find_polygon_issues(path: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Issue]:
+    """Yield the issues with a polygon and its holes."""
     issues = list(_find_ring_issues((*path, "vertices"), shape.vertices))
     for k, hole in enumerate(shape.holes):
         issues += _find_ring_issues((*path, "holes", k), hole)
     if issues or shape.polygon.is_valid:
         yield from issues
         return
-    # Each ring is valid by itself, but not all of them together.
+    # Each ring is valid by itself, but the polygon with its holes is not.
     outline = Polygon(shape.vertices)
     valid_holes: list[Ring] = []
     for k, hole in enumerate(shape.holes):
@@ -153,7 +156,7 @@ def _find_polygon_issues(path: JsonPath, shape: PolygonObstacle | WeightedArea) 
 
 
 def _find_space_issues(environment: Environment) -> Iterator[Issue]:
-    """Yield the issues in the combination of the parts of a map, each of which is valid by itself."""
+    """Yield the issues in the combination of boundary, obstacles, density and starts."""
     if len(environment.region.vertices) < 3:
         yield Issue.at_path(("boundary",), "expected a region with an area, got a line as its convex hull")
         return
@@ -161,14 +164,14 @@ def _find_space_issues(environment: Environment) -> Iterator[Issue]:
         yield Issue.at_path(("obstacles",), "no free space is left inside the boundary")
         return
     density = environment.density
-    # Integrate the density only if necessary, because importing the modules for it takes a second.
+    # Integrate the density only if necessary, because importing the modules for this takes a second.
     if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
         yield Issue.at_path(("density",), f"{NO_WEIGHT} in the free space")
     for name, start in environment.starts.items():
         if isinstance(start, PointsStart):
             yield from _find_position_issues(environment, name, start)
         else:
-            yield from _find_room_issues(environment, name, start)
+            yield from _find_capacity_issues(environment, name, start)
 
 
 def _find_position_issues(environment: Environment, name: str, start: PointsStart) -> Iterator[Issue]:
@@ -184,10 +187,10 @@ def _find_position_issues(environment: Environment, name: str, start: PointsStar
         yield Issue.at_path(path, "duplicate position, expected one for each robot")
 
 
-def _find_room_issues(
+def _find_capacity_issues(
     environment: Environment, name: str, start: DiscStart | UniformStart
 ) -> Iterator[Issue]:
-    """Yield an issue if the disc or free space has no space for a robot of the default size."""
+    """Yield an issue if a robot of the default size does not fit at a start."""
     if _fits_at_disc_center(environment, start):
         return
     try:
@@ -204,7 +207,8 @@ def _find_room_issues(
 def _fits_at_disc_center(environment: Environment, start: DiscStart | UniformStart) -> bool:
     """Return whether a robot fits at the center of a start disc, which is faster to check than sampling.
 
-    For a uniform start, the discs of all other starts are checked: a robot that fits there fits in the map.
+    For a uniform start, the discs of all starts are checked: a robot that fits in one of them fits in the
+    map.
     """
     starts = [start] if isinstance(start, DiscStart) else environment.starts.values()
     centers = [disc.center for disc in starts if isinstance(disc, DiscStart)]

@@ -23,7 +23,7 @@ from robocov.mapfile.models import (
     MIN_SIZE_M,
     MIN_WEIGHT,
     MODELS_BY_KIND,
-    PARTS,
+    NESTED_MODELS,
     RING_EXPECTED,
     VERSION,
     WEIGHT_EXPECTED,
@@ -34,8 +34,9 @@ from robocov.mapfile.models import (
 )
 
 NO_WEIGHT = "expected at least one weight above 0, got none"
+"""Message about a density that is 0 everywhere."""
 _MIN_KIND_SIMILARITY = 0.5
-"""Minimum similarity of a suggested kind, as `difflib` measures it."""
+"""Minimum similarity between an unknown kind and a suggested one, as `difflib` measures it."""
 _MIN_RELATIVE_DETERMINANT = 1e-9
 """Smallest determinant of a covariance matrix, relative to the product of its diagonal."""
 _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
@@ -58,32 +59,35 @@ _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
     "black": (WEIGHT_EXPECTED,),
     "white": (WEIGHT_EXPECTED,),
 }
-"""Descriptions of the expected values of keys, of their items, of the items of these, and so on."""
+"""Descriptions by key: of the value, of its items if it is a list, of the items of these, and so on."""
 
 
-def validate_document(document: object, where: str) -> MapModel:
+def validate_document(document: object, source_name: str) -> MapModel:
     """Validate the structure of a map JSON.
 
     Parameters
     ----------
     document : object
-    where : str
-        Name of the document in messages.
+        Parsed content of a map file.
+    source_name : str
+        Name of the source in messages, such as the path of the file.
 
     Returns
     -------
     MapModel
+        Model of the document.
 
     Raises
     ------
     MapError
-        With the issues in structure and density.
+        If a key is missing or unknown, a value has the wrong type or is out of range, or the density has no
+        weight or contradictory keys. The error lists the issues.
     """
-    check_header(document, where, FORMAT, VERSION)
+    check_header(document, source_name, FORMAT, VERSION)
     try:
         model = MapModel.model_validate(document)
     except ValidationError as error:
-        raise build_document_error(error, where, _build_issue) from None
+        raise build_document_error(error, source_name, _build_issue) from None
     if model.density is None:
         return model
     if isinstance(model.density, RasterModel):
@@ -91,7 +95,7 @@ def validate_document(document: object, where: str) -> MapModel:
     else:
         issues = list(_find_weight_issues(model.density))
     if issues:
-        raise MapError.from_issues(where, issues)
+        raise MapError.from_issues(source_name, issues)
     return model
 
 
@@ -103,18 +107,18 @@ def _build_issue(detail: ErrorDetails) -> Issue:
         text = f"starts: name: {describe_mismatch(LABEL_EXPECTED, detail['input'])}"
         return Issue(tuple(path[:-1]), text, at_key=True)
     kinds = MODELS_BY_KIND.get(key, {})
-    # Length of the path of an object with a kind: of the density itself, or of an item of a list.
+    # Length of the path to an object with a kind: ("density",) or, for example, ("obstacles", 3).
     object_length = 1 if key == "density" else 2
     if not kinds or len(path) < object_length:
         return _build_member_issue(path, detail, MapModel)
     if len(path) == object_length:
         return _build_unknown_kind_issue(tuple(path), detail["input"], list(kinds))
-    # The path of pydantic contains the kind after the object; the path in the file does not.
+    # In pydantic's path, the kind follows the object. It is not part of the path in the file.
     model = kinds[str(path[object_length])]
     path = path[:object_length] + path[object_length + 1 :]
     if len(path) > object_length + 1:
-        # The issue is in a part of the object, such as a peak of a density.
-        model = PARTS.get(str(path[object_length]), model)
+        # The issue may be in an object inside this one, such as a peak of a density.
+        model = NESTED_MODELS.get(str(path[object_length]), model)
     return _build_member_issue(path, detail, model)
 
 
@@ -122,7 +126,7 @@ def _build_member_issue(path: list[int | str], detail: ErrorDetails, model: type
     """Build the issue for a missing, unknown or wrong member of an object, at a path in the file."""
     if detail["type"] == "extra_forbidden":
         return _build_unknown_key_issue(path, model)
-    # The steps after the last key are indices in nested lists, such as 2 and 0 in vertices[2][0].
+    # The last key is followed by indices of nested lists, such as 2 and 0 in vertices[2][0].
     last_key = max(k for k, step in enumerate(path) if isinstance(step, str))
     nesting_depth = len(path) - 1 - last_key
     expected = _EXPECTED[str(path[last_key])][nesting_depth]
@@ -131,6 +135,7 @@ def _build_member_issue(path: list[int | str], detail: ErrorDetails, model: type
 
 
 def _build_unknown_key_issue(path: list[Any], model: type[Model]) -> Issue:
+    """Build the issue for an unknown key of an object, with a suggestion."""
     *parent, key = path
     known = [field.alias or name for name, field in model.model_fields.items()]
     prefix = f"{format_path(parent)}: " if parent else ""
@@ -172,15 +177,16 @@ def _find_weight_issues(model: DensityModel) -> Iterator[Issue]:
 
 
 def _is_covariance(matrix: list[list[float]]) -> bool:
-    """Return whether a matrix is symmetric, and its eigenvalues are large enough."""
+    """Return whether a matrix is symmetric and positive definite, with large enough eigenvalues."""
     (a, b), (c, d) = matrix
+    # The eigenvalues of [[a, b], [b, d]] are (a + d) / 2 plus or minus the length of ((a - d) / 2, b).
     smaller_eigenvalue = 0.5 * (a + d) - math.hypot(0.5 * (a - d), b)
     is_regular = a * d - b * c > _MIN_RELATIVE_DETERMINANT * a * d
     return b == c and smaller_eigenvalue >= MIN_SIZE_M**2 and is_regular
 
 
 def _describe_choice(model: Model, first: str, second: str) -> str | None:
-    """Return the message for a model without exactly one of two keys; None if it has one."""
+    """Describe the issue of a model with both or neither of two keys; return None if it has exactly one."""
     has_first = getattr(model, first) is not None
     has_second = getattr(model, second) is not None
     if has_first != has_second:
@@ -189,6 +195,7 @@ def _describe_choice(model: Model, first: str, second: str) -> str | None:
 
 
 def _find_raster_issues(model: RasterModel) -> Iterator[Issue]:
+    """Yield the issues in the keys and rows of a raster density."""
     choice_message = _describe_choice(model, "rows", "picture")
     if choice_message is not None:
         yield Issue.at_path(("density",), choice_message)
@@ -212,6 +219,7 @@ def _find_raster_issues(model: RasterModel) -> Iterator[Issue]:
 
 
 def _is_extent(extent: list[float]) -> bool:
+    """Return whether an extent is a rectangle with sides of valid lengths."""
     x_min, y_min, x_max, y_max = extent
     width = x_max - x_min
     height = y_max - y_min

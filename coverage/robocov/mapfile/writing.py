@@ -1,4 +1,4 @@
-"""Write maps as JSON documents and files."""
+"""Writing of maps as JSON documents, texts and files."""
 
 import json
 import math
@@ -16,28 +16,31 @@ from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
 
 _MAX_LINE_CHARACTERS = 100
-"""Objects up to this length are written on one line, counting two characters for each number."""
+"""Largest length of an object that is written on one line. Each number counts as two characters."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
 """Keys whose numbers `dump_map` shortens."""
 _EXPANDED_KEYS = ("obstacles", "starts")
 """Keys whose items are each written on a separate line."""
-_DIGITS = 9
-"""Decimal places of coordinates in meters: smaller fractions of a map have no meaning."""
+_DECIMALS = 9
+"""Decimal places to which numbers may be shortened, because smaller fractions of a meter have no meaning."""
 _MAX_ERROR_ULPS = 16
-"""Largest rounding error of a few sums and a rotation, in ulps of the number, or of 1 m if it is smaller."""
+"""Largest rounding error after a few sums and a rotation, in units in the last place of the number (or of 1,
+if the number is smaller). Shortening a number changes it by no more than this error."""
 
 
 def to_json(environment: Environment) -> dict[str, Any]:
-    """Build the JSON document of a map, from which `from_json` builds an equal one.
+    """Build the JSON document of a map, from which `from_json` builds an equal map.
 
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
     dict
+        Content of the map file.
     """
     document: dict[str, Any] = {}
     if environment.schema is not None:
@@ -101,15 +104,19 @@ def save_map(environment: Environment, path: str | Path) -> None:
 
 
 def dump_map(environment: Environment) -> str:
-    """Format a map as the text of a map file: keys in a fixed order, a list of vertices on one line.
+    """Format a map as the text of a map file.
+
+    The keys are in a fixed order. Each list of points is on one line.
 
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
     str
+        Text of the file, with a line break at the end.
 
     Notes
     -----
@@ -122,28 +129,30 @@ def dump_map(environment: Environment) -> str:
 def dump_document(document: dict[str, Any]) -> str:
     """Format a JSON document as the text of a map file.
 
-    Line breaks do not depend on the lengths of numbers, so moving a vertex changes one line of the file.
+    Line breaks do not depend on the number of digits, so that moving a vertex changes one line of the file.
 
     Parameters
     ----------
     document : dict
-        It need not be a valid map.
+        A JSON document, which need not be a valid map.
 
     Returns
     -------
     str
+        Text of the file, with a line break at the end.
     """
     return _format_members(_shorten_numbers(document), "", is_document=True) + "\n"
 
 
 def _shorten_numbers(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document with shortened numbers, except for numbers at the user's own keys."""
     return document | {key: _shorten_value(document[key]) for key in _NUMERIC_KEYS if key in document}
 
 
 def _shorten_value(value: Any) -> Any:
     """Return a JSON value with its numbers rounded as in a map file."""
     if isinstance(value, float):
-        decimal = round(value, _DIGITS)
+        decimal = round(value, _DECIMALS)
         max_error = _MAX_ERROR_ULPS * math.ulp(max(abs(value), 1.0))
         return to_json_value(decimal if abs(decimal - value) <= max_error else value)
     if isinstance(value, list):
@@ -162,7 +171,7 @@ def _format_members(value: Any, indent: str, *, is_document: bool = False) -> st
     lines = []
     for key, item in value.items():
         head = f"{inner_indent}{json.dumps(key, ensure_ascii=False)}: "
-        # Each row of a raster is on a separate line; unlike lists of points, rows are long.
+        # Each row of a raster is on a separate line. Unlike points, rows are long.
         has_several_rows = key == "rows" and isinstance(item, list) and len(item) > 1
         if _is_container(item) and (has_several_rows or (is_document and key in _EXPANDED_KEYS)):
             lines.append(head + _format_members(item, inner_indent))
@@ -172,7 +181,7 @@ def _format_members(value: Any, indent: str, *, is_document: bool = False) -> st
 
 
 def _format_value(value: Any, indent: str, column: int) -> str:
-    """Return a value on one line if it fits there or is a list of points, otherwise on several lines."""
+    """Return a value on one line if the line is short or a list of points, and on several lines otherwise."""
     line = json.dumps(value, ensure_ascii=False, allow_nan=False)
     if not _is_container(value):
         return line
@@ -191,11 +200,12 @@ def _is_container(value: object) -> bool:
 
 
 def _is_ring(value: object) -> bool:
+    """Return whether a value is a list whose first item is a point."""
     return isinstance(value, list) and bool(value) and isinstance(value[0], list) and len(value[0]) == 2
 
 
 def _build_density_document(density: Density) -> Any:
-    """Return the JSON document of a density, with the values of an image instead of its name."""
+    """Build the JSON document of a density, with rows of values even if it was loaded from an image."""
     if not isinstance(density, Raster):
         return to_json_value(density)
     return {

@@ -185,7 +185,7 @@ def test_links_in_the_folder_are_not_followed(tmp_path: Path, link: str) -> None
     (out / link).symlink_to(outside)
     with (
         pytest.raises(OutputError, match="link"),
-        create_result(out, "comparison", overwrite=True, parts=["rapf"]) as result,
+        create_result(out, "comparison", overwrite=True, run_names=["rapf"]) as result,
     ):
         pytest.fail(f"the work has started in {result.staging}")
     assert read_contents(outside) == files
@@ -252,7 +252,7 @@ ACTIONS: dict[str, Callable[[Path], None]] = {
 
 
 def save_comparison(folder: Path) -> None:
-    with create_result(folder, "comparison", overwrite=True, parts=["rapf"]) as result:
+    with create_result(folder, "comparison", overwrite=True, run_names=["rapf"]) as result:
         write_files(
             result.staging, {"comparison.json": '{"format": "robocov-comparison"}', "rapf/run.json": "new"}
         )
