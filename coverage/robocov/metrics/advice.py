@@ -10,19 +10,18 @@ from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
 
 TREMBLE_WINDOW_S = 5.0
-"""Length of the period at the end of a run that is checked for trembling."""
+"""Duration of the period at the end of a run that is checked for trembling."""
 MIN_TREMBLE_STEP_M = 0.05
-"""Minimum mean displacement of a trembling robot per control step; a robot at rest moves less in 4 s."""
-MIN_TREMBLE_TURN = np.pi / 6.0
-"""Minimum mean turn of a trembling robot per control step, rad: an oscillation takes at most 12 steps."""
+"""Minimum mean displacement of a trembling robot per control step. A robot at rest moves less in 4 s."""
+MIN_TREMBLE_TURN_RAD = np.pi / 6.0
+"""Minimum mean turn of a trembling robot per control step. An oscillation thus takes at most 12 steps."""
 MIN_TREMBLE_DETOUR = 5.0
 """Minimum ratio of path length to net displacement of a trembling robot."""
 
 MAX_ZIGZAG_PERIOD_S = 3.0
 """Maximum time between contacts with opposite walls that count as one zigzag."""
 MAX_OPPOSITE_COSINE = -0.5
-"""Walls are opposite if the cosine of the angle between the directions away from them is below this: the
-angle is more than 120 degrees."""
+"""Cosine of the smallest angle, 120 degrees, between the normals of walls that count as opposite."""
 MIN_ZIGZAGS = 5
 """Minimum number of zigzags of a robot that are reported."""
 
@@ -36,26 +35,28 @@ def advise(record: Record, clearances: Array) -> list[str]:
     Parameters
     ----------
     record : Record
+        The run.
     clearances : (T, n) array, m
-        Gap between each robot and the nearest wall, from `clearance.compute_clearances`.
+        Gap between each robot and the nearest wall, as returned by `clearance.compute_clearances`.
 
     Returns
     -------
     list of str
-        One or two sentences for each finding; empty if there is none.
+        One or two sentences for each finding; empty if there is no finding.
 
     Notes
     -----
-    Forces are constant during a control step of length dt. A robot of mass m and viscosity nu that is held
-    by a stiffness K, such as the slope of the repulsion at its position, is stable under sampling only while
-    K is below about 2 nu / dt: at longer periods it reacts too late, and swings with a period of a few
-    steps. Such robots stay in one place, although they move by centimeters in every step and turn sharply
-    between steps. This does not happen if the control period is short enough.
+    Forces are constant during a control step of duration dt. Consider a robot of mass m and viscosity nu, and
+    let K be the stiffness of the force on it, such as the slope of the repulsion at its position. Its motion
+    is stable only if K is below about 2 nu / dt. If dt is longer, the robot reacts too late, and oscillates
+    with a period of a few steps: it trembles. Such a robot stays in one place, although it moves by
+    centimeters in every step and turns sharply between steps. A shorter control period prevents this.
 
-    In a passage, the same happens if a robot cannot accelerate enough: a swing of amplitude A across it
-    requires the acceleration A K / m. If the limit is lower, the robot reaches the opposite wall before it
-    has stopped. Contacts with opposite walls within a short time are therefore counted; sliding along a wall
-    or bumping into the same wall again and again is not.
+    In a passage, a robot also oscillates if it cannot accelerate enough. An oscillation of amplitude A
+    between the walls requires the acceleration A K / m. If the maximum acceleration is lower, the robot
+    reaches the opposite wall before it stops. The robot therefore zigzags if contacts with opposite walls
+    follow each other within a short time. Sliding along a wall does not count, nor does bumping into the same
+    wall repeatedly.
 
     Examples
     --------
@@ -66,22 +67,22 @@ def advise(record: Record, clearances: Array) -> list[str]:
     >>> advise(record, compute_clearances(record))  # doctest: +ELLIPSIS
     ['The team trembles: ... the control period of 0.25 s is too long ...']
     """
-    trembling = find_trembling(record)
-    if len(trembling):
-        return [_describe_trembling(record, trembling)]
-    zigzags = count_zigzags(record, clearances)
-    if zigzags.max(initial=0) >= MIN_ZIGZAGS:
-        return [_describe_zigzags(record, zigzags)]
+    trembling_robots = find_trembling_robots(record)
+    if len(trembling_robots) > 0:
+        return [_describe_trembling(record, trembling_robots)]
+    zigzag_counts = count_zigzags(record, clearances)
+    if zigzag_counts.max(initial=0) >= MIN_ZIGZAGS:
+        return [_describe_zigzags(record, zigzag_counts)]
     return []
 
 
-def find_trembling(record: Record) -> IntArray:
+def find_trembling_robots(record: Record) -> IntArray:
     """Find the robots that tremble at the end of a run.
 
     Parameters
     ----------
     record : Record
-        Must contain every control step; otherwise, no robots are found.
+        The run. No robots are found unless the record contains every control step.
 
     Returns
     -------
@@ -96,11 +97,11 @@ def find_trembling(record: Record) -> IntArray:
     positions = record.positions[-step_count - 1 :]
     displacements = np.diff(positions, axis=0)
     step_lengths = compute_point_distances(positions[1:], positions[:-1])
-    net_displacement = compute_point_distances(positions[-1], positions[0])
+    net_displacements = compute_point_distances(positions[-1], positions[0])
     turning_angles = _compute_turning_angles(displacements)
     is_trembling = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
-    is_trembling &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN
-    is_trembling &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacement
+    is_trembling &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN_RAD
+    is_trembling &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacements
     is_trembling &= record.traveled[-step_count:].all(axis=0) & record.working[-step_count:].all(axis=0)
     return np.flatnonzero(is_trembling)
 
@@ -109,22 +110,25 @@ def _compute_turning_angles(displacements: Array) -> Array:
     """Return the magnitudes of the angles between consecutive displacements, (k - 1, n) rad."""
     incoming = displacements[:-1]
     outgoing = displacements[1:]
-    cross = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
-    return np.asarray(np.abs(np.arctan2(cross, (incoming * outgoing).sum(axis=-1))))
+    cross_products = incoming[..., 0] * outgoing[..., 1] - incoming[..., 1] * outgoing[..., 0]
+    dot_products = (incoming * outgoing).sum(axis=-1)
+    return np.asarray(np.abs(np.arctan2(cross_products, dot_products)))
 
 
 def count_zigzags(record: Record, clearances: Array) -> IntArray:
-    """Count how many times each robot went from contact with a wall to contact with the opposite one.
+    """Count how many times each robot moved quickly from one wall to the opposite wall, touching both.
 
     Parameters
     ----------
     record : Record
+        The run.
     clearances : (T, n) array, m
-        Returned by `clearance.compute_clearances`.
+        Gap between each robot and the nearest wall, as returned by `clearance.compute_clearances`.
 
     Returns
     -------
     (n,) int array
+        Number of zigzags of each robot.
     """
     is_touching = clearances <= MAX_CONTACT_GAP_M
     is_new_contact = is_touching.copy()
@@ -132,9 +136,10 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
     counts = np.zeros(len(record.team), dtype=np.intp)
     for robot in np.flatnonzero(is_new_contact.any(axis=0)).tolist():
         steps = np.flatnonzero(is_new_contact[:, robot])
+        # Unit vectors from the walls to the robot.
         normals = record.positions[steps, robot] - record.obstacle_points[steps, robot]
         normals /= np.maximum(compute_point_distances(normals, np.zeros(2)), _MIN_DISTANCE_M)[:, None]
-        # The cosine is nan, and the walls are not opposite, if a robot sensed nothing.
+        # If a robot sensed nothing, the cosine is nan, and the comparison is false.
         is_opposite = (normals[:-1] * normals[1:]).sum(axis=1) < MAX_OPPOSITE_COSINE
         is_soon = np.diff(record.time[steps]) <= MAX_ZIGZAG_PERIOD_S
         counts[robot] = int((is_opposite & is_soon).sum())
@@ -142,7 +147,7 @@ def count_zigzags(record: Record, clearances: Array) -> IntArray:
 
 
 def _describe_trembling(record: Record, robots: IntArray) -> str:
-    """Return the advice for a control period that is too long."""
+    """Build the advice for a control period that is too long."""
     step_count = round(TREMBLE_WINDOW_S / record.dt)
     positions = record.positions[-step_count - 1 :, robots]
     step_lengths_cm = 100.0 * compute_point_distances(positions[1:], positions[:-1]).mean(axis=0)
@@ -151,15 +156,15 @@ def _describe_trembling(record: Record, robots: IntArray) -> str:
     return f"The team trembles: {extent}; {cause}. Try a shorter one (--dt), such as 1/60 s."
 
 
-def _describe_zigzags(record: Record, zigzags: IntArray) -> str:
-    """Return the advice for an acceleration limit that is too low."""
-    robots = np.flatnonzero(zigzags >= MIN_ZIGZAGS)
-    limit = float(record.team.max_acceleration[robots].min())
-    crossings = int(zigzags.sum())
+def _describe_zigzags(record: Record, zigzag_counts: IntArray) -> str:
+    """Build the advice for a maximum acceleration that is too low."""
+    robots = np.flatnonzero(zigzag_counts >= MIN_ZIGZAGS)
+    max_acceleration = float(record.team.max_acceleration[robots].min())
+    total = int(zigzag_counts.sum())
     return (
-        f"Zigzag in a narrow passage: {_format_robots(record, robots)} went {crossings} times from one wall "
-        f"to the opposite one. Try a higher maximum acceleration than {limit:g} m/s² (--max-acceleration), "
-        "or a lower maximum speed (--max-speed)."
+        f"Zigzag in a narrow passage: {_format_robots(record, robots)} went {total} times from one wall "
+        f"to the opposite one. Try a higher maximum acceleration than {max_acceleration:g} m/s² "
+        "(--max-acceleration), or a lower maximum speed (--max-speed)."
     )
 
 

@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.observation.neighbors import Neighbors
 
 _EIGENVALUE_DECIMALS = 12
-"""Number of decimals of eigenvalues; further ones are rounding errors."""
+"""Decimal places to which eigenvalues are rounded. Smaller differences are rounding errors."""
 
 
 class Connectivity(NamedTuple):
@@ -21,7 +21,7 @@ class Connectivity(NamedTuple):
     components: int
     """Number of connected components."""
     algebraic_connectivity: float
-    """Second smallest eigenvalue of the graph's Laplacian; 0 for a graph in several components."""
+    """Second smallest eigenvalue of the graph's Laplacian. It is 0 if the graph has several components."""
 
 
 def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
@@ -32,16 +32,18 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     Parameters
     ----------
     positions : (n, 2) array, m
+        Positions of the robots.
     ranges : (n,) array, m
-        Communication ranges.
+        Communication ranges of the robots.
 
     Returns
     -------
     Connectivity
+        Number of components and algebraic connectivity.
 
     Notes
     -----
-    The algebraic connectivity is n if all pairs of the n robots are linked, and 0 for a single robot. Source:
+    If all pairs of n robots are linked, the algebraic connectivity is n. For a single robot, it is 0. Source:
     M. Fiedler, *Algebraic connectivity of graphs*, Czechoslovak Mathematical Journal 23 (1973).
 
     Examples
@@ -55,13 +57,14 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     neighbors = Neighbors.from_ranges(positions, ranges)
     if neighbors.is_complete:
         return Connectivity(1, float(n) if n > 1 else 0.0)
-    robot, neighbor = neighbors.list_pairs()
-    adjacency = coo_array((np.ones(len(robot)), (robot, neighbor)), (n, n))
+    robots, linked_robots = neighbors.list_pairs()
+    adjacency = coo_array((np.ones(len(robots)), (robots, linked_robots)), (n, n))
     component_count, _ = connected_components(adjacency, directed=False)
     if n == 1 or component_count > 1:
         return Connectivity(int(component_count), 0.0)
-    # The number of neighbors of each robot on the diagonal, and -1 for each pair of neighbors.
-    laplacian = np.diag(np.bincount(robot).astype(float))
-    laplacian[robot, neighbor] = -1.0
+    # The Laplacian has the number of neighbors of each robot on its diagonal, and -1 for each pair of
+    # neighbors.
+    laplacian = np.diag(np.bincount(robots).astype(float))
+    laplacian[robots, linked_robots] = -1.0
     second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])
     return Connectivity(int(component_count), round(second_eigenvalue, _EIGENVALUE_DECIMALS))

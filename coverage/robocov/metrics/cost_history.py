@@ -14,9 +14,10 @@ from robocov.errors import format_count, require_type
 from robocov.record import Record, select_nearest_steps
 
 DEFAULT_RATE_HZ = 10.0
-"""Samples of the coverage cost per simulated second."""
+"""Number of samples of the coverage cost per simulated second."""
 MAX_RATE_WITH_MOVING_OBSTACLES_HZ = 1.0
-"""Maximum number of samples per simulated second if obstacles move: each sample needs its own map."""
+"""Maximum number of samples per simulated second if obstacles move. Then each sample takes longer, because
+the map differs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +27,16 @@ class CostHistory(Drawable):
     Attributes
     ----------
     time : (K,) array, s
+        Simulation time of each sample.
     mean_distance : (K,) array, m
+        Mean distance of the points of the map from the nearest robot.
     cost : (K,) array, m³
+        Coverage cost.
     uncovered_area : (K,) array, m²
+        Area of the components of the free space without a robot.
     mean_time : (K,) array or None, s
-        Mean over the area of the time that the first robot needs to arrive, each at its own maximum speed.
-        None if all robots have the same maximum speed.
+        Mean over the points of the map of the time until the first robot arrives, if every robot drives at
+        its maximum speed. None if all robots have the same maximum speed.
     """
 
     _drawing_name = "history"
@@ -57,8 +62,7 @@ def compute_cost_history(
 ) -> CostHistory:
     """Compute the coverage cost over a run.
 
-    The cost at each time step counts only the working robots, with moving obstacles where they are at that
-    time.
+    At each time step, only working robots count, and moving obstacles are at their positions at this time.
 
     Parameters
     ----------
@@ -67,13 +71,14 @@ def compute_cost_history(
     cost : CoverageCost
         Cost of the record's environment.
     rate : float, Hz
-        Samples per simulated second, see `select_sampled_steps`.
+        Number of samples per simulated second; see `select_sampled_steps`.
     on_sample : callable or None
         Called after each sample, to report progress.
 
     Returns
     -------
     CostHistory
+        The cost at each sampled time step.
 
     Raises
     ------
@@ -114,9 +119,9 @@ def compute_cost_history(
         cost_values[sample] = summary.value
         uncovered_area[sample] = summary.uncovered_area
         if has_mixed_speeds:
-            result = cost_at_time(time, positions, working, record.team.max_speed)
-            if result is not None:
-                mean_time[sample] = result.mean_time
+            speed_cost = cost_at_time(time, positions, working, record.team.max_speed)
+            if speed_cost is not None:
+                mean_time[sample] = speed_cost.mean_time
         if on_sample is not None:
             on_sample()
     return CostHistory(
@@ -134,8 +139,10 @@ def select_sampled_steps(record: Record, rate: float) -> list[int]:
     Parameters
     ----------
     record : Record
+        The run.
     rate : float, Hz
-        Limited to `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` if obstacles move.
+        Number of samples per simulated second. It is limited to `MAX_RATE_WITH_MOVING_OBSTACLES_HZ` if
+        obstacles move.
 
     Returns
     -------
@@ -148,17 +155,19 @@ def select_sampled_steps(record: Record, rate: float) -> list[int]:
 
 
 def compute_mean_over_run(time: Array, values: Array) -> float:
-    """Compute the mean over time of values sampled over a run, by the trapezoidal rule.
+    """Compute the mean over time of values that were sampled over a run, by the trapezoidal rule.
 
     Parameters
     ----------
     time : (K,) array, s
-        Ascending.
+        Times of the samples, ascending.
     values : (K,) array
+        Values at these times.
 
     Returns
     -------
     float
+        Mean, in the unit of the values.
 
     Examples
     --------

@@ -10,9 +10,9 @@ from robocov.record import TIME_ROUNDING_S
 STUCK_WINDOW_S = 5.0
 """Time over which the net displacement of a stuck robot is measured."""
 STUCK_DISTANCE_M = 0.05
-"""Net displacement in this time below which a robot may be stuck."""
+"""Net displacement of a stuck robot, which is less than this."""
 MIN_STUCK_GOAL_DISTANCE_M = 0.5
-"""Distance from its goal above which a robot that does not move is stuck."""
+"""Distance of a stuck robot from its goal, which is more than this."""
 
 
 def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) -> Array:
@@ -21,12 +21,14 @@ def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) ->
     Parameters
     ----------
     positions : (T, n, 2) array, m
+        Positions of the robots over time.
     traveled : (T - 1, n) bool array, optional
-        Mask of the displacements that count, such as `Record.traveled`. By default, all count.
+        Whether each displacement between time steps counts, such as `Record.traveled`. By default, all count.
 
     Returns
     -------
     (n,) array, m
+        Path length of each robot.
 
     Examples
     --------
@@ -40,7 +42,7 @@ def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) ->
 
 
 def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | None:
-    """Count the robots that are far from their goals at the end and no longer approach them.
+    """Count the robots that are far from their goals at the end of a run and no longer move.
 
     A robot is stuck if its distance from its goal exceeds `MIN_STUCK_GOAL_DISTANCE_M` and its net
     displacement over the last `STUCK_WINDOW_S` is below `STUCK_DISTANCE_M`.
@@ -48,21 +50,23 @@ def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | Non
     Parameters
     ----------
     time : (T,) array, s
+        Time of each time step.
     positions : (T, n, 2) array, m
+        Positions of the robots over time.
     goals : (T, n, 2) array, m
-        nan where a robot has no goal.
+        Goals of the robots over time; nan for a robot without a goal.
 
     Returns
     -------
     int or None
-        None if no robot has a goal, or the run is shorter than `STUCK_WINDOW_S`.
+        Number of stuck robots. None if no robot has a goal, or the run is shorter than `STUCK_WINDOW_S`.
     """
     window_start = float(time[-1]) - STUCK_WINDOW_S
     has_goal = ~np.isnan(goals[-1]).any(axis=1)
     if not has_goal.any() or window_start < float(time[0]) - TIME_ROUNDING_S:
         return None
-    earlier = int(np.searchsorted(time, window_start + TIME_ROUNDING_S, side="right")) - 1
-    displacement = compute_point_distances(positions[-1], positions[earlier])
-    goal_distance = compute_point_distances(goals[-1], positions[-1])
-    is_stuck = (displacement < STUCK_DISTANCE_M) & (goal_distance > MIN_STUCK_GOAL_DISTANCE_M)
+    start_step = int(np.searchsorted(time, window_start + TIME_ROUNDING_S, side="right")) - 1
+    displacements = compute_point_distances(positions[-1], positions[start_step])
+    goal_distances = compute_point_distances(goals[-1], positions[-1])
+    is_stuck = (displacements < STUCK_DISTANCE_M) & (goal_distances > MIN_STUCK_GOAL_DISTANCE_M)
     return int(is_stuck.sum())

@@ -1,4 +1,4 @@
-"""The results of a sweep, read from its folder: a table of any size, and the runs behind its rows."""
+"""The results of a sweep, which are read from its folder: a table of any size, and the run of each row."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ _COLUMN_KINDS = {
     "contacts": "int64",
     "stuck_robots": "int64",
 }
-"""Kinds of the columns that every study may have and that do not contain floats."""
+"""Kinds of the columns that any study may have, except for columns of floats."""
 
 _MAX_SHOWN_ROWS = 10
-"""Number of rows that notebooks show."""
+"""Largest number of rows that notebooks show."""
 
 
 class Results:
-    """The table of a sweep, one row for each run, and the folders of the runs.
+    """The table of a sweep, with one row for each run, and the folders of the runs.
 
-    Files are read when they are needed.
+    Files are read only when they are needed.
 
     Parameters
     ----------
@@ -60,8 +60,9 @@ class Results:
     folder : Path
         The folder of the sweep.
     columns : tuple of str
-        Parameters that vary (``map``, ``controller``, ``robots``, ``start``, ``seed``, gains, ...), results
-        whose names end in their units, the name of the run's folder (``run``), and its ``error``.
+        Names of the columns of the table: parameters that vary (``map``, ``controller``, ``robots``,
+        ``start``, ``seed``, gains, ...), results whose names end in their units, the name of the run's folder
+        (``run``), and the message of a run that failed (``error``).
 
     Raises
     ------
@@ -110,16 +111,17 @@ class Results:
             raise InputError(f"{path}: cannot be read: {error}") from error
 
     def rows(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
-        """Yield the rows in order, as dicts by column.
+        """Read the rows of the table one after another.
 
         Parameters
         ----------
         columns : sequence of str, or None
-            By default all columns. Empty cells are None.
+            Names of the columns to read; by default, all columns.
 
         Returns
         -------
         iterator of dict
+            The values of each row by column. Empty cells are None.
 
         Raises
         ------
@@ -132,18 +134,19 @@ class Results:
         return read_rows(self._table, self._read_kinds(), columns)
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> DataFrame:
-        """Return the rows as a data frame.
+        """Read the table as a data frame.
 
         Requires ``robocov[pandas]``.
 
         Parameters
         ----------
         columns : sequence of str, or None
-            By default all columns.
+            Names of the columns to read; by default, all columns.
 
         Returns
         -------
         pandas.DataFrame
+            One row for each run.
 
         Raises
         ------
@@ -154,7 +157,7 @@ class Results:
         names = list(columns or self.columns)
         frame: DataFrame = pandas.DataFrame(list(self.rows(names)), columns=names)
         kinds = self._read_kinds()
-        # Otherwise, columns without any value would have the type object.
+        # Columns without any value would otherwise have the type object.
         empty_columns = [name for name in names if kinds.get(name) != "string" and frame[name].isna().all()]
         return frame.astype(dict.fromkeys(empty_columns, float))
 
@@ -164,7 +167,7 @@ class Results:
         Returns
         -------
         list of dict
-            By column; ``error`` is the message.
+            The values of each row by column. ``error`` is the message of the error.
         """
         return [row for row in self.rows() if row["error"] is not None]
 
@@ -174,11 +177,12 @@ class Results:
         Parameters
         ----------
         run : str, int or mapping
-            The name of its folder, the index of its row, or the row itself.
+            The name of the run's folder, the index of its row, or the row itself.
 
         Returns
         -------
         Record
+            The record of the run.
 
         Raises
         ------
@@ -193,11 +197,12 @@ class Results:
         Parameters
         ----------
         run : str, int or mapping
-            The name of its folder, the index of its row, or the row itself.
+            The name of the run's folder, the index of its row, or the row itself.
 
         Returns
         -------
         CostHistory
+            The coverage cost over the run.
 
         Raises
         ------
@@ -207,7 +212,7 @@ class Results:
         return read_history(self._find_run_folder(run) / COST_FILE)
 
     def _read_kinds(self) -> dict[str, str]:
-        """Return the known kinds of columns: those of every study if ``study.json`` cannot be read."""
+        """Return the kinds of columns by name; without a readable study, only those in `_COLUMN_KINDS`."""
         try:
             study_kinds = {column["name"]: str(column["kind"]) for column in self.study["columns"]}
         except (InputError, KeyError, TypeError, ValueError):
@@ -215,7 +220,7 @@ class Results:
         return _COLUMN_KINDS | study_kinds
 
     def _find_run_folder(self, run: str | int | Mapping[str, Any]) -> Path:
-        """Find the folder of a run; raise InputError if there is none, or the run failed."""
+        """Find the folder of a run; raise InputError if there is no such folder, or the run failed."""
         name = self._find_run_name(run)
         folder = self.folder / RUNS_FOLDER / name
         # A name with a separator could lead out of the folder of the sweep.
@@ -228,16 +233,16 @@ class Results:
         return folder
 
     def _find_run_name(self, run: str | int | Mapping[str, Any]) -> str:
-        """Return the name of a run, which is given by its name, its row, or the number of its row."""
+        """Return the name of a run that is given by its name, the index of its row, or its row."""
         if isinstance(run, str):
             return run
         if not isinstance(run, int | np.integer):
             return str(run["run"])
-        number = int(run)
-        count = len(self)
-        if not -count <= number < count:
-            raise InputError(f"{self.folder}: there is no row {number} (of {format_count(count, 'row')})")
-        row = next(islice(self.rows(["run"]), number % count, None))
+        index = int(run)
+        row_count = len(self)
+        if not -row_count <= index < row_count:
+            raise InputError(f"{self.folder}: there is no row {index} (of {format_count(row_count, 'row')})")
+        row = next(islice(self.rows(["run"]), index % row_count, None))
         return str(row["run"])
 
     def _repr_html_(self) -> str:
@@ -248,9 +253,9 @@ class Results:
         for row in first_rows:
             cells = "".join(f"<td>{escape(_format_cell(row[name]))}</td>" for name in self.columns)
             body.append(f"<tr>{cells}</tr>")
-        count = len(self)
-        caption = f"{format_count(count, 'run')} of {escape(str(self.folder))}"
-        if count > len(first_rows):
+        run_count = len(self)
+        caption = f"{format_count(run_count, 'run')} of {escape(str(self.folder))}"
+        if run_count > len(first_rows):
             caption += f"; the first {len(first_rows)}"
         return escape_controls(
             f'<div style="overflow-x: auto"><table style="white-space: nowrap"><caption>{caption}</caption>'
@@ -271,11 +276,12 @@ def read_results(folder: Path | str) -> Results:
     Returns
     -------
     Results
+        The table and the runs.
 
     Raises
     ------
     InputError
-        If it is not the folder of a sweep, or its table cannot be read.
+        If the folder is not the folder of a sweep, or its table cannot be read.
 
     See Also
     --------
@@ -302,19 +308,21 @@ def read_results(folder: Path | str) -> Results:
 def read_rows(
     table: Path, kinds: Mapping[str, str], columns: Sequence[str] | None = None
 ) -> Iterator[dict[str, Any]]:
-    """Yield the rows of ``results.csv`` as dicts by column.
+    """Read the rows of ``results.csv`` one after another.
 
     Parameters
     ----------
     table : Path
+        The file.
     kinds : mapping of str to str
-        Kinds of the columns, named as in Parquet: "string", "int64" or "double".
+        Kinds of the columns by name, as in Parquet: "string", "int64" or "double".
     columns : sequence of str, or None
-        By default all columns.
+        Names of the columns to read; by default, all columns.
 
     Yields
     ------
     dict
+        The values of a row by column. Empty cells are None.
 
     Raises
     ------
@@ -336,7 +344,7 @@ def read_rows(
 
 
 def _read_lines(table: Path) -> Iterator[list[str]]:
-    """Yield the header of a table, and then its rows, as lists of strings."""
+    """Yield the header and then the rows of a table, as lists of strings."""
     try:
         with table.open(encoding="utf-8", newline="") as file:
             yield from csv.reader(file)
@@ -345,20 +353,22 @@ def _read_lines(table: Path) -> Iterator[list[str]]:
 
 
 def read_history(path: Path) -> CostHistory:
-    """Read a file ``cost.csv``.
+    """Read the coverage cost over a run from a file ``cost.csv``.
 
     Parameters
     ----------
     path : Path
+        The file.
 
     Returns
     -------
     CostHistory
+        The coverage cost over the run.
 
     Raises
     ------
     InputError
-        If it cannot be read; the message names the line.
+        If the file cannot be read; the message names the line.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -388,7 +398,7 @@ def read_history(path: Path) -> CostHistory:
 
 
 def _parse_value(text: str, kind: str | None) -> Any:
-    """Return the value of a cell; None if it is empty."""
+    """Convert the text of a cell to a value of the given kind; return None if the cell is empty."""
     if not text or kind == "string":
         return unquote_cell(text) or None
     if kind == "int64":
@@ -397,13 +407,13 @@ def _parse_value(text: str, kind: str | None) -> Any:
         return float(text)
     except ValueError:
         if kind is None:
-            # Studies of earlier versions do not list the columns that contain text.
+            # If the study does not list the kinds of its columns, this may be a column of text.
             return unquote_cell(text)
         raise
 
 
 def _read_error(path: Path) -> str:
-    """Return the message of a run that failed."""
+    """Read the message of a run that failed."""
     try:
         return str(json.loads(path.read_bytes())["error"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -12,15 +12,15 @@ from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.communication import compute_sent_rate
-from robocov.metrics.connectivity import measure_connectivity
+from robocov.metrics.connectivity import Connectivity, measure_connectivity
 from robocov.metrics.cost_history import CostHistory
-from robocov.metrics.visible_area import compute_covered_areas
+from robocov.metrics.visible_area import CoveredAreas, compute_covered_areas
 from robocov.record import Record, select_nearest_steps
 
 DEFAULT_RATE_HZ = 2.0
-"""Moments per simulated second at which areas and graphs are measured."""
+"""Number of samples of the metrics per simulated second."""
 NEAR_FINAL_TOLERANCE = 0.05
-"""Maximum relative deviation of a cost that counts as near the final cost."""
+"""Maximum relative deviation of a mean distance that counts as near its final value."""
 
 COLUMNS = {
     "time": "time_s",
@@ -35,7 +35,7 @@ COLUMNS = {
     "wall_clearance": "wall_clearance_m",
     "robot_clearance": "robot_clearance_m",
 }
-"""The columns of ``metrics.csv``, in order, with the attributes of `RunMetrics` as keys."""
+"""Columns of ``metrics.csv``, in order, by the attributes of `RunMetrics`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,22 +51,23 @@ class RunMetrics:
     range_area : (K,) array, m²
         Free area within the sensing range of a robot, regardless of walls (blanket coverage by discs).
     visible_area : (K,) array, m²
-        Free area in line of sight of a robot at any distance (as in the art gallery problem).
+        Free area in the line of sight of a robot, at any distance (as in the art gallery problem).
     work : (K,) array, J
-        Integral of ``|F v|`` so far, summed over the robots; F is the controller's force before any limit.
+        Integral of ``|F v|`` from the start to the sample, summed over the robots. F is the force of the
+        controller before any limit.
     effort : (K,) array, N² s
-        Integral of ``|F|²`` so far, summed over the robots.
+        Integral of ``|F|²`` from the start to the sample, summed over the robots.
     path_length : (K,) array, m
-        Path length so far, averaged over the robots.
+        Path length from the start to the sample, averaged over the robots.
     components : (K,) int array
-        Number of components of the communication graph, see
+        Number of components of the communication graph; see
         `robocov.metrics.connectivity.measure_connectivity`.
     algebraic_connectivity : (K,) array
-        Second smallest eigenvalue of the Laplacian of this graph; 0 for several components.
+        Second smallest eigenvalue of the Laplacian of this graph; 0 if the graph has several components.
     wall_clearance : (K,) array, m
-        Smallest gap between a robot's rim and a wall since the previous sample; inf if there is none.
+        Smallest gap between a robot and a wall since the previous sample; inf if no robot works.
     robot_clearance : (K,) array, m
-        Smallest gap between the rims of two robots since the previous sample; inf if there is none.
+        Smallest gap between two robots since the previous sample; inf if fewer than two robots work.
     free_area : float, m²
         Free area of the map.
 
@@ -109,6 +110,7 @@ class RunMetrics:
         Returns
         -------
         list of tuple of float
+            One row for each sample.
         """
         return list(zip(*(getattr(self, name).tolist() for name in COLUMNS), strict=True))
 
@@ -118,7 +120,8 @@ class RunMetrics:
         Returns
         -------
         dict of str to float or None
-            The names end in the units. Clearances are the smallest of the run, and None if they are infinite.
+            Metrics by column of ``metrics.csv``, except for the time. Clearances are the smallest ones of the
+            run; they are None if they are infinite.
         """
         final_values: dict[str, float | None] = {}
         for name, column in COLUMNS.items():
@@ -131,7 +134,7 @@ class RunMetrics:
 
 
 class _Integrals(NamedTuple):
-    """Integrals from the start of a run to each time step, (T,) each, as the attributes of `RunMetrics`."""
+    """Integrals from the start of a run to each time step, (T,) each; see `RunMetrics` for their meanings."""
 
     work: Array
     effort: Array
@@ -148,14 +151,15 @@ def compute_run_metrics(
     record : Record
         The run.
     rate : float, Hz
-        Samples per simulated second. The last time step is always sampled. Energy and path lengths are
-        integrated over all time steps of the record.
+        Number of samples per simulated second. The last time step is always sampled. Energy and path lengths
+        are integrated over all time steps of the record, whatever the rate.
     on_sample : callable or None
         Called after each sample, to report progress.
 
     Returns
     -------
     RunMetrics
+        The metrics at each sampled time step.
 
     Raises
     ------
@@ -181,16 +185,13 @@ def compute_run_metrics(
     areas = []
     graphs = []
     for step in steps.tolist():
-        robots = np.flatnonzero(record.working[step])
-        positions = record.positions[step, robots]
-        free = record.environment.at(float(record.time[step])).free
-        areas.append(compute_covered_areas(free, positions, record.team.sensing_range[robots]))
-        graphs.append(measure_connectivity(positions, record.team.communication_range[robots]))
+        areas.append(_compute_areas_at(record, step))
+        graphs.append(_measure_connectivity_at(record, step))
         if on_sample is not None:
             on_sample()
     integrals = _integrate(record)
-    # The clearances of a sample are the smallest ones since the previous sample. Each interval starts with
-    # the step after that sample.
+    # The clearances of a sample are the smallest ones since the previous sample. The interval of a sample
+    # starts at the step after the previous sample.
     interval_starts = np.concatenate([[0], steps[:-1] + 1])
     wall_gaps = compute_clearances(record).min(axis=1)
     robot_gaps = measure_robot_gaps(record).min_gaps
@@ -210,39 +211,56 @@ def compute_run_metrics(
     )
 
 
+def _compute_areas_at(record: Record, step: int) -> CoveredAreas:
+    """Compute the areas that the working robots cover at a time step."""
+    free = record.environment.at(float(record.time[step])).free
+    robots = np.flatnonzero(record.working[step])
+    return compute_covered_areas(free, record.positions[step, robots], record.team.sensing_range[robots])
+
+
+def _measure_connectivity_at(record: Record, step: int) -> Connectivity:
+    """Measure the connectivity of the working robots at a time step."""
+    robots = np.flatnonzero(record.working[step])
+    return measure_connectivity(record.positions[step, robots], record.team.communication_range[robots])
+
+
 def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float:
-    """Find the time after which the mean distance stays near its final value.
+    """Find the time from which on the mean distance stays near its final value.
 
     Parameters
     ----------
     history : CostHistory
+        Coverage cost over the run.
     tolerance : float
-        Relative deviation from the final value, in both directions.
+        Largest relative deviation from the final value, in both directions.
 
     Returns
     -------
     float, s
+        Time of a sample of the history.
     """
-    cost = history.mean_distance
-    is_near_final = np.abs(cost - cost[-1]) <= tolerance * cost[-1]
-    # The sample after the last one that is not near; the first sample if all are.
+    mean_distance = history.mean_distance
+    is_near_final = np.abs(mean_distance - mean_distance[-1]) <= tolerance * mean_distance[-1]
+    # The sample after the last one that is not near the final value; the first sample if all are near.
     last_not_near = int(np.flatnonzero(~is_near_final).max(initial=-1))
-    return float(history.time[min(last_not_near + 1, len(cost) - 1)])
+    return float(history.time[min(last_not_near + 1, len(mean_distance) - 1)])
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Compute the final metrics of a run, the time until its cost is near the final one, and the bytes sent.
+    """Compute the metrics of a run that describe all of it by one number each.
 
     Parameters
     ----------
     record : Record
+        The run.
     history : CostHistory
         Coverage cost over the run.
 
     Returns
     -------
     mapping of str to float or None
-        The names end in the units.
+        The metrics at the end of the run, the data rate of the messages of a robot, and the time from which
+        on the mean distance is near its final value. The names end in the units.
     """
     return {
         **compute_run_metrics(record, rate=0.0).final(),
@@ -254,7 +272,8 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
 def _integrate(record: Record) -> _Integrals:
     """Integrate work, effort and mean path length from the start of a run to each time step.
 
-    Forces are constant during a step. Power is integrated by the trapezoidal rule.
+    Forces are constant during a time step, while velocities change. The power is therefore integrated by the
+    trapezoidal rule.
     """
     forces = np.where(record.working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
@@ -270,5 +289,5 @@ def _integrate(record: Record) -> _Integrals:
 
 
 def _accumulate(increments: Array) -> Array:
-    """Return the cumulative sum of the increments, starting with 0."""
+    """Return the cumulative sums of increments, starting with 0."""
     return np.concatenate([[0.0], np.cumsum(increments)])

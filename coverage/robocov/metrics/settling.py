@@ -9,21 +9,25 @@ from robocov.arrays import Array, BoolArray, compute_point_distances
 SETTLED_WINDOW_S = 4.0
 """Time over which the net displacement of a robot at rest is measured."""
 SETTLED_DISTANCE_M = 0.05
-"""Net displacement in this time below which a robot is at rest."""
+"""Net displacement of a robot at rest, which is less than this."""
 
 
 def is_team_at_rest(before: Array, after: Array, distance: float = SETTLED_DISTANCE_M) -> BoolArray:
-    """Return whether the net displacement of each robot over a window is below a distance.
+    """Return whether a team is at rest: all its robots have a small net displacement over a window of time.
 
     Parameters
     ----------
-    before, after : (..., n, 2) arrays, m
-        Positions at the start and at the end of the window, `SETTLED_WINDOW_S` by default.
+    before : (..., n, 2) array, m
+        Positions of the robots at the start of the window.
+    after : (..., n, 2) array, m
+        Positions of the robots at the end of the window, usually `SETTLED_WINDOW_S` later.
     distance : float, m
+        Net displacement below which a robot is at rest.
 
     Returns
     -------
     (...) bool array
+        Whether each team is at rest.
 
     Examples
     --------
@@ -43,12 +47,12 @@ def find_settling_time(
     window: float = SETTLED_WINDOW_S,
     distance: float = SETTLED_DISTANCE_M,
 ) -> float | None:
-    """Find when the team came to rest.
+    """Find the time at which the team came to rest.
 
     Parameters
     ----------
     time : (T,) array, s
-        Evenly spaced.
+        Times of the positions, evenly spaced.
     positions : (T, n, 2) array, m
         Positions of the robots over time.
     window : float, s
@@ -59,8 +63,8 @@ def find_settling_time(
     Returns
     -------
     float or None
-        Earliest time, s, such that in every window that starts then or later, the net displacement of each
-        robot is below `distance`; None if the team was still moving at the end.
+        Earliest time, s, from which on the team is at rest in every window that starts at this time or later.
+        None if the team was still moving at the end.
 
     See Also
     --------
@@ -68,7 +72,7 @@ def find_settling_time(
 
     Notes
     -----
-    Speed is not a suitable criterion, because a robot may tremble in one place forever.
+    Speed is not a suitable criterion, because a robot may tremble in the same place forever.
 
     Examples
     --------
@@ -83,7 +87,7 @@ def find_settling_time(
     window_steps = round(window / dt) if dt > 0 else 0
     if window_steps == 0 or len(time) <= window_steps:
         return None
-    # Entry k says whether the team moves in the window that starts with step k.
+    # Whether the team moves in the window that starts at each step.
     is_moving = ~is_team_at_rest(positions[:-window_steps], positions[window_steps:], distance)
     last_moving = int(np.flatnonzero(is_moving).max(initial=-1))
     first_at_rest = last_moving + 1

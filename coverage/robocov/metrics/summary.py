@@ -13,7 +13,8 @@ from robocov.metrics.settling import find_settling_time
 from robocov.record import Record
 
 MIN_REPORTED_OFFSET_M = 5e-4
-"""Distance from the requested position above which it is reported that a robot joined elsewhere."""
+"""Smallest distance between the requested and the actual position of a robot that joined, if it is
+reported."""
 
 
 def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
@@ -29,8 +30,8 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     Returns
     -------
     dict
-        Results whose names end in their units, and ``notes``, a list of remarks, if there are any. The mean
-        size of the messages that a robot sends per second is included if there are any messages.
+        Results by name; the names end in the units. If there are remarks on the run, ``notes`` is a list of
+        them. ``sent_bytes_per_s`` is included only if robots send messages.
 
     See Also
     --------
@@ -72,7 +73,7 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
 
 
 def _describe_moved_joins(record: Record) -> list[str]:
-    """Return a sentence for each robot that joined at a position other than the requested one."""
+    """Return a sentence for each robot that did not join at the requested position."""
     notes = []
     for joined in record.joined:
         if joined.offset >= MIN_REPORTED_OFFSET_M:

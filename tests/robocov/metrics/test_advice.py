@@ -11,7 +11,7 @@ from robocov.controllers import Lloyd, Rapf
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
 from robocov.metrics import compute_clearances
-from robocov.metrics.advice import advise, count_zigzags, find_trembling
+from robocov.metrics.advice import advise, count_zigzags, find_trembling_robots
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -70,18 +70,18 @@ def test_a_robot_that_patrols_in_circles_does_not_tremble() -> None:
     circle = np.stack([3.0 + np.cos(angle), 2.0 + np.sin(angle)], axis=1)
     positions = record.positions.copy()
     positions[:, 0] = circle
-    assert len(find_trembling(replace(record, positions=positions))) == 0
+    assert len(find_trembling_robots(replace(record, positions=positions))) == 0
     # With a period of four steps it trembles.
     angle = 0.5 * np.pi * np.arange(len(record))
     positions[:, 0] = np.stack([3.0 + 0.1 * np.cos(angle), 2.0 + 0.1 * np.sin(angle)], axis=1)
-    assert find_trembling(replace(record, positions=positions)).tolist() == [0]
+    assert find_trembling_robots(replace(record, positions=positions)).tolist() == [0]
 
 
 def test_short_and_thinned_records_are_not_judged() -> None:
     record = simulate_rooms(0.25)
-    assert len(find_trembling(record)) > 0
-    assert len(find_trembling(record.until(3.0))) == 0
-    assert len(find_trembling(record.thin(1.0))) == 0
+    assert len(find_trembling_robots(record)) > 0
+    assert len(find_trembling_robots(record.until(3.0))) == 0
+    assert len(find_trembling_robots(record.thin(1.0))) == 0
 
 
 def test_contacts_with_one_wall_are_no_zigzag() -> None:
