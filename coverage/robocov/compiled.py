@@ -1,9 +1,12 @@
 """Kernels: plain loops over arrays, which numba compiles when they are first called.
 
-Numba is imported only then. Its own cache keeps the machine code in the user's cache folder, in a folder
-named after a digest of this installation of robocov, so that code of another version is never used. The
-environment variable ``NUMBA_CACHE_DIR`` selects another folder, and ``ROBOCOV_CACHE`` one for all caches of
-robocov; if the latter is empty, nothing is cached. With ``NUMBA_DISABLE_JIT=1`` kernels run as Python.
+Numba is imported when a kernel is first called. Its cache stores the machine code in the user's cache folder,
+in a folder named after a digest of this installation of robocov, so that the code of another version is never
+used.
+
+The environment variable ``NUMBA_CACHE_DIR`` selects another folder for the machine code, and
+``ROBOCOV_CACHE`` another folder for all caches of robocov. If ``ROBOCOV_CACHE`` is set but empty, nothing is
+cached. With ``NUMBA_DISABLE_JIT=1``, kernels run as Python.
 """
 
 from __future__ import annotations
@@ -33,29 +36,36 @@ from robocov.files.cache_folders import find_cache_root, open_private_folder
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
-"""Whether kernels are compiled; the environment variable ``NUMBA_DISABLE_JIT`` prevents it."""
+"""Whether kernels are compiled. The environment variable ``NUMBA_DISABLE_JIT`` disables the compiler."""
 _MAX_KEPT_VERSIONS = 4
-"""Number of most recently used versions whose machine code is kept."""
+"""Number of versions, the most recently used ones, whose machine code is kept in any case."""
 _MIN_UNUSED_DAYS = 1.0
-"""Machine code that was used more recently is kept in any case: a program may still be running with it."""
+"""Time after the last use before which machine code is kept in any case, because a program may still use
+it."""
+
+_CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
+"""Errors that numba raises if its cache cannot be read or written. Kernels themselves raise none of these."""
 
 _compilation_listeners: list[Callable[[str], None]] = []
-"""Functions that `notify_compilation` calls."""
+"""Functions to call before each compilation; see `notify_compilation`."""
 _lock = threading.RLock()
+"""Lock of the import of numba, and of the dispatchers of kernels."""
 _is_cache_usable = True
+"""Whether the cache has not failed in this process."""
 _must_interpret: Callable[[str, tuple[Any, ...]], bool] | None = None
+"""Function that selects kernels to run as Python; see `interpret_kernels`."""
 _kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()
+"""All kernels of this process."""
 _ADDRESS = re.compile(" at 0x[0-9a-f]+")
-_CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
-"""Errors that numba raises if its cache cannot be read or written; kernels themselves raise none of these."""
+"""Address of a function in the text of a type of numba."""
 
 
 def kernel(function: _Function) -> _Function:
     """Decorate a function so that it is compiled to machine code when it is first called.
 
-    Its arguments are numbers, arrays, and named tuples of these. It may call other kernels, from any module,
-    and read global numbers. Arithmetic is that of Python, without fused or reordered operations, so that the
-    results have the same bits on all processors.
+    The arguments of the function are numbers, arrays, and named tuples of these. The function may call other
+    kernels, from any module, and read global numbers. The arithmetic is that of Python, without fused or
+    reordered operations, so that the results have the same bits on all processors.
 
     Parameters
     ----------
@@ -83,15 +93,15 @@ def kernel(function: _Function) -> _Function:
 
 
 def inlined_kernel(function: _Function) -> _Function:
-    """Compile a function as a part of each kernel that calls it.
+    """Decorate a function so that it is compiled as a part of each kernel that calls it.
 
-    Use it for short functions in inner loops: a call updates the reference counts of all arrays that it
-    passes, which can take longer than the arithmetic. Inlining makes the calling kernels slower to compile.
+    Use this for short functions in inner loops. A call updates the reference counts of all arrays that are
+    passed, which can take longer than the arithmetic. Kernels that inline functions take longer to compile.
 
     Parameters
     ----------
     function : callable
-        See `kernel`.
+        Function as for `kernel`.
 
     Returns
     -------
@@ -109,11 +119,11 @@ class Kernel:
     Attributes
     ----------
     py_func : callable
-        The function in Python.
+        The Python function.
     name : str
-        Its module and name.
+        Module and name of the function.
     is_inlined : bool
-        Whether it becomes part of the kernels that call it.
+        Whether the function becomes part of the kernels that call it.
     """
 
     def __init__(self, function: Callable[..., Any], *, is_inlined: bool = False) -> None:
@@ -134,7 +144,7 @@ class Kernel:
         try:
             return dispatcher(*args, **kwargs)
         except SystemError as error:
-            # numba turns a Ctrl-C that arrives while it inspects the arguments into a SystemError.
+            # If Ctrl-C is pressed while numba inspects the arguments, numba raises a SystemError.
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise KeyboardInterrupt from None
             raise
@@ -151,11 +161,12 @@ class Kernel:
         return self._dispatcher is not None and len(self._dispatcher.signatures) > 0
 
     def get_dispatcher(self) -> Any:
-        """Return numba's dispatcher for the function; import numba if this is the first kernel.
+        """Return numba's dispatcher for the function, which is built by the first call.
 
         Returns
         -------
         numba dispatcher
+            Compiled function, which compiles itself for further types of arguments.
         """
         with _lock:
             if self._dispatcher is None or (self._is_cached and not _is_cache_usable):
@@ -164,28 +175,29 @@ class Kernel:
             return self._dispatcher
 
     def _build_dispatcher(self) -> Any:
+        """Build numba's dispatcher for the function, with or without a cache."""
         numba = import_numba()
         options = {"error_model": "numpy", "forceinline": self.is_inlined}
-        # A dispatcher looks up the cache folder when it is built. The setting is restored afterwards.
-        previous = numba.config.CACHE_DIR
+        # A dispatcher reads the cache folder from numba's configuration when it is built.
+        previous_folder = numba.config.CACHE_DIR
         try:
             if self._is_cached:
                 numba.config.CACHE_DIR = str(open_cache_folder())
-                with suppress(RuntimeError):  # functions without a file, as in a doctest, cannot be cached
+                with suppress(RuntimeError):  # Functions without a file, as in a doctest, cannot be cached.
                     return numba.njit(self.py_func, cache=True, **options)
             return numba.njit(self.py_func, **options)
         finally:
-            numba.config.CACHE_DIR = previous
+            numba.config.CACHE_DIR = previous_folder
 
 
 def interpret_kernels(must_interpret: Callable[[str, tuple[Any, ...]], bool] | None) -> None:
-    """Run some kernels as Python, which gives the same results, only more slowly.
+    """Run some kernels as Python from now on. They return the same results, but take longer.
 
     Parameters
     ----------
     must_interpret : callable or None
-        Takes the `Kernel.name` of a kernel and the positional arguments of a call, and returns whether to run
-        it as Python. None runs none as Python.
+        Function of the `Kernel.name` of a kernel and of the positional arguments of a call, which returns
+        whether to run the kernel as Python. If it is None, no kernel is run as Python.
     """
     global _must_interpret
     _must_interpret = must_interpret
@@ -197,18 +209,19 @@ def is_interpreting() -> bool:
     Returns
     -------
     bool
+        False if all kernels are compiled.
     """
     return _must_interpret is not None
 
 
 def list_compiled_kernels() -> dict[str, list[str]]:
-    """Return the kernels that this process has compiled, or loaded from the cache.
+    """List the kernels that this process has compiled or loaded from the cache.
 
     Returns
     -------
     dict of str to list of str
-        For each name of a kernel, the types for which there is machine code, as from
-        `describe_argument_types`, in alphabetical order.
+        For each name of a kernel, the types of arguments for which there is machine code, as texts of
+        `describe_argument_types` in alphabetical order.
     """
     compiled: dict[str, list[str]] = {}
     for item in _kernels:
@@ -219,39 +232,44 @@ def list_compiled_kernels() -> dict[str, list[str]]:
 
 
 def describe_argument_types(arguments: tuple[Any, ...]) -> str:
-    """Return numba's types of the arguments of a kernel, as text.
+    """Return a text that names numba's types of the arguments of a kernel.
 
     Parameters
     ----------
     arguments : tuple
+        Positional arguments of a call.
 
     Returns
     -------
     str
+        Names of the types. Equal types have equal texts, in every process.
     """
     numba = import_numba()
     return _format_types([numba.typeof(argument) for argument in arguments])
 
 
 def _format_types(types: Iterable[Any]) -> str:
-    # The type of a kernel that is passed to another one contains the address of its function.
+    """Return a text that names types of numba."""
+    # The name of the type of a kernel contains the address of its function, which differs between processes.
     return _ADDRESS.sub("", "; ".join(map(str, types)))
 
 
 def _disable_cache() -> None:
-    """Continue without the cache for the rest of the process; kernels build new dispatchers when needed."""
+    """Continue without the cache for the rest of the process. Kernels then build new dispatchers."""
     global _is_cache_usable
     _is_cache_usable = False
 
 
 def import_numba() -> ModuleType:
-    """Import numba despite a folder `coverage` on the path, and let kernels call other kernels.
+    """Import numba, and let kernels call other kernels.
 
-    Numba takes any module `coverage` for coverage.py, including our source root of that name.
+    Numba uses the package coverage.py, and mistakes any module `coverage` for it. In a checkout, this is the
+    source folder of robocov, which is therefore hidden from the import.
 
     Returns
     -------
     module
+        The package numba.
     """
     with _lock:
         return _import_numba()
@@ -267,7 +285,7 @@ def _import_numba() -> ModuleType:
         sys.modules["coverage"] = None  # type: ignore[assignment]
     try:
         import numba
-        from numba.core import event  # documented as numba's event API
+        from numba.core import event  # This is the documented event API of numba.
         from numba.extending import typeof_impl
     finally:
         if is_source_root:
@@ -298,12 +316,12 @@ def _import_numba() -> ModuleType:
 
 @contextmanager
 def notify_compilation(report: Callable[[str], None]) -> Iterator[None]:
-    """Call a function right before each compilation of a kernel, as long as the context is open.
+    """Call a function before each compilation of a kernel within a ``with`` block.
 
     Parameters
     ----------
     report : callable
-        Called with the name of the kernel.
+        Function of the name of the kernel.
     """
     _compilation_listeners.append(report)
     try:
@@ -314,15 +332,15 @@ def notify_compilation(report: Callable[[str], None]) -> Iterator[None]:
 
 @functools.cache
 def open_cache_folder() -> Path | None:
-    """Open the folder with the machine code of this version; create it if needed.
+    """Open the folder with the machine code of this version, or create it.
 
-    A folder that belongs to somebody else, or that others may write to, is ignored, because code from it
-    would run as this user. A folder that cannot be written to is ignored as well.
+    A folder that belongs to another user, or to which other users may write, is not used, because its code
+    would run as this user. Nor is a folder that cannot be written to.
 
     Returns
     -------
     Path or None
-        None if nothing is cached.
+        The folder. None if nothing is cached.
     """
     configured = os.environ.get("NUMBA_CACHE_DIR")
     root = Path(configured) if configured else find_cache_root()
@@ -340,8 +358,9 @@ def open_cache_folder() -> Path | None:
 def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
     """Return a digest of an installation: its sources and folder, and the versions of Python and numba.
 
-    Numba looks for machine code by the folder of the sources and the versions of Python and numba. Each
-    combination has its own cache folder, so that a kernel counts as ready only where numba will find it.
+    Numba finds cached machine code by the folder of the sources and by the versions of Python and numba. Each
+    combination has its own cache folder, so that a kernel counts as compiled only if numba will find its
+    code.
     """
     numba_version = importlib.metadata.version("numba")
     digest = hashlib.blake2b(digest_size=10)
@@ -354,12 +373,12 @@ def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
 
 
 def _remove_unused_versions(parent: Path) -> None:
-    """Remove the machine code of versions of the library that have not been used for some time."""
+    """Remove the machine code of versions of robocov that have not been used for some time."""
     max_removal_time = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
-    last_used: list[tuple[float, Path]] = []
+    versions: list[tuple[float, Path]] = []
     for folder in parent.glob("robocov-*"):
         with suppress(OSError):
-            last_used.append((folder.stat().st_mtime, folder))
-    for use_time, folder in sorted(last_used, reverse=True)[_MAX_KEPT_VERSIONS:]:
-        if use_time < max_removal_time:
+            versions.append((folder.stat().st_mtime, folder))
+    for last_use_time, folder in sorted(versions, reverse=True)[_MAX_KEPT_VERSIONS:]:
+        if last_use_time < max_removal_time:
             shutil.rmtree(folder, ignore_errors=True)

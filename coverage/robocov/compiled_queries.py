@@ -1,10 +1,11 @@
-"""A compiled shortcut to pymunk's read-only queries: many queries in one call.
+"""Compiled loops over the read-only queries of pymunk, which are faster than separate calls from Python.
 
-Calling `pymunk.Space.point_query_nearest` and `pymunk.Space.segment_query_first` from Python costs
-microseconds each, mostly for building their result objects. The functions here call the same C functions of
-the pymunk library from a compiled loop. This is the only module that uses a private interface of pymunk.
-`is_usable` compares its results with those of the public queries, and `robocov.sensor` uses the latter where
-they differ. With the environment variable ``ROBOCOV_PUBLIC_QUERIES=1`` this module is never used.
+A call of `pymunk.Space.point_query_nearest` or `pymunk.Space.segment_query_first` takes microseconds, mostly
+to build the object for the result. The functions in this module call the same C functions of the pymunk
+library in a compiled loop. This is the only module that uses a private interface of pymunk.
+
+`is_usable` compares the results with those of the public queries. If they differ, `robocov.sensor` uses the
+public queries. With the environment variable ``ROBOCOV_PUBLIC_QUERIES=1``, this module is never used.
 
 Importing this module imports numba.
 """
@@ -34,63 +35,72 @@ _PASSES_STRUCTS_IN_REGISTERS = sys.platform != "win32" and platform.machine() in
     "aarch64",
     "arm64",
 )
-"""Whether C functions take a vector as two floats and a filter as two integers, as the calls below do."""
+"""Whether C functions on this platform take a structure of two floats like two separate floats, and a filter
+like two integers. The calls below rely on this."""
 _POINT_INFO_FIELDS = {"shape": 0, "point": 8, "distance": 24, "gradient": 32}
+"""Expected offsets, in bytes, of the fields of ``cpPointQueryInfo``, the result of a point query."""
 _SEGMENT_INFO_FIELDS = {"shape": 0, "point": 8, "normal": 24, "alpha": 40}
-"""Offsets of the fields of the structures that the queries fill, in bytes."""
+"""Expected offsets, in bytes, of the fields of ``cpSegmentQueryInfo``, the result of a segment query."""
 _INFO_SIZE = 6
-"""Size of either structure, in numbers of 8 bytes, in which its fields are read."""
+"""Size of either structure as an array of floats of 8 bytes."""
 _POINT_X = 1
-"""Index of x of the point in the structure of a point query."""
 _POINT_Y = 2
-"""Index of y of the point."""
+"""Indices of the coordinates of the point in a ``cpPointQueryInfo``."""
 _ALPHA = 5
-"""Index of the fraction in the structure of a segment query."""
+"""Index of the fraction of the segment in a ``cpSegmentQueryInfo``."""
 _RAY_RADIUS_M = 0.0
+"""Radius of a segment query, which makes it a ray."""
 _NO_GROUP = 0
+"""Group of a filter that belongs to no group."""
 _ALL_CATEGORIES = -1
-"""A filter's categories and mask as one integer, all bits set."""
+"""Categories and mask of a filter of all shapes: two integers of 32 bits, all set, as one integer of 64
+bits."""
 
 
 @numba.extending.intrinsic  # type: ignore[untyped-decorator]
 def call_c_function(typing_context: Any, address: Any, arguments: Any) -> Any:
-    """Call a C function at an address with floats and integers.
+    """Call the C function at an address, with floats and integers as arguments.
 
-    This is a numba intrinsic: numba calls it with the types of the arguments when it compiles a kernel.
+    This is a numba intrinsic: when numba compiles a kernel with such a call, it calls this function with the
+    types of the arguments, and receives a function that generates the code.
 
     Parameters
     ----------
     typing_context : numba typing context
+        Not used.
     address : numba type
-        Integer, the address of the function.
+        Type of the address of the C function, an integer.
     arguments : numba type
-        Tuple of floats and integers.
+        Type of the arguments of the C function, a tuple of floats and integers.
 
     Returns
     -------
     signature : numba signature
-        The call returns an integer.
+        Types of the call, which returns an integer.
     generate_code : callable
+        Function that generates the code of the call.
     """
     argument_types = numba.types.Tuple([numba.types.unliteral(argument) for argument in arguments])
     signature = numba.types.intp(numba.types.intp, argument_types)
 
     def generate_code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        passed = [builder.extract_value(values[1], k) for k in range(len(argument_types))]
-        function_type = ir.FunctionType(ir.IntType(64), [value.type for value in passed])
-        return builder.call(builder.inttoptr(values[0], function_type.as_pointer()), passed)
+        argument_values = [builder.extract_value(values[1], k) for k in range(len(argument_types))]
+        function_type = ir.FunctionType(ir.IntType(64), [value.type for value in argument_values])
+        function = builder.inttoptr(values[0], function_type.as_pointer())
+        return builder.call(function, argument_values)
 
     return signature, generate_code
 
 
 def is_usable() -> bool:
-    """Return whether the compiled queries give the same results as the public ones on this machine.
+    """Return whether the compiled queries give the same results as the public queries on this machine.
 
     Both are called for a point and a ray near a triangle, and their results are compared.
 
     Returns
     -------
     bool
+        False also if the user or the platform excludes the compiled queries.
     """
     if os.environ.get(PUBLIC_QUERIES_VARIABLE, "0") not in ("", "0"):
         return False
@@ -123,14 +133,16 @@ def find_nearest_points(space: pymunk.Space, positions: Array, ranges: Array) ->
     Parameters
     ----------
     space : pymunk.Space
+        Space with the shapes.
     positions : (n, 2) array, m
+        Positions of the queries.
     ranges : (n,) array, m
-        Maximum distance, finite.
+        Maximum distance of each point from its position, which must be finite.
 
     Returns
     -------
     (n, 2) array, m
-        nan where no shape is within the range.
+        Nearest points; nan if no shape is within the range.
     """
     points = np.empty((len(positions), 2))
     _find_nearest_points(_get_address(space._space), _POINT_QUERY, positions, ranges, points)
@@ -143,15 +155,18 @@ def cast_rays(space: pymunk.Space, positions: Array, ends: Array) -> tuple[Array
     Parameters
     ----------
     space : pymunk.Space
+        Space with the shapes.
     positions : (n, 2) array, m
+        Start of the rays of each row.
     ends : (n, rays, 2) array, m
+        End of each ray.
 
     Returns
     -------
     fractions : (n, rays) array
-        Fraction of each segment up to the first shape; 1 where there is none.
+        Fraction of each ray up to the first shape; 1 if it meets no shape.
     is_hit : (n, rays) bool array
-        Whether the segment meets a shape.
+        Whether each ray meets a shape.
     """
     fractions = np.ones(ends.shape[:2])
     is_hit = np.zeros(ends.shape[:2], dtype=np.bool_)
@@ -160,10 +175,12 @@ def cast_rays(space: pymunk.Space, positions: Array, ends: Array) -> tuple[Array
 
 
 def _get_address(pointer: Any) -> int:
+    """Return the address of a C pointer."""
     return int(ffi.cast("intptr_t", pointer))
 
 
 def _read_offsets(structure: str) -> dict[str, int]:
+    """Return the offsets of the fields of a C structure, in bytes."""
     return {name: field.offset for name, field in ffi.typeof(structure).fields}
 
 
@@ -173,8 +190,12 @@ _SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
 
 @kernel
 def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array, points: Array) -> None:
-    """Store the nearest point to each position in `points`; see `find_nearest_points`."""
-    info = np.empty(_INFO_SIZE)  # a cpPointQueryInfo
+    """Write the nearest point to each position to `points`; see `find_nearest_points`.
+
+    `space` and `query` are the addresses of the space and of the C function.
+    """
+    # The memory of a cpPointQueryInfo.
+    info = np.empty(_INFO_SIZE)
     for i in range(len(positions)):
         arguments = (
             space,
@@ -197,8 +218,12 @@ def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array
 def _cast_rays(
     space: int, query: int, positions: Array, ends: Array, fractions: Array, is_hit: BoolArray
 ) -> None:
-    """Write the fraction of each ray up to the first shape, and whether it hits one; see `cast_rays`."""
-    info = np.empty(_INFO_SIZE)  # a cpSegmentQueryInfo
+    """Write the results of rays that meet a shape to `fractions` and `is_hit`; see `cast_rays`.
+
+    `space` and `query` are the addresses of the space and of the C function.
+    """
+    # The memory of a cpSegmentQueryInfo.
+    info = np.empty(_INFO_SIZE)
     for i in range(len(positions)):
         for ray in range(ends.shape[1]):
             arguments = (

@@ -1,9 +1,8 @@
 """Compilation of kernels in advance: before a long computation, or in the background of a window.
 
 Numba compiles a kernel for the types of the arguments with which it is called. Each *example* below calls a
-group of kernels in the same way as robocov does. Once an example has been called, the machine code of its
-kernels is in the cache folder, where a file marks it as ready. No two processes call the same example at the
-same time.
+group of kernels as robocov does. After the call, the machine code of these kernels is in the cache folder,
+and a file there marks the example as ready. No two processes call the same example at the same time.
 
 ``python -m robocov.kernel_compilation`` calls all examples.
 """
@@ -49,34 +48,35 @@ Example: TypeAlias = Callable[[], None]
 _COMPILED_LIST = "compiled.json"
 """File in the cache folder with the names of the kernels whose machine code is there, and their types."""
 _POLL_PERIOD_S = 0.25
-"""Time between two checks whether more kernels have been compiled."""
+"""Time between two checks for further compiled kernels."""
 _EXIT_WITH_PARENT_OPTION = "--until-stdin-closes"
 """Command-line option: exit when standard input closes, as it does when the parent process ends."""
 CONTROLLER_STEPS = 12
-"""Steps of each built-in controller, after which it has planned routes."""
+"""Number of steps after which each built-in controller has planned a route."""
 _SQUARE = ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0))
 _TRIANGLE = PolygonObstacle(((3.0, 3.0), (4.0, 3.0), (4.0, 4.0)))
 _MAP = Environment("example", _SQUARE, (_TRIANGLE,))
+"""Map of most examples."""
 _WALL = WallObstacle(((3.0, 0.0), (3.0, 5.0)), 0.2)
 _DIVIDED_MAP = Environment("divided example", _SQUARE, (_WALL, _TRIANGLE))
-"""A map on which paths to the other side of the wall have a corner."""
-_FORCES_INTO_WALL = np.full((4, 2), -1000.0)
-"""Forces, N, that push four robots against the boundary."""
+"""Map on which paths to the other side of the wall have a corner."""
+_FORCES_INTO_WALL_N = np.full((4, 2), -1000.0)
+"""Forces that push four robots against the boundary."""
 
 
 def call_cost_kernels() -> None:
-    """Call the kernels of the coverage cost."""
+    """Call the kernels of the coverage cost, for equal and for different speeds."""
     cost = CoverageCost(_MAP, 2)
     cost(np.array([[0.5, 0.5]]))
     cost(np.array([[0.5, 0.5], [5.0, 5.0]]), speeds=np.array([1.0, 2.0]))
 
 
 def call_step_kernels() -> None:
-    """Call the kernels of a step with the paper's controllers, free and in contact."""
+    """Call the kernels of a step with the controllers of the paper, without and with contacts."""
     for controller in (Rapf(), Lloyd()):
         simulation = Simulation(_MAP, controller, _place_robots(4))
         simulation.step()
-        simulation.step(_FORCES_INTO_WALL)
+        simulation.step(_FORCES_INTO_WALL_N)
         simulation.step()
 
 
@@ -87,7 +87,7 @@ def call_summary_kernels() -> None:
 
 
 def call_large_team_kernels() -> None:
-    """Call the kernels of teams whose cells come from a triangulation."""
+    """Call the kernels of large teams, whose Voronoi cells are computed from a triangulation."""
     simulation = Simulation(_MAP, Rapf(), _place_robots(25))
     for _ in range(3):
         simulation.step()
@@ -105,7 +105,7 @@ def call_team_kernels() -> None:
     ):
         simulation = Simulation(_MAP, controller, _place_robots(4), team, conditions=conditions)
         simulation.step()
-        simulation.step(_FORCES_INTO_WALL)
+        simulation.step(_FORCES_INTO_WALL_N)
         simulation.step()
 
 
@@ -124,7 +124,7 @@ def call_density_kernels() -> None:
 
 
 def call_controller_kernels() -> None:
-    """Call the kernels of all built-in controllers, on a map on which they have to find their way."""
+    """Call the kernels of all built-in controllers, on a map with a wall around which they plan routes."""
     for controller in CONTROLLERS.values():
         simulation = Simulation(_DIVIDED_MAP, controller(), _place_robots(4))
         for _ in range(CONTROLLER_STEPS):
@@ -132,7 +132,7 @@ def call_controller_kernels() -> None:
 
 
 COMMON_EXAMPLES: tuple[Example, ...] = (call_cost_kernels, call_step_kernels, call_summary_kernels)
-"""Examples of a run of the paper's controllers, and its summary."""
+"""Examples for a run of the controllers of the paper, and its summary."""
 ALL_EXAMPLES: tuple[Example, ...] = (
     call_step_kernels,
     call_cost_kernels,
@@ -142,26 +142,27 @@ ALL_EXAMPLES: tuple[Example, ...] = (
     call_density_kernels,
     call_controller_kernels,
 )
-"""Examples of all kernels."""
+"""Examples for all kernels."""
 
 
-def _place_robots(count: int) -> Array:
-    """Return positions of robots in rows, the first of them in a corner."""
-    robots = np.arange(count)
+def _place_robots(robot_count: int) -> Array:
+    """Return positions of robots on a grid, the first one in a corner of the map."""
+    robots = np.arange(robot_count)
     return np.column_stack([0.3 + 0.5 * (robots % 5), 0.3 + 0.5 * (robots // 5)])
 
 
 def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
-    """Compile the kernels that example functions call, unless their machine code is already in the cache.
+    """Compile the kernels that examples call, unless their machine code is already in the cache.
 
     An example calls a group of kernels with arguments of the same types as in a simulation. Numba compiles a
-    kernel at its first call, so that calling the example compiles the group. If another process is doing
-    this, the function waits for it. Without a cache folder, the machine code is only for this process.
+    kernel at its first call, so that calling the example compiles the group. If another process is calling
+    the example, this function waits for the other process. Without a cache folder, only this process can use
+    the machine code.
 
     Parameters
     ----------
     examples : sequence of Example
-        By default those of a run and its summary.
+        Examples to call; by default, those for a run and its summary.
     """
     folder = open_cache_folder()
     for example in examples:
@@ -176,15 +177,17 @@ def compile_kernels(examples: Sequence[Example] = COMMON_EXAMPLES) -> None:
 
 
 def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
-    """Return whether the machine code of the kernels that example functions call is in the cache.
+    """Return whether the machine code of the kernels that examples call is in the cache.
 
     Parameters
     ----------
     examples : sequence of Example
+        Examples to check; by default, those for a run and its summary.
 
     Returns
     -------
     bool
+        Whether all examples are ready.
     """
     folder = open_cache_folder()
     return folder is not None and all(_get_marker(folder, example).exists() for example in examples)
@@ -192,15 +195,16 @@ def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
 
 @contextmanager
 def compile_in_background() -> Iterator[None]:
-    """Compile all kernels in another process, and run those that are not ready as Python.
+    """Compile all kernels in another process, and run kernels as Python as long as they are not compiled.
 
     The results are the same. A step of six robots in Python takes less than a millisecond, so that a window
-    shows it in real time from the start. The other process ends with the context. Kernels that it has not
-    compiled by then are compiled the next time.
+    can show a simulation in real time from the start. At the end of the ``with`` block, the other process is
+    ended. Kernels that it has not compiled are compiled the next time.
 
     Returns
     -------
     context manager
+        Context without a value.
     """
     folder = open_cache_folder()
     if folder is None or are_kernels_compiled(ALL_EXAMPLES):
@@ -216,19 +220,25 @@ def compile_in_background() -> Iterator[None]:
 
 
 class _BackgroundCompilation:
-    """Another process that compiles all kernels."""
+    """Another process that compiles all kernels.
+
+    Parameters
+    ----------
+    folder : Path
+        Cache folder.
+    """
 
     def __init__(self, folder: Path) -> None:
-        self._list = folder / _COMPILED_LIST
+        self._list_file = folder / _COMPILED_LIST
         self._compiled: dict[str, list[str]] = {}
         self._next_poll_time = 0.0
-        # Importing numba is slow as well, so a thread of this process does it.
+        # Importing numba is slow too. A thread of this process does it meanwhile.
         self._import = threading.Thread(target=import_numba, daemon=True)
         self._import.start()
         self._process = _start_compilation_process()
 
     def must_interpret(self, kernel: str, arguments: tuple[Any, ...]) -> bool:
-        """Return whether a kernel must run as Python, because its machine code is not ready yet."""
+        """Return whether a kernel must run as Python because its machine code is not ready."""
         if self._import.is_alive():
             return True
         if self._is_compiled(kernel, arguments):
@@ -246,17 +256,18 @@ class _BackgroundCompilation:
         return describe_argument_types(arguments) in self._compiled[kernel]
 
     def _poll(self) -> None:
-        """Read which kernels are compiled. If the process has ended, the others are compiled in this one."""
+        """Read which kernels have been compiled."""
         has_ended = self._process is None or self._process.poll() is not None
         with suppress(OSError, ValueError):
-            self._compiled = json.loads(self._list.read_text(encoding="utf-8"))
+            self._compiled = json.loads(self._list_file.read_text(encoding="utf-8"))
         if has_ended:
+            # No more kernels will be compiled. This process compiles the others when it calls them.
             interpret_kernels(None)
 
     def close(self) -> None:
         """End the other process."""
         if self._process is not None:
-            with self._process:  # which also closes the pipe
+            with self._process:  # Leaving the block closes the pipe and waits for the end of the process.
                 self._process.kill()
 
 
@@ -303,6 +314,7 @@ def main() -> None:
 
 
 def _exit_when_stdin_closes() -> None:
+    """Wait until standard input closes, then end the process."""
     sys.stdin.buffer.read()
     os._exit(0)
 

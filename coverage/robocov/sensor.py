@@ -1,7 +1,7 @@
 """The range sensor: nearest obstacle points and ray scans, by pymunk queries.
 
-A sensor has a space of its own, which contains the obstacles and robots that have failed. Working robots are
-not in it: they neither hide obstacles nor are mistaken for any.
+A sensor has a space of its own, which contains the obstacles and the robots that have failed. Working robots
+are not in this space, so that they neither hide obstacles nor are mistaken for obstacles.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from robocov.arrays import Array, BoolArray
 from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import compute_ray_directions
 from robocov.world.bodies import build_obstacle_space
-from robocov.world.obstacle_pieces import Mover, Obstacles
+from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
 
 _MAX_RANGE_M = 1e6
-"""Range that replaces an unlimited one, because pymunk's bounding boxes must be finite."""
+"""Largest range of a query, also if the sensing range is infinite, because bounding boxes in pymunk must be
+finite."""
 _INDEXING_STEP_S = 1e-9
-"""Duration of the step in which pymunk builds its spatial index; nothing moves in it."""
+"""Duration of the step in which pymunk builds its spatial index. Nothing moves in this step."""
 _EVERYTHING = pymunk.ShapeFilter()
+"""Filter of queries that find all shapes."""
 
 
 class RangeSensor:
@@ -32,10 +34,10 @@ class RangeSensor:
     Parameters
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free, see
+        Convex polygons that tile everything that is not free; see
         `world.obstacle_pieces.build_solid_pieces`.
-    movers : tuple of Mover
-        Moving obstacles, at their positions at time zero until `set_time` is called.
+    moving_obstacles : tuple of MovingObstacle
+        Moving obstacles. They are at their positions at time zero until `set_time` is called.
 
     See Also
     --------
@@ -55,26 +57,27 @@ class RangeSensor:
     array([[2., 3., 3., 3.]])
     """
 
-    def __init__(self, walls: tuple[Array, ...], movers: tuple[Mover, ...] = ()) -> None:
+    def __init__(self, walls: tuple[Array, ...], moving_obstacles: tuple[MovingObstacle, ...] = ()) -> None:
         self._walls = walls
-        self._movers = movers
-        self._space, self._mover_bodies = build_obstacle_space(Obstacles(walls, movers))
-        # An empty step builds the spatial index; queries never change the space.
+        self._moving_obstacles = moving_obstacles
+        self._space, self._moving_bodies = build_obstacle_space(Obstacles(walls, moving_obstacles))
+        # A step builds the spatial index, which queries need but do not build.
         self._space.step(_INDEXING_STEP_S)
         self._failed_robots: dict[tuple[float, float, float], pymunk.Circle] = {}
 
     def copy(self) -> RangeSensor:
-        """Return a sensor among the same obstacles at time zero.
+        """Return a sensor among the same obstacles at time zero, without failed robots.
 
         Returns
         -------
         RangeSensor
+            An independent sensor.
         """
-        return RangeSensor(self._walls, self._movers)
+        return RangeSensor(self._walls, self._moving_obstacles)
 
     def __reduce__(self) -> tuple[type[RangeSensor], tuple[Any, ...]]:
-        """Pickle the obstacles; pymunk's space is built again, at time zero."""
-        return RangeSensor, (self._walls, self._movers)
+        """Pickle the obstacles only. The space is built again, at time zero."""
+        return RangeSensor, (self._walls, self._moving_obstacles)
 
     def set_time(self, time: float, failed_robots: Array | None = None) -> None:
         """Move the obstacles to their positions at a given time.
@@ -84,10 +87,10 @@ class RangeSensor:
         time : float, s
             Simulation time.
         failed_robots : (w, 3) array or None, m
-            x, y and radius of the robots that have failed by then; they count as obstacles.
+            Center x and y and radius of the robots that have failed by this time. They count as obstacles.
         """
-        for body, mover in zip(self._mover_bodies, self._movers, strict=True):
-            body.position = tuple(mover.path.compute_displacement(time).tolist())
+        for body, obstacle in zip(self._moving_bodies, self._moving_obstacles, strict=True):
+            body.position = tuple(obstacle.path.compute_displacement(time).tolist())
             self._space.reindex_shapes_for_body(body)
         failed = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
         for robot in self._failed_robots.keys() - failed:
@@ -103,13 +106,14 @@ class RangeSensor:
         Parameters
         ----------
         positions : (n, 2) array, m
+            Centers of the robots.
         ranges : (n,) array, m
-            Sensing ranges; may be infinite.
+            Sensing ranges, which may be infinite.
 
         Returns
         -------
         (n, 2) array, m
-            nan where no obstacle is in range. Read-only.
+            Nearest point of each robot; nan if no obstacle is in range. Read-only.
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
         queries = _get_compiled_queries()
@@ -125,22 +129,23 @@ class RangeSensor:
         return points
 
     def scan(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
-        """Cast rays at even angles over a full turn from each position; the first points along +x.
+        """Cast rays at even angles over a full turn from each position. The first ray points along +x.
 
         Parameters
         ----------
         positions : (n, 2) array, m
+            Centers of the robots.
         rays : int
             Number of rays of each robot.
         ranges : (n,) array, m
-            Sensing ranges; may be infinite.
+            Sensing ranges, which may be infinite.
 
         Returns
         -------
         distances : (n, rays) array, m
-            Distance to the first obstacle, or the range where there is none. Read-only.
+            Distance to the first obstacle on each ray; the range if there is none. Read-only.
         is_hit : (n, rays) bool array
-            Whether an obstacle is in range. Read-only.
+            Whether there is an obstacle in range on each ray. Read-only.
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
         ends = positions[:, None, :] + limits[:, None, None] * compute_ray_directions(rays)
@@ -155,32 +160,33 @@ class RangeSensor:
         return distances, is_hit
 
     def scan_from(self, position: Array, rays: int, sensing_range: float) -> tuple[Array, Array]:
-        """Cast rays at even angles over a full turn from one position; the first points along +x.
+        """Cast rays at even angles over a full turn from one position. The first ray points along +x.
 
         Parameters
         ----------
         position : (2,) array, m
+            Start of the rays.
         rays : int
             Number of rays.
         sensing_range : float, m
-            May be infinite.
+            Sensing range, which may be infinite.
 
         Returns
         -------
         distances : (rays,) array, m
-            Distance to the first obstacle, or the range where there is none.
+            Distance to the first obstacle on each ray; the range if there is none.
         ends : (rays, 2) array, m
-            Ends of the rays.
+            Points at which the rays end.
         """
         distances, _ = self.scan(np.asarray(position)[None], rays, np.array([sensing_range]))
         return distances[0], position + distances[0][:, None] * compute_ray_directions(rays)
 
     def _cast_rays(self, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
-        """Cast rays by pymunk's public query, as `compiled_queries.cast_rays` does."""
+        """Cast rays by the public query of pymunk; see `compiled_queries.cast_rays`."""
         fractions = np.ones(ends.shape[:2])
         is_hit = np.zeros(ends.shape[:2], dtype=bool)
-        for row, (position, ends_of_robot) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
-            for ray, end in enumerate(ends_of_robot):
+        for row, (position, robot_ends) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
+            for ray, end in enumerate(robot_ends):
                 hit = self._space.segment_query_first(tuple(position), tuple(end), 0.0, _EVERYTHING)
                 if hit is not None:
                     fractions[row, ray] = hit.alpha
@@ -189,7 +195,7 @@ class RangeSensor:
 
 
 def _get_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries`, or None if pymunk's public queries must be used."""
+    """Return `robocov.compiled_queries`, or None if the public queries of pymunk must be used."""
     return None if is_interpreting() else _load_compiled_queries()
 
 
@@ -203,5 +209,5 @@ def _load_compiled_queries() -> ModuleType | None:
 
         return compiled_queries if compiled_queries.is_usable() else None
     except Exception:
-        # If anything is wrong with the shortcut, the public queries still work.
+        # The public queries work even if there is an error in the compiled queries.
         return None

@@ -1,4 +1,4 @@
-"""Random and dense packings: points in an area, any two of which are at least a spacing apart."""
+"""Random and dense packings of an area: points that keep a minimum spacing from each other."""
 
 from __future__ import annotations
 

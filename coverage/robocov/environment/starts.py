@@ -315,8 +315,8 @@ def compute_start_spacing(radius: float) -> float:
 def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
     """Return n random points that are at least `spacing` apart, or fewer if no more are found.
 
-    Three methods are tried, each of which finds more points than the one before, but less random ones: adding
-    independent points, a random lattice, and the dense packing that `Start.estimate_capacity` counts.
+    Three methods are tried in turn: adding independent random points, a random lattice, and the dense packing
+    that `Start.estimate_capacity` counts. Each finds more points than the one before, but less random ones.
     """
     if n > bound_point_count(area, spacing):
         return np.empty((0, 2))

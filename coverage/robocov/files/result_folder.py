@@ -199,7 +199,7 @@ def create_result(
     overwrite : bool
         Whether to replace a result that is already in the folder.
     run_names : iterable of str
-        Names of the runs of a comparison, each of which has a folder.
+        Names of the runs of a comparison. Each run has a folder of this name.
 
     Yields
     ------

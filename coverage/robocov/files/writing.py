@@ -1,4 +1,4 @@
-"""Writing of files, each of which appears completely or not at all."""
+"""Writing of files that appear completely or not at all."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.compiled import kernel
 from robocov.record import Record
 from robocov.sensor import RangeSensor
-from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
 
 MAX_CONTACT_GAP_M = 1e-3
 """Largest gap at which two bodies count as in contact."""
@@ -91,7 +91,7 @@ def _compute_clearances_by_queries(record: Record) -> Array:
     environment = record.environment
     working = record.working
     radius = record.team.radius
-    sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
+    sensor = RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
     has_failed = record.present & ~working
     # No wall is farther away than the diagonal of the region.
     width, height = np.ptp(environment.region.vertices, axis=0)

@@ -49,7 +49,7 @@ class CoveredAreas(NamedTuple):
 
 
 class _Sectors(NamedTuple):
-    """Sectors of a view in each of which one wall is visible, counter-clockwise, (s,) each."""
+    """Sectors of a view, counter-clockwise, (s,) each. In each sector, one wall is visible."""
 
     starts: Array
     """Angle at which each sector starts, rad from +x."""

@@ -34,9 +34,9 @@ from robocov.simulation.controller_caller import ControllerCaller
 from robocov.simulation.sensing import build_observations, is_scan_due
 from robocov.simulation.team_state import TeamState, to_team_state
 from robocov.team import Team
-from robocov.world import MAX_PENETRATION, ChangingWorld, World
+from robocov.world import MAX_PENETRATION_M, ChangingWorld, World
 from robocov.world.free_positions import require_free_starts
-from robocov.world.obstacle_pieces import build_movers, build_obstacles, build_solid_pieces
+from robocov.world.obstacle_pieces import build_moving_obstacles, build_obstacles, build_solid_pieces
 
 MAX_START_OVERLAP_M = 1e-6
 """Maximum overlap of robots at rest, with walls or with each other, that is attributed to rounding."""
@@ -134,7 +134,7 @@ class Simulation:
             _check_robots_fit(environment, self.team, state, self.conditions, self.time)
         self._controller_caller = ControllerCaller(controller, environment.static, self.time)
         self._world = self._build_world(state)
-        self.sensor = RangeSensor(build_solid_pieces(environment), build_movers(environment))
+        self.sensor = RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
         has_team_changes = self.conditions is not None and self.conditions.has_team_changes
         self._has_changing_obstacles = environment.has_moving_obstacles or has_team_changes
         self._radio = Radio(self.conditions or Conditions(), self.team.communication_range, dt)
@@ -569,6 +569,6 @@ def _check_robots_fit(
     max_overlap = MAX_START_OVERLAP_M
     if state.velocities is not None:
         # Bodies in contact overlap a little, and a moving robot may be in contact.
-        max_overlap = 2.0 * MAX_PENETRATION
+        max_overlap = 2.0 * MAX_PENETRATION_M
     working = None if conditions is None else conditions.find_working(time, len(state))
     require_free_starts(environment.at(time), state.positions, team, max_overlap, working)

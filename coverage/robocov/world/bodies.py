@@ -7,20 +7,24 @@ in one call.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 import pymunk
 from pymunk import batch
 
 from robocov.arrays import Array, IntArray
-from robocov.world.obstacle_pieces import Mover, Obstacles
+from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
+
+BodyAndDisc: TypeAlias = tuple[pymunk.Body, pymunk.Circle]
+"""The body of a robot, and its shape."""
 
 WALL_CATEGORY = 0b1
 """Filter category of shapes that robots never enter: walls and failed robots, but not moving obstacles."""
 WALLS_ONLY = pymunk.ShapeFilter(mask=WALL_CATEGORY)
 """Filter of queries that find only walls and failed robots."""
 MAX_TEAMS_PER_SPACE = 31
-"""Number of teams that one space can keep apart: each needs a filter category, and so do the walls."""
+"""Largest number of teams in one space. A filter has 32 categories: one for walls, and one for each team."""
 
 _ALL_BUT_WALLS = pymunk.ShapeFilter.ALL_CATEGORIES() & ~WALL_CATEGORY
 _FORCE_FIELD = batch.BodyFields.FORCE
@@ -41,44 +45,50 @@ def build_obstacle_space(obstacles: Obstacles) -> tuple[pymunk.Space, list[pymun
     Returns
     -------
     space : pymunk.Space
-    mover_bodies : list of pymunk.Body
-        A kinematic body for each moving obstacle, whose position is its displacement since time zero.
+        Space in which all moving obstacles are at their positions at time zero.
+    moving_bodies : list of pymunk.Body
+        A kinematic body for each moving obstacle. The position of the body is the displacement of the
+        obstacle since time zero.
     """
     space = pymunk.Space()
-    mover_bodies = []
+    moving_bodies = []
     for polygon in obstacles.walls:
         space.add(pymunk.Poly(space.static_body, polygon.tolist()))
     if obstacles.failed_robots is not None:
         for x, y, radius in obstacles.failed_robots.tolist():
             space.add(pymunk.Circle(space.static_body, radius, (x, y)))
-    for mover in obstacles.movers:
+    for obstacle in obstacles.moving_obstacles:
         body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         space.add(body)
-        for polygon in mover.pieces:
+        for polygon in obstacle.pieces:
             shape = pymunk.Poly(body, polygon.tolist())
             shape.filter = pymunk.ShapeFilter(categories=_ALL_BUT_WALLS)
             space.add(shape)
-        mover_bodies.append(body)
-    return space, mover_bodies
+        moving_bodies.append(body)
+    return space, moving_bodies
 
 
-def build_robot(mass: float, radius: float, team: int | None = None) -> tuple[pymunk.Body, pymunk.Circle]:
+def build_robot(mass: float, radius: float, team: int | None = None) -> BodyAndDisc:
     """Build the body of a robot: a frictionless disc that never rotates.
 
-    The heading of a unicycle is part of `World.steering`; no contact depends on it.
+    Contacts do not depend on the heading of a unicycle, which is part of `World.steering`.
 
     Parameters
     ----------
     mass : float, kg
+        Mass of the robot.
     radius : float, m
+        Radius of the robot.
     team : int or None
-        Index of the robot's team, from 0 to ``MAX_TEAMS_PER_SPACE - 1``, if several teams share the space:
-        robots of different teams do not collide. By default, the robot collides with all others.
+        Index of the robot's team, from 0 to ``MAX_TEAMS_PER_SPACE - 1``, if several teams share the space.
+        Robots of different teams do not collide. By default, the robot collides with all others.
 
     Returns
     -------
     body : pymunk.Body
+        Body with infinite moment of inertia.
     disc : pymunk.Circle
+        Shape of the body.
     """
     body = pymunk.Body(mass, math.inf)
     disc = pymunk.Circle(body, radius)
@@ -93,8 +103,8 @@ def build_robot(mass: float, radius: float, team: int | None = None) -> tuple[py
 class BodyArrays:
     """Positions, velocities and forces of the bodies of a space as arrays.
 
-    Rows are in the order in which pymunk lists the bodies; `find_rows` returns the rows of given bodies.
-    Arrays are changed in place, and take effect when they are written.
+    Each row belongs to a body, in the order in which pymunk lists the bodies. `find_rows` returns the rows of
+    given bodies. Changes of the arrays take effect when the arrays are written to the space.
 
     Parameters
     ----------
@@ -113,7 +123,7 @@ class BodyArrays:
 
     def __init__(self, space: pymunk.Space, capacity: int) -> None:
         self._space = space
-        # One spare row, because pymunk reallocates a buffer as soon as it is full.
+        # An additional row is needed, because pymunk reallocates a buffer as soon as it is full.
         self.forces = np.zeros((capacity + 1, 2))
         self.states = np.zeros((capacity + 1, 4))
         self._force_buffer = _wrap_array(self.forces)
@@ -126,17 +136,18 @@ class BodyArrays:
         Parameters
         ----------
         bodies : list of pymunk.Body
+            Bodies in the space.
 
         Returns
         -------
         slice or int array
-            In the order of the list. A slice if they are consecutive, which is the usual case and makes
-            indexing faster.
+            Row of each body, in the order of the list. If the rows are consecutive, which is the usual case,
+            they are a slice, which makes indexing faster.
         """
         self._id_buffer.clear()
         batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._id_buffer)
-        row_of_body = {identifier: row for row, identifier in enumerate(self._read_ids())}
-        rows = [row_of_body[body.id] for body in bodies]
+        rows_by_id = {body_id: row for row, body_id in enumerate(self._read_ids())}
+        rows = [rows_by_id[body.id] for body in bodies]
         first = rows[0] if rows else 0
         if rows == list(range(first, first + len(rows))):
             return slice(first, first + len(rows))
@@ -161,17 +172,18 @@ class BodyArrays:
         Returns
         -------
         list of int
-            Ids of the bodies; each appears once for every contact that it has.
+            Ids of the bodies. A body appears once for each of its contacts.
         """
         self._id_buffer.clear()
         batch.get_space_arbiters(self._space, _CONTACT_FIELDS, self._id_buffer)
         return self._read_ids()
 
     def _read_ids(self) -> list[int]:
-        data = self._id_buffer.int_buf()
-        if len(data) == 0:
+        """Return the ids of bodies that pymunk has written to the buffer."""
+        buffer = self._id_buffer.int_buf()
+        if len(buffer) == 0:
             return []
-        ids: list[int] = np.frombuffer(data, dtype=np.uintp).tolist()
+        ids: list[int] = np.frombuffer(buffer, dtype=np.uintp).tolist()
         return ids
 
 
@@ -182,25 +194,27 @@ def _wrap_array(array: Array) -> batch.Buffer:
     return buffer
 
 
-def compute_mover_states(movers: tuple[Mover, ...], time: float, dt: float) -> Array:
+def compute_obstacle_states(moving_obstacles: tuple[MovingObstacle, ...], time: float, dt: float) -> Array:
     """Compute the displacements and velocities of moving obstacles.
 
     Parameters
     ----------
-    movers : tuple of Mover
+    moving_obstacles : tuple of MovingObstacle
+        The m obstacles.
     time : float, s
         Simulation time.
     dt : float, s
-        Period over which the velocity is averaged, so that a step of `dt` ends exactly on the path.
+        Duration of the next step. The velocity is the mean velocity over this step, so that the obstacle is
+        exactly on its path at the end.
 
     Returns
     -------
     (m, 4) array, m and m/s
-        Displacement since time zero and velocity: x, y, vx, vy.
+        Displacement since time zero, x and y, and velocity, vx and vy.
     """
-    states = np.empty((len(movers), 4))
-    for row, mover in enumerate(movers):
-        displacement = mover.path.compute_displacement(time)
+    states = np.empty((len(moving_obstacles), 4))
+    for row, obstacle in enumerate(moving_obstacles):
+        displacement = obstacle.path.compute_displacement(time)
         states[row, :2] = displacement
-        states[row, 2:] = (mover.path.compute_displacement(time + dt) - displacement) / dt
+        states[row, 2:] = (obstacle.path.compute_displacement(time + dt) - displacement) / dt
     return states

@@ -23,31 +23,39 @@ _TURNING_RATE = 1
 
 
 class ChangingWorld:
-    """A world with a row for every robot that is ever part of the team.
+    """A world whose robots fail and join at given times.
 
-    A robot that has failed is an obstacle from then on. A robot that has not joined yet is not in the world;
-    its row contains the position at which it will join. Whenever the team changes, the robots that work
-    continue in a new `World`.
+    Its arrays have a row for each robot that is part of the team at any time. A robot that has failed is an
+    obstacle from then on. A robot that has not joined yet is not in the world, and its row contains the
+    position at which it will join. Whenever the team changes, the working robots continue in a new `World`.
 
     Parameters
     ----------
     conditions : Conditions
         Times at which robots fail and join.
     environment : Environment
+        The map.
     team : Team
         All n robots.
     positions : (n, 2) array, m
+        Centers of the robots.
     velocities : (n, 2) array or None, m/s
+        Velocities of the robots. By default, robots are at rest.
     steering : (n, 2) array or None, rad and rad/s
+        Heading and turning rate of unicycles. By default, they face the direction in which they move.
     time : float, s
         Simulation time of this state.
 
     Attributes
     ----------
-    positions, velocities, steering
-        See `World`. Read-only.
+    positions : (n, 2) array, m
+        Centers of the robots. Read-only.
+    velocities : (n, 2) array, m/s
+        Velocities of the robots. Read-only.
+    steering : (n, 2) array or None, rad and rad/s
+        Heading and turning rate of unicycles; None for a team without unicycles. Read-only.
     working : (n,) bool array
-        Mask of the robots that are present and have not failed. Read-only.
+        Whether each robot is present and has not failed. Read-only.
     """
 
     def __init__(
@@ -78,19 +86,20 @@ class ChangingWorld:
 
     @property
     def failed_robots(self) -> Array:
-        """x, y and radius of the robots that have failed, (w, 3) m."""
+        """Center x and y and radius of the robots that have failed, (w, 3) m."""
         return np.column_stack([self.positions, self.team.radius])[self._failed]
 
     def copy(self) -> ChangingWorld:
-        """Return an independent world in the same state, which continues identically.
+        """Return an independent copy in the same state, which continues identically.
 
         Returns
         -------
         ChangingWorld
+            The copy.
         """
-        twin = copy(self)
-        twin._world = None if self._world is None else self._world.copy()
-        return twin
+        world = copy(self)
+        world._world = None if self._world is None else self._world.copy()
+        return world
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -99,15 +108,18 @@ class ChangingWorld:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Move the robots as `World.step` does, then let robots fail and join.
+        """Move the working robots by `World.step`, then let robots fail and join.
 
         Parameters
         ----------
         forces : (n, 2) array, N
+            Forces of the controllers.
         dt : float, s
+            Duration of the step.
         external_forces : (n, 2) array or None, N
+            Further forces; see `World.step`.
         time : float, s
-            Time at the start of the step.
+            Simulation time at the start of the step.
 
         Raises
         ------
@@ -121,7 +133,7 @@ class ChangingWorld:
     def _move_working_robots(
         self, forces: Array, dt: float, external_forces: Array | None, time: float
     ) -> None:
-        """Move the robots that work in their own world; all others stay where they are, at rest."""
+        """Move the working robots in their own world. All other robots stay at rest at their positions."""
         self.positions = self.positions.copy()
         self.velocities = np.zeros_like(self.velocities)
         if self._world is None:
@@ -136,7 +148,7 @@ class ChangingWorld:
             self.steering[rows] = self._world.steering
 
     def _change_team(self, time: float) -> None:
-        """Apply the failures and arrivals up to a time: stop robots that fail, and place robots that join."""
+        """Apply the changes of the team up to a time: stop robots that fail, and place robots that join."""
         working = self._conditions.find_working(time, len(self.team))
         failed = self._conditions.find_failed(time, len(self.team))
         if (working == self.working).all() and (failed == self._failed).all():
@@ -155,7 +167,7 @@ class ChangingWorld:
         self._build_world()
 
     def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:
-        """Return the free position nearest to the one at which a robot should join."""
+        """Return the free position nearest to the position at which a robot should join."""
         x, y = self.positions[robot].tolist()
         try:
             return find_free_position(
@@ -187,6 +199,7 @@ class ChangingWorld:
             )
 
     def _protect_state(self) -> None:
+        """Make the arrays of the state read-only."""
         for array in (self.positions, self.velocities, self.working, self.steering):
             if array is not None:
                 array.setflags(write=False)

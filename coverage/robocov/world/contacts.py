@@ -1,10 +1,10 @@
 """Contacts: finding the robots that touch something, and moving them again in fine substeps.
 
-Besides positions and velocities, pymunk stores cached impulses, overlap corrections that it has yet to
-apply, and a search tree whose shape depends on the past. A step must depend on nothing but positions and
-velocities, so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved
-as if there were no contacts (`ContactDetector`), and those that pymunk reports in contact are moved again,
-from the same state, by a `ContactSolver`, which stores nothing between steps.
+Besides positions and velocities, pymunk stores cached impulses, overlap corrections that it has yet to apply,
+and a search tree whose shape depends on the past. A step must depend on nothing but positions and velocities,
+so that a copy of a world continues identically, bit for bit. Therefore all robots are first moved as if there
+were no contacts (`ContactDetector`). The robots that pymunk reports in contact are then moved again, from the
+same state, by a `ContactSolver`, which stores nothing between steps.
 """
 
 from __future__ import annotations
@@ -15,47 +15,53 @@ import pymunk
 
 from robocov.arrays import Array, IntArray
 from robocov.team import Team
-from robocov.world.bodies import WALLS_ONLY, BodyArrays, build_obstacle_space, build_robot
+from robocov.world.bodies import WALLS_ONLY, BodyAndDisc, BodyArrays, build_obstacle_space, build_robot
 from robocov.world.dynamics import compute_clip_factor
 from robocov.world.obstacle_pieces import Obstacles
 
-MAX_PENETRATION = 1e-3
-"""Maximum depth, in meters, to which robots may sink into walls or each other. A robot in contact moves no
-farther than this in one substep."""
+MAX_PENETRATION_M = 1e-3
+"""Maximum depth to which robots may sink into walls or each other. A robot in contact moves no farther than
+this in one substep."""
 
+_MAX_TRAVEL_RADII = 0.1
+"""Largest distance that a robot in contact moves in one substep, as a fraction of the smallest radius."""
 _MAX_SUBSTEPS = 64
-"""Maximum number of substeps of a step; very fast robots may then sink in farther."""
+"""Maximum number of substeps of a step. Very fast robots may then sink in deeper than `MAX_PENETRATION_M`."""
 _COLLISION_SLOP_M = 1e-4
 """Overlap with a wall that pymunk does not correct."""
-_MOVER_COLLISION_BIAS = 1e-9
-"""Fraction of an overlap that remains after one second if obstacles move: not 0, so that a robot that one of
-them has run over is pushed out gradually."""
+_MOVING_COLLISION_BIAS = 1e-9
+"""Fraction of an overlap that remains after one second if obstacles move. It is not 0, so that a robot that a
+moving obstacle has run over is pushed out gradually."""
 _BASE_ITERATIONS = 20
-"""Solver iterations, to which those for the ratio of masses are added."""
+"""Number of solver iterations, to which twice the ratio of masses is added."""
 _MAX_CORNER_WALLS = 3
-"""Maximum number of walls in a corner that a pushed robot is moved out of, one after the other."""
+"""Maximum number of walls that a pushed robot is moved out of, one after another, as in a corner."""
 
 
 class ContactDetector:
     """Moves robots as if there were no contacts, and reports which robots did touch something.
 
-    Several teams may share the space; robots of different teams pass through each other.
+    Several teams may share the space. Robots of different teams pass through each other.
 
     Parameters
     ----------
     obstacles : Obstacles
+        Walls, moving obstacles and failed robots.
     team : Team
-        All robots of all teams, n of them.
-    positions, velocities : (n, 2) arrays, m and m/s
+        All n robots of all teams, one team after another.
+    positions : (n, 2) array, m
+        Centers of the robots.
+    velocities : (n, 2) array, m/s
+        Velocities of the robots.
     team_count : int
-        Number of teams, of equal size.
+        Number of teams, which have equal sizes.
     """
 
     def __init__(
         self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, team_count: int = 1
     ) -> None:
-        space, movers = build_obstacle_space(obstacles)
-        # This space only detects contacts: it does not resolve them, and forgets them after a step.
+        space, moving_bodies = build_obstacle_space(obstacles)
+        # This space detects contacts, but does not resolve them. It forgets contacts after a step.
         space.iterations = 1
         space.collision_persistence = 1
         space.collision_bias = 1.0  # Overlaps are never pushed apart.
@@ -63,14 +69,15 @@ class ContactDetector:
         robots = []
         for row, (mass, radius) in enumerate(zip(team.mass.tolist(), team.radius.tolist(), strict=True)):
             body, disc = build_robot(mass=mass, radius=radius, team=row // team_size)
-            # Set the position first: pymunk would register a contact between discs added at one place.
+            # The position is set before the body is added. Otherwise, pymunk would register a contact between
+            # discs that are added at the same position.
             body.position = tuple(positions[row].tolist())
             space.add(body, disc)
             robots.append(body)
         self._space = space
-        self._arrays = BodyArrays(space, capacity=len(movers) + len(robots) + 1)
+        self._arrays = BodyArrays(space, capacity=len(moving_bodies) + len(robots) + 1)
         self._robot_rows = self._arrays.find_rows(robots)
-        self._mover_rows = self._arrays.find_rows(movers)
+        self._moving_rows = self._arrays.find_rows(moving_bodies)
         self._robot_of_body = {body.id: robot for robot, body in enumerate(robots)}
         self.set_robots(positions, velocities)
 
@@ -80,21 +87,23 @@ class ContactDetector:
         Parameters
         ----------
         positions : (n, 2) array, m
+            Centers of the robots.
         velocities : (n, 2) array, m/s
+            Velocities of the robots.
         """
         self._arrays.states[self._robot_rows, :2] = positions
         self._arrays.states[self._robot_rows, 2:] = velocities
         self._arrays.write_states()
 
-    def set_movers(self, states: Array) -> None:
+    def set_moving_obstacles(self, states: Array) -> None:
         """Set the states of moving obstacles.
 
         Parameters
         ----------
-        states : (movers, 4) array, m and m/s
-            As `bodies.compute_mover_states` returns them.
+        states : (m, 4) array, m and m/s
+            Displacements and velocities, as returned by `bodies.compute_obstacle_states`.
         """
-        self._arrays.states[self._mover_rows] = states
+        self._arrays.states[self._moving_rows] = states
         self._arrays.write_states()
 
     def step(self, net_forces: Array, dt: float) -> Array:
@@ -103,12 +112,14 @@ class ContactDetector:
         Parameters
         ----------
         net_forces : (n, 2) array, N
+            Force on each robot.
         dt : float, s
+            Duration of the step.
 
         Returns
         -------
         (n, 4) array, m and m/s
-            x, y, vx and vy of each robot.
+            x, y, vx and vy of each robot after the step.
         """
         self._arrays.forces[self._robot_rows] = net_forces
         self._arrays.write_forces()
@@ -122,95 +133,103 @@ class ContactDetector:
         Returns
         -------
         list of int
-            Ascending.
+            Indices of the robots, ascending.
         """
         bodies = self._arrays.list_touching_bodies()
         return sorted({self._robot_of_body[body] for body in bodies if body in self._robot_of_body})
 
 
 class ContactSolver:
-    """Moves robots that touch something, in a space that contains only them and the obstacles.
+    """Moves robots that touch something, in a space that contains only these robots and the obstacles.
 
-    It stores nothing between calls: pymunk drops a contact when the discs leave the space.
+    The space stores nothing about earlier contacts, because pymunk forgets a contact when a disc is removed.
 
     Parameters
     ----------
     team : Team
         All robots that may come into contact.
     obstacles : Obstacles
+        Walls, moving obstacles and failed robots.
     """
 
     def __init__(self, team: Team, obstacles: Obstacles) -> None:
         self._team = team
-        self._max_mover_speed = obstacles.max_speed
-        space, self._movers = build_obstacle_space(obstacles)
-        # A light robot between a heavy one and a wall needs about as many iterations as the ratio of masses.
+        self._max_obstacle_speed = obstacles.max_speed
+        space, self._moving_bodies = build_obstacle_space(obstacles)
+        # For a light robot between a heavy one and a wall, the solver needs about as many iterations as the
+        # ratio of the masses.
         mass_ratio = float(team.mass.max() / team.mass.min())
         space.iterations = _BASE_ITERATIONS + math.ceil(2.0 * mass_ratio)
         space.collision_slop = _COLLISION_SLOP_M
-        # With 0, each substep removes all overlap.
-        space.collision_bias = _MOVER_COLLISION_BIAS if self._movers else 0.0
+        # If the bias is 0, each substep removes all overlap.
+        space.collision_bias = _MOVING_COLLISION_BIAS if self._moving_bodies else 0.0
         self._space = space
-        self._arrays = BodyArrays(space, capacity=len(self._movers) + len(team) + 1)
-        self._mover_rows = self._arrays.find_rows(self._movers)
+        self._arrays = BodyArrays(space, capacity=len(self._moving_bodies) + len(team) + 1)
+        self._moving_rows = self._arrays.find_rows(self._moving_bodies)
         self._robots = [
             build_robot(mass=mass, radius=radius)
             for mass, radius in zip(team.mass.tolist(), team.radius.tolist(), strict=True)
         ]
-        self._max_travel = min(MAX_PENETRATION, 0.1 * float(team.radius.min()))
+        self._max_travel = min(MAX_PENETRATION_M, _MAX_TRAVEL_RADII * float(team.radius.min()))
 
     def move(
         self,
         robots: IntArray,
         states: Array,
         net_forces: Array,
-        mover_states: Array,
+        obstacle_states: Array,
         max_speed: Array,
         dt: float,
     ) -> Array:
-        """Move some robots by `dt` seconds, with contacts.
+        """Move some robots in a step, with contacts.
 
         Parameters
         ----------
         robots : (k,) array
-            Their rows in the team, ascending.
+            Indices of the robots in the team, ascending.
         states : (k, 4) array, m and m/s
-            x, y, vx, vy of these robots.
+            x, y, vx and vy of these robots before the step.
         net_forces : (k, 2) array, N
-        mover_states : (movers, 4) array, m and m/s
-            As `bodies.compute_mover_states` returns them.
+            Force on each of these robots.
+        obstacle_states : (m, 4) array, m and m/s
+            Displacements and velocities of the moving obstacles, as returned by
+            `bodies.compute_obstacle_states`.
         max_speed : (k,) array, m/s
-            Maximum speed of each robot afterwards: a contact can make it faster than its drive can.
+            Speed to which each robot is limited after the step, because a contact may accelerate it.
         dt : float, s
+            Duration of the step.
 
         Returns
         -------
         (k, 4) array, m and m/s
-            x, y, vx, vy afterwards.
+            x, y, vx and vy of these robots after the step.
         """
-        members = [self._robots[robot] for robot in robots.tolist()]
-        bodies = [body for body, _ in members]
-        discs = [disc for _, disc in members]
+        bodies_and_discs = [self._robots[robot] for robot in robots.tolist()]
+        bodies = [body for body, _ in bodies_and_discs]
+        discs = [disc for _, disc in bodies_and_discs]
         self._space.add(*bodies)
         try:
             rows = self._arrays.find_rows(bodies)
-            self._arrays.states[:] = 0.0  # This includes the row of the static body.
-            self._arrays.states[self._mover_rows] = mover_states
+            self._arrays.states[:] = 0.0  # One of the rows belongs to the static body.
+            self._arrays.states[self._moving_rows] = obstacle_states
             self._arrays.states[rows] = states
             self._arrays.write_states()
             self._space.add(*discs)
             self._arrays.forces[rows] = net_forces
-            substeps = self._count_substeps(robots, states, net_forces, dt)
-            self._run_substeps(members, substeps, dt / substeps)
+            substep_count = self._count_substeps(robots, states, net_forces, dt)
+            substep = dt / substep_count
+            for _ in range(substep_count):
+                self._arrays.write_forces()
+                self._run_substep(bodies_and_discs, substep)
             self._space.remove(*discs)
             self._arrays.read_states()
-            final = self._arrays.states[rows].copy()
-            for row, (vx, vy) in enumerate(final[:, 2:].tolist()):
-                final[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
-            # These corrections change the positions; the velocities are those from before.
-            self._finish_corrections(members, dt / substeps)
-            final[:, :2] = self._arrays.states[rows, :2]
-            return final
+            final_states = self._arrays.states[rows].copy()
+            for row, (vx, vy) in enumerate(final_states[:, 2:].tolist()):
+                final_states[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
+            self._apply_pending_corrections(bodies_and_discs, substep)
+            # The corrections changed the positions. The velocities are those from before the corrections.
+            final_states[:, :2] = self._arrays.states[rows, :2]
+            return final_states
         finally:
             # Leave no robots in the space, even after an interruption.
             self._arrays.forces[:] = 0.0
@@ -218,56 +237,58 @@ class ContactSolver:
             self._space.remove(*bodies)
 
     def _count_substeps(self, robots: IntArray, states: Array, net_forces: Array, dt: float) -> int:
-        """Return how many substeps limit the travel in each to `_max_travel`, at most `_MAX_SUBSTEPS`."""
+        """Return the number of substeps that limits the travel in each to `_max_travel`.
+
+        It is at most `_MAX_SUBSTEPS`, also if the travel is then longer.
+        """
         max_squared_speed = 0.0
-        mass = self._team.mass[robots].tolist()
-        for (_, _, vx, vy), (fx, fy), m in zip(states.tolist(), net_forces.tolist(), mass, strict=True):
+        masses = self._team.mass[robots].tolist()
+        for (_, _, vx, vy), (fx, fy), m in zip(states.tolist(), net_forces.tolist(), masses, strict=True):
             final_vx = vx + fx * (dt / m)
             final_vy = vy + fy * (dt / m)
             max_squared_speed = max(
                 max_squared_speed, vx * vx + vy * vy, final_vx * final_vx + final_vy * final_vy
             )
-        speed = math.sqrt(max_squared_speed) + self._max_mover_speed
+        speed = math.sqrt(max_squared_speed) + self._max_obstacle_speed
         return min(_MAX_SUBSTEPS, max(1, math.ceil(speed * dt / self._max_travel)))
 
-    def _run_substeps(
-        self, members: list[tuple[pymunk.Body, pymunk.Circle]], substeps: int, dt: float
-    ) -> None:
-        """Run substeps of `dt` seconds each, all under the same forces."""
-        for _ in range(substeps):
-            self._arrays.write_forces()
-            self._run_substep(members, dt)
+    def _apply_pending_corrections(self, bodies_and_discs: list[BodyAndDisc], dt: float) -> None:
+        """Apply the overlap corrections that pymunk has computed but not yet applied, and read the states.
 
-    def _finish_corrections(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
-        """Apply the overlap corrections that pymunk has computed but not yet applied, and read the states."""
+        Pymunk applies them in the next substep, which here is one at rest.
+        """
         self._arrays.states[:, 2:] = 0.0
         self._arrays.write_states()
-        self._run_substep(members, dt)
+        self._run_substep(bodies_and_discs, dt)
         self._arrays.read_states()
 
-    def _run_substep(self, members: list[tuple[pymunk.Body, pymunk.Circle]], dt: float) -> None:
-        """Run a substep; afterwards, no robot is in a wall into which a moving obstacle has pushed it."""
-        if not self._movers:
+    def _run_substep(self, bodies_and_discs: list[BodyAndDisc], dt: float) -> None:
+        """Run a substep, and move robots that a moving obstacle has pushed into a wall out of the wall."""
+        if not self._moving_bodies:
             self._space.step(dt)
             return
-        old_positions = [body.position for body, _ in members]
+        old_positions = [body.position for body, _ in bodies_and_discs]
         self._space.step(dt)
-        self._keep_out_of_walls(members, old_positions)
+        self._keep_out_of_walls(bodies_and_discs, old_positions)
 
     def _keep_out_of_walls(
-        self, members: list[tuple[pymunk.Body, pymunk.Circle]], old_positions: list[pymunk.Vec2d]
+        self, bodies_and_discs: list[BodyAndDisc], old_positions: list[pymunk.Vec2d]
     ) -> None:
         """Move robots that a moving obstacle has pushed into a wall back in front of that wall.
 
         Walls take precedence over moving obstacles, which then pass over the robot.
         """
-        for (body, disc), old_position in zip(members, old_positions, strict=True):
-            crossed = self._space.segment_query_first(old_position, body.position, 0.0, WALLS_ONLY)
-            if crossed is not None:
+        for (body, disc), old_position in zip(bodies_and_discs, old_positions, strict=True):
+            crossed_wall = self._space.segment_query_first(old_position, body.position, 0.0, WALLS_ONLY)
+            if crossed_wall is not None:
                 body.position = old_position
             for _ in range(_MAX_CORNER_WALLS):  # Leaving one wall may mean entering another.
                 wall = self._space.point_query_nearest(body.position, disc.radius, WALLS_ONLY)
-                if wall is None or wall.distance >= disc.radius - _COLLISION_SLOP_M or wall.distance <= 0.0:
+                if wall is None or wall.distance >= disc.radius - _COLLISION_SLOP_M:
+                    break
+                # If the center is inside the wall, the vector from the wall to the center leads deeper into
+                # it.
+                if wall.distance <= 0.0:
                     break
                 away = body.position - wall.point
                 body.position = wall.point + away * (disc.radius / math.hypot(*away))

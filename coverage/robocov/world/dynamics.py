@@ -1,9 +1,9 @@
 """Free motion of robots: viscosity and kinematic limits, combined into one net force per robot.
 
-A controller returns a force. Equation (28) with its sign corrected, m q'' = F - nu q', is solved exactly over
-a substep, so viscosity is stable for any time step; then the change of velocity and the speed are
-limited. The net force takes a point mass from its velocity to the resulting one within the substep. It is
-what pymunk integrates.
+A controller returns a force F. Equation (28) with its sign corrected, m q'' = F - nu q', is solved exactly
+over a substep, so that the motion is stable for any time step. Then the change of velocity and the speed are
+limited. The net force is the constant force under which a point mass reaches the resulting velocity in this
+substep. Pymunk integrates the motion under net forces.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from robocov.team import Team
 
 
 class MotionResponse(NamedTuple):
-    """Response of robots to forces during one substep; each (n,)."""
+    """Response of robots to forces during one substep, (n,) each."""
 
     velocity_loss: Array
     """Fraction of the velocity that viscosity removes, 1 - exp(-nu dt / m)."""
     velocity_per_force: Array
     """Velocity gained per unit of the controller's force, m/s/N."""
     force_per_velocity: Array
-    """Net force per change of velocity, m / dt, N/(m/s)."""
+    """Net force needed per change of velocity, m / dt, N/(m/s)."""
     max_velocity_change: Array
     """Largest change of velocity, max_acceleration * dt, m/s."""
     max_speed: Array
@@ -39,35 +39,39 @@ def compute_response(team: Team, dt: float) -> MotionResponse:
     Parameters
     ----------
     team : Team
+        The n robots.
     dt : float, s
         Duration of the substep.
 
     Returns
     -------
     MotionResponse
+        Coefficients and limits for a substep of this duration.
     """
-    rate = team.viscosity / team.mass
-    velocity_loss = -np.expm1(-rate * dt)
-    is_viscous = rate > 0
-    effective_time = np.where(is_viscous, velocity_loss / np.where(is_viscous, rate, 1.0), dt)
+    decay_rate = team.viscosity / team.mass
+    velocity_loss = -np.expm1(-decay_rate * dt)
+    is_viscous = decay_rate > 0
+    # The change of velocity under a constant force F is F / m times this time, (1 - exp(-nu dt / m)) m / nu,
+    # which approaches dt as the viscosity approaches 0.
+    effective_time = np.where(is_viscous, velocity_loss / np.where(is_viscous, decay_rate, 1.0), dt)
     return MotionResponse(
         velocity_loss=velocity_loss,
         velocity_per_force=effective_time / team.mass,
         force_per_velocity=team.mass / dt,
         max_velocity_change=team.max_acceleration * dt,
-        # A copy, because read-only arrays, such as those of a team, are a different type to the compiler.
+        # The array of the team is read-only, which is a different type for the compiler. A copy is not.
         max_speed=team.max_speed.copy(),
     )
 
 
 @kernel
 def compute_clip_factor(x: float, y: float, limit: float) -> float:
-    """Compute the factor by which to scale a vector so that it is at most `limit` long.
+    """Compute the factor that clips a vector to a maximum length.
 
     Parameters
     ----------
     x, y : float
-        The vector.
+        Components of the vector.
     limit : float
         Maximum length.
 
@@ -87,20 +91,23 @@ def compute_net_forces(forces: Array, velocities: Array, response: MotionRespons
     """Compute the net forces that pymunk integrates.
 
     The change of velocity is limited first, then the speed. Limiting the speed does not make the change
-    larger again, because the old velocity is within the limit as well.
+    larger again, because the old velocity is within the limit too.
 
     Parameters
     ----------
     forces : (n, 2) array, N
-        The controllers' forces.
+        Forces of the controllers.
     velocities : (n, 2) array, m/s
+        Velocities before the substep.
     response : MotionResponse
+        Response of the robots to forces.
     external : (n, 2) or (0, 2) array, N
         Further forces, to which no limits apply; empty if there are none.
 
     Returns
     -------
     (n, 2) array, N
+        Force on each robot, constant during the substep.
     """
     net = np.empty((len(forces), 2))
     for i in range(len(forces)):

@@ -12,47 +12,54 @@ from robocov.potential import compute_spread_directions
 from robocov.team import Team
 
 _CLEARANCE_M = 1e-3
-"""Clearance that a robot keeps from walls and robots when it is moved away from them."""
+"""Gap between a robot and the walls and robots from which it is moved away."""
 _MAX_ROUNDS = 300
-"""Maximum number of rounds, after which robots that still overlap are assumed not to fit."""
+"""Number of rounds after which robots that still overlap are assumed not to fit."""
 _QUADRANT_SEGMENTS = 16
 """Edges per quadrant of the polygons that represent the discs of other robots."""
 
 
 def relocate_robots(environment: Environment, positions: Array, team: Team) -> Array:
-    """Move robots as little as needed, so that all of them fit.
+    """Move robots that overlap walls or each other, so that all of them fit.
+
+    In each round, robots in walls are moved to the nearest positions outside, and the two robots of each
+    overlapping pair are moved apart.
 
     Parameters
     ----------
     environment : Environment
+        The map.
     positions : (n, 2) array, m
+        Centers of the robots.
     team : Team
         The n robots.
 
     Returns
     -------
     (n, 2) array, m
+        New positions. Robots that neither overlap nor are pushed by others do not move.
 
     Raises
     ------
     StartError
-        If they do not fit.
+        If the robots do not fit.
     """
     positions = np.array(positions, dtype=float)
     areas = _compute_center_areas(environment, team)
     for _ in range(_MAX_ROUNDS):
         _leave_walls(environment, positions, team, areas)
-        first, second, distance = find_close_pairs(positions, 2.0 * float(team.radius.max()))
-        overlap = team.radius[first] + team.radius[second] - distance
-        rows = np.flatnonzero((overlap > 0.0) & (first < second))
+        first, second, distances = find_close_pairs(positions, 2.0 * float(team.radius.max()))
+        overlaps = team.radius[first] + team.radius[second] - distances
+        rows = np.flatnonzero((overlaps > 0.0) & (first < second))
         if len(rows) == 0:
             return positions
         first = first[rows]
         second = second[rows]
-        direction = _compute_directions(positions, first, second, distance[rows])
-        step = 0.5 * (overlap[rows] + _CLEARANCE_M)[:, None] * direction
-        np.add.at(positions, first, -step)
-        np.add.at(positions, second, step)
+        directions = _compute_directions(positions, first, second, distances[rows])
+        # Each robot of a pair moves by half of the distance that is missing.
+        displacements = 0.5 * (overlaps[rows] + _CLEARANCE_M)[:, None] * directions
+        np.add.at(positions, first, -displacements)
+        np.add.at(positions, second, displacements)
     raise StartError(
         f"robots {first[0] + 1} and {second[0] + 1} have no space next to each other "
         f"in map {environment.name!r}"
@@ -60,7 +67,7 @@ def relocate_robots(environment: Environment, positions: Array, team: Team) -> A
 
 
 def _compute_center_areas(environment: Environment, team: Team) -> dict[float, BaseGeometry]:
-    """Return the areas for the centers of robots, by their radius."""
+    """Return the area in which the center of a robot may be, by the radius of the robot."""
     areas = {}
     for radius in np.unique(team.radius).tolist():
         areas[radius] = _compute_center_area(environment, radius)
@@ -73,18 +80,18 @@ def _compute_center_areas(environment: Environment, team: Team) -> dict[float, B
 def _leave_walls(
     environment: Environment, positions: Array, team: Team, areas: dict[float, BaseGeometry]
 ) -> None:
-    """Move the robots that are in walls to the nearest positions where they fit."""
+    """Move the robots that overlap walls to the nearest positions where they fit, changing the positions."""
     is_in_wall = _compute_wall_distances(environment, positions) < team.radius
-    areas_of_robots = np.array([areas[radius] for radius in team.radius[is_in_wall].tolist()], dtype=object)
-    positions[is_in_wall] = find_nearest_inside(areas_of_robots, positions[is_in_wall])
+    center_areas = np.array([areas[radius] for radius in team.radius[is_in_wall].tolist()], dtype=object)
+    positions[is_in_wall] = find_nearest_inside(center_areas, positions[is_in_wall])
 
 
-def _compute_directions(positions: Array, first: IntArray, second: IntArray, distance: Array) -> Array:
+def _compute_directions(positions: Array, first: IntArray, second: IntArray, distances: Array) -> Array:
     """Return unit vectors from the first robots of pairs to the second ones, (k, 2)."""
-    is_same_point = distance == 0.0
-    divisor = np.where(is_same_point, 1.0, distance)
-    directions: Array = (positions[second] - positions[first]) / divisor[:, None]
-    # The direction between robots at the same point is undefined: each such pair is assigned one.
+    is_same_point = distances == 0.0
+    divisors = np.where(is_same_point, 1.0, distances)
+    directions: Array = (positions[second] - positions[first]) / divisors[:, None]
+    # The direction between robots at the same point is undefined. Each such pair gets an arbitrary direction.
     directions[is_same_point] = compute_spread_directions((first + second)[is_same_point])
     return directions
 
@@ -97,17 +104,20 @@ def find_free_position(
     Parameters
     ----------
     environment : Environment
+        The map.
     radius : float, m
         Radius of the robot.
     others : (n, 2) array, m
         Positions of the other robots.
     point : (x, y), m
+        Requested position.
     radii : (n,) array or None, m
         Radii of the other robots; by default the same as `radius`.
 
     Returns
     -------
     (x, y), m
+        The point itself if the robot fits there.
 
     Raises
     ------
@@ -122,8 +132,8 @@ def find_free_position(
         return float(point[0]), float(point[1])
     area = _compute_center_area(environment, radius)
     if len(others) > 0:
-        # shapely replaces a disc by a polygon inscribed in it. The disc is enlarged, so that the edges of the
-        # polygon keep the clearance as well.
+        # Shapely represents a disc by an inscribed polygon, whose edges are nearer to the center. The disc is
+        # enlarged, so that the edges are at the required distance.
         inradius_ratio = np.cos(np.pi / (4 * _QUADRANT_SEGMENTS))
         circumradii = (radius + radii + _CLEARANCE_M) / inradius_ratio
         discs = shapely.buffer(shapely.points(others), circumradii, quad_segs=_QUADRANT_SEGMENTS)
@@ -146,18 +156,20 @@ def require_free_starts(
     Parameters
     ----------
     environment : Environment
+        The map.
     positions : (n, 2) array, m
+        Positions at which the robots start.
     team : Team
         The n robots.
     tolerance : float, m
-        Overlaps up to this depth are accepted.
+        Depth up to which overlaps are accepted.
     is_present : (n,) bool array or None
-        Mask of the robots to check; all robots by default.
+        Whether to check each robot; by default, all robots are checked.
 
     Raises
     ------
     StartError
-        If a position is not finite, or a robot that is present overlaps a wall or another one.
+        If a position is not finite, or a robot to check overlaps a wall or another robot to check.
     """
     if is_present is None:
         is_present = np.ones(len(positions), dtype=bool)
@@ -174,16 +186,16 @@ def require_free_starts(
             f"{start} is {wall_distances[i]:.3g} m from a wall, "
             f"expected at least the radius of the robot, {team.radius[i]:g} m"
         )
-    first, second, distance = find_close_pairs(positions, 2.0 * float(team.radius.max()))
-    overlaps = distance < team.radius[first] + team.radius[second] - tolerance
-    for k in np.flatnonzero(overlaps & is_present[first] & is_present[second]).tolist():
+    first, second, distances = find_close_pairs(positions, 2.0 * float(team.radius.max()))
+    is_overlapping = distances < team.radius[first] + team.radius[second] - tolerance
+    for k in np.flatnonzero(is_overlapping & is_present[first] & is_present[second]).tolist():
         raise StartError(
-            f"starts[{first[k]}] and starts[{second[k]}] are {distance[k]:.3g} m apart: the robots overlap"
+            f"starts[{first[k]}] and starts[{second[k]}] are {distances[k]:.3g} m apart: the robots overlap"
         )
 
 
 def _compute_center_area(environment: Environment, radius: float) -> BaseGeometry:
-    """Return the area for the center of a robot, away from walls."""
+    """Return the area in which the center of a robot may be, with some clearance from walls."""
     return environment.free.buffer(-(radius + _CLEARANCE_M), join_style="round")
 
 

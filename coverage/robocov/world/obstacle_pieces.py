@@ -1,8 +1,8 @@
 """Walls and obstacles as convex pieces, the only polygons that the physics engine supports.
 
-pymunk silently replaces a concave polygon by its convex hull. Therefore everything that is not free is
-triangulated, and the triangles are merged into larger pieces as long as these stay convex (Hertel and
-Mehlhorn 1983: at most four times as many pieces as in an optimal decomposition).
+Pymunk silently replaces a concave polygon by its convex hull. Therefore everything that is not free is
+triangulated, and the triangles are merged into larger pieces as long as these are convex (Hertel and
+Mehlhorn, 1983: at most four times as many pieces as in an optimal decomposition).
 """
 
 import weakref
@@ -16,24 +16,25 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, freeze
 from robocov.environment import Environment, ObstaclePath, Point
 
-Loop: TypeAlias = list[Point]
+Ring: TypeAlias = list[Point]
 """Corners of a convex polygon, counter-clockwise, (x, y) m."""
 
 FRAME_WIDTH_M = 2.0
-"""Thickness of the wall around the region."""
+"""Thickness of the solid frame around the region."""
 
 _pieces_by_environment: dict[int, tuple[Array, ...]] = {}
-"""Pieces of the static environments that are in use, by `id`."""
+"""Pieces of each static environment that is in use, by the `id` of the environment."""
 
 
-class Mover(NamedTuple):
+class MovingObstacle(NamedTuple):
     """A moving obstacle.
 
     Attributes
     ----------
     pieces : tuple of (k, 2) arrays, m
-        Convex polygons at time zero.
+        Convex polygons that tile the obstacle at time zero.
     path : ObstaclePath
+        Path along which the obstacle moves.
     """
 
     pieces: tuple[Array, ...]
@@ -48,20 +49,20 @@ class Obstacles:
     ----------
     walls : tuple of (k, 2) arrays, m
         Convex polygons that tile everything that is not free; see `build_solid_pieces`.
-    movers : tuple of Mover
+    moving_obstacles : tuple of MovingObstacle
         Moving obstacles.
     failed_robots : (w, 3) array or None, m
         Center x, y and radius of robots that have failed.
     """
 
     walls: tuple[Array, ...]
-    movers: tuple[Mover, ...] = ()
+    moving_obstacles: tuple[MovingObstacle, ...] = ()
     failed_robots: Array | None = None
 
     @property
     def max_speed(self) -> float:
         """Largest speed of a moving obstacle, m/s."""
-        return max((mover.path.speed for mover in self.movers), default=0.0)
+        return max((obstacle.path.speed for obstacle in self.moving_obstacles), default=0.0)
 
 
 def build_obstacles(environment: Environment) -> Obstacles:
@@ -70,12 +71,14 @@ def build_obstacles(environment: Environment) -> Obstacles:
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
     Obstacles
+        Obstacles without failed robots.
     """
-    return Obstacles(build_solid_pieces(environment), build_movers(environment))
+    return Obstacles(build_solid_pieces(environment), build_moving_obstacles(environment))
 
 
 def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
@@ -86,11 +89,12 @@ def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
     tuple of (k, 2) arrays, m
-        Counter-clockwise. Computed only once for each environment.
+        Counter-clockwise polygons. They are computed only once for each environment.
     """
     static = environment.static
     pieces = _pieces_by_environment.get(id(static))
@@ -108,31 +112,33 @@ def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
     return pieces
 
 
-def build_movers(environment: Environment) -> tuple[Mover, ...]:
+def build_moving_obstacles(environment: Environment) -> tuple[MovingObstacle, ...]:
     """Build the moving obstacles of an environment.
 
     Parameters
     ----------
     environment : Environment
+        The map.
 
     Returns
     -------
-    tuple of Mover
-        In the order of the obstacles.
+    tuple of MovingObstacle
+        Moving obstacles, in the order of the obstacles in the map.
     """
     return tuple(
-        Mover(split_into_convex_pieces(obstacle.polygon), obstacle.path)
+        MovingObstacle(split_into_convex_pieces(obstacle.polygon), obstacle.path)
         for obstacle in environment.obstacles
         if obstacle.path is not None
     )
 
 
 def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
-    """Split the polygons of a geometry into convex ones.
+    """Split the polygons of a geometry into convex polygons.
 
     Parameters
     ----------
     geometry : geometry, m
+        Geometry of any type. Lines and points are ignored.
 
     Returns
     -------
@@ -141,14 +147,14 @@ def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
     """
     shapes = shapely.get_parts(geometry)
     polygons = [shape for shape in shapes if shape.geom_type == "Polygon" and shape.area > 0.0]
-    loops = chain.from_iterable(_merge_loops(_triangulate(polygon)) for polygon in polygons)
-    return tuple(freeze(loop) for loop in loops)
+    rings = chain.from_iterable(_merge_rings(_triangulate(polygon)) for polygon in polygons)
+    return tuple(freeze(ring) for ring in rings)
 
 
-def _triangulate(polygon: BaseGeometry) -> list[Loop]:
-    """Return counter-clockwise triangles that tile a polygon."""
+def _triangulate(polygon: BaseGeometry) -> list[Ring]:
+    """Triangulate a polygon; return counter-clockwise triangles."""
     rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
-    triangles: list[Loop] = []
+    triangles: list[Ring] = []
     for corners in rings[:, :3].tolist():
         a, b, c = map(tuple, corners)
         doubled_area = _compute_doubled_area(a, b, c)
@@ -159,13 +165,13 @@ def _triangulate(polygon: BaseGeometry) -> list[Loop]:
     return triangles
 
 
-def _merge_loops(loops: list[Loop]) -> list[Loop]:
-    """Merge triangles across their common edges as long as the result is convex.
+def _merge_rings(rings: list[Ring]) -> list[Ring]:
+    """Merge triangles across their common edges as long as the results are convex.
 
-    An edge is a pair of points. Since all loops are counter-clockwise, the edge from a to b of one piece is
-    the edge from b to a of the piece on its other side.
+    An edge is a pair of points. All rings are counter-clockwise. If one piece has the edge from a to b, the
+    piece on the other side of this edge therefore has the edge from b to a.
     """
-    pieces = dict(enumerate(loops))
+    pieces = dict(enumerate(rings))
     piece_of_edge: dict[tuple[Point, Point], int] = {}
     for number, (a, b, c) in pieces.items():
         piece_of_edge[a, b] = number
@@ -180,24 +186,24 @@ def _merge_loops(loops: list[Loop]) -> list[Loop]:
         if union is None:
             continue
         # The edges of the second piece now belong to the first one, except for the common edge.
-        second_loop = pieces.pop(second)
-        for k, corner in enumerate(second_loop):
-            piece_of_edge[second_loop[k - 1], corner] = first
+        second_ring = pieces.pop(second)
+        for k, corner in enumerate(second_ring):
+            piece_of_edge[second_ring[k - 1], corner] = first
         del piece_of_edge[a, b]
         del piece_of_edge[b, a]
         pieces[first] = union
     return list(pieces.values())
 
 
-def _unite_if_convex(first: Loop, second: Loop, a: Point, b: Point) -> Loop | None:
-    """Return the union of two loops across the edge a→b of `first`, or None if it is not convex."""
-    # The corners of the first loop from b to a, and those of the second one from a to b. Chained together,
-    # they go once around the union.
+def _unite_if_convex(first: Ring, second: Ring, a: Point, b: Point) -> Ring | None:
+    """Unite two rings across the edge from a to b of the first; return None if the union is not convex."""
+    # The corners of the first ring from b to a, followed by the corners of the second ring from a to b, go
+    # once around the union.
     index_of_b = first.index(b)
     index_of_a = second.index(a)
     b_to_a = first[index_of_b:] + first[:index_of_b]
     a_to_b = second[index_of_a:] + second[:index_of_a]
-    # The union can only be concave where the loops meet: at a, between its two neighbors, and at b.
+    # The union can only be concave where the rings meet, at a and at b. Test the turn there.
     is_convex_at_a = _compute_doubled_area(b_to_a[-2], a, a_to_b[1]) > 0.0
     is_convex_at_b = _compute_doubled_area(a_to_b[-2], b, b_to_a[1]) > 0.0
     if is_convex_at_a and is_convex_at_b:

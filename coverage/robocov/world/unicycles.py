@@ -1,34 +1,41 @@
 """Unicycles: wheel speeds that make a two-wheeled robot follow the force that acts on a point robot.
 
-A controller's force gives the acceleration a of a point robot, within its limits and with viscosity.
-A unicycle (a differential drive with its center between its wheels) has a speed v >= 0 along its heading h
-and a turning rate ω. In every substep it turns that acceleration into
+The force of a controller gives the acceleration a of a point robot, with viscosity and within its limits. A
+unicycle is a differential drive with its center between its wheels. It has a speed v >= 0 along its heading h
+and a turning rate ω. In every substep, the acceleration of the point determines a target of the unicycle's
+motion:
 
-- a turn toward the velocity v h + τ a that the point would have τ = 0.2 s later, which differs from the
-  heading by the angle e: ω* = e / τ, up to the turning rate, and never so fast that the wheels could not stop
-  at e = 0;
-- a speed, from the acceleration along the heading, a·h. The part of a across the heading that turning at v ω
-  does not provide is replaced by braking: v* = v + dt (a·h - max(0, |a × h| - v ω)), and at least 0.
+- The turning rate. The point would have the velocity v h + τ a after the response time τ = 0.2 s. The
+unicycle
+  turns toward this velocity, which differs from the heading by the angle e: ω* = e / τ, limited by the
+  maximum turning rate, and by the rate from which the wheels can still stop at e = 0.
+- The speed. It changes by the acceleration along the heading, a·h. Across the heading, turning provides only
+the
+  acceleration v ω. If the point would accelerate more, the unicycle brakes by the difference:
+  v* = v + dt (a·h - max(0, |a × h| - v ω)), but at least 0.
 
-So it turns in place if the point would move off in another direction, and drives once it nearly faces that
-way. The wheels, v ∓ ω b / 2 with the track width b, approach these speeds as fast as `max_acceleration`
-allows. Braking comes first, then the turn, then speeding up; the turn takes its share of `max_speed` first.
-Such heading control (ω from e, speed from the projection on the heading) is that of Aicardi, Casalino, Bicchi
-and Balestrino (1995) and Astolfi (1999), as it is commonly described; their texts were not consulted.
+The unicycle thus turns in place if the point would start in another direction, and drives once it nearly
+faces this direction. The speeds of the wheels are v ∓ ω b / 2, where b is the track width. They approach the
+target as fast as `max_acceleration` allows: braking has priority over turning, and turning over speeding up.
+If the target exceeds `max_speed`, turning has priority over driving.
+
+Such heading control, with ω from e and the speed from the projection on the heading, is commonly attributed
+to Aicardi, Casalino, Bicchi and Balestrino (1995) and Astolfi (1999). Their texts were not consulted.
 
 Guarantees:
 
-- Neither the wheels nor the turning rate exceed their limits; a unicycle gains no more speed in a substep
-  than the point would along its heading.
+- Neither the wheels nor the turning rate exceed their limits. In a substep, a unicycle gains no more speed
+than
+  the point would along the heading.
 - If the point would brake along the heading, the unicycle brakes just as hard, at once and without turning.
-- There is no sideways slip, except in contact and under external forces: those carry a robot, which then
-  moves as a point and keeps its heading. When it is released, its wheels stop the sideways part of its
+- There is no sideways slip, except in contact and under external forces. Under an external force, a unicycle
+  moves as a point and keeps its heading. When the force ends, the wheels stop the sideways part of its
   velocity.
 
-Unicycles may come into contact where points would not. A point turns its velocity by up to
-max_acceleration / v, which at low speed is more than the turning rate; a unicycle brakes instead, but keeps
-moving straight ahead meanwhile. A proof that a controller avoids all contact, such as that of safety barrier
-certificates, therefore holds only for points. For unicycles it is tested on maps, not proven.
+Unicycles may come into contact where points would not. A point turns its velocity by up to max_acceleration /
+v, which at low speed is more than the maximum turning rate. A unicycle brakes instead, but meanwhile it moves
+straight ahead. A proof that a controller avoids all contact, as for safety barrier certificates, therefore
+holds only for points. For unicycles, it is tested on maps, not proven.
 """
 
 import math
@@ -42,35 +49,37 @@ from robocov.team import Team
 from robocov.world.dynamics import MotionResponse, compute_clip_factor
 
 RESPONSE_TIME_S = 0.2
-"""τ, the time within which a unicycle turns to the direction in which it should move."""
+"""Response time τ, within which a unicycle turns to the direction in which it should move."""
 _DAMPING_FRACTION = 0.005
 """Fraction of the maximum acceleration below which turning is damped, so that noise does not turn a robot at
 rest."""
 
 
 class Wheels(NamedTuple):
-    """The wheels of a team; each (n,)."""
+    """The wheels of a team, (n,) each."""
 
     track_width: Array
-    """m."""
+    """Distance between the wheels of each robot, m."""
     max_turning_rate: Array
-    """rad/s."""
+    """Maximum turning rate of each robot, rad/s."""
     is_rolling: BoolArray
-    """Mask of the unicycles that their wheels move. The others are points, or external forces carry them."""
+    """Whether wheels move each robot. The other robots are points, or are moved by external forces."""
 
 
 class DriveCommand(NamedTuple):
     """Motion of the wheels in one substep.
 
-    With `response`, the forces give a unicycle exactly its new velocity: viscosity and limits are left out of
-    it, as the wheels have already respected them. The rows of other robots are unchanged.
+    Under `forces` and `response`, each unicycle that its wheels move gets exactly its new velocity. Its
+    response has no viscosity or limits, because the motion of the wheels already accounts for these. The rows
+    of other robots are unchanged.
     """
 
     forces: Array
-    """(n, 2) N."""
+    """(n, 2) N, in place of the forces of the controllers."""
     steering: Array
-    """(n, 2) rad and rad/s: heading and turning rate after the substep."""
+    """(n, 2) rad and rad/s, heading and turning rate after the substep."""
     response: MotionResponse
+    """Response of the robots to these forces."""
 
 
 def initialize_steering(team: Team, velocities: Array, steering: Array | None) -> Array | None:
@@ -79,31 +88,36 @@ def initialize_steering(team: Team, velocities: Array, steering: Array | None) -
     Parameters
     ----------
     team : Team
+        The n robots.
     velocities : (n, 2) array, m/s
+        Velocities of the robots.
     steering : (n, 2) array or None, rad and rad/s
-        Heading, from +x, and turning rate. By default robots face the direction in which they move, without
-        turning.
+        Heading, from +x, and turning rate. By default, robots face the direction in which they move, and do
+        not turn.
 
     Returns
     -------
     (n, 2) array or None, rad and rad/s
-        Read-only; None for a team without unicycles.
+        Heading and turning rate, read-only. None for a team without unicycles.
     """
     if not team.is_unicycle.any():
         return None
     if steering is None:
-        # atan2 from math, not numpy: its results are the same on every processor.
+        # `math.atan2` is used, because its results are the same on every processor, unlike those of numpy.
         steering = np.array([(math.atan2(vy, vx), 0.0) for vx, vy in velocities.tolist()])
     return freeze(steering)
 
 
 @kernel
 def clip_magnitude(value: float, limit: float) -> float:
-    """Clip a value to a magnitude.
+    """Clip a value to a maximum magnitude.
 
     Parameters
     ----------
-    value, limit : float
+    value : float
+        Value to clip.
+    limit : float
+        Maximum magnitude, at least 0.
 
     Returns
     -------
@@ -119,7 +133,7 @@ class _Motion(NamedTuple):
     speed: float
     """Speed along the heading, m/s, at least 0."""
     turning_rate: float
-    """rad/s."""
+    """Turning rate, rad/s, positive for a turn to the left."""
 
 
 class _WheelLimits(NamedTuple):
@@ -132,7 +146,7 @@ class _WheelLimits(NamedTuple):
     max_change: float
     """Maximum change of the speed of a wheel, m/s."""
     max_turning_rate: float
-    """rad/s."""
+    """Maximum turning rate, rad/s."""
 
 
 @kernel
@@ -144,23 +158,27 @@ def compute_drive_command(
     wheels: Wheels,
     dt: float,
 ) -> DriveCommand:
-    """Convert the controllers' forces into wheel motion, as explained at the top of this module.
+    """Compute the motion of the wheels from the forces of controllers, as the module's docstring explains.
 
     Parameters
     ----------
     forces : (n, 2) array, N
+        Forces of the controllers.
     velocities : (n, 2) array, m/s
+        Velocities before the substep.
     steering : (n, 2) array, rad and rad/s
         Heading and turning rate before the substep.
     response : MotionResponse
-        Response of points to forces.
+        Response of point robots to forces.
     wheels : Wheels
-        The rows of robots that are not rolling are copied unchanged.
+        Wheels of the robots. The rows of robots that are not rolling are copied unchanged.
     dt : float, s
+        Duration of the substep.
 
     Returns
     -------
     DriveCommand
+        Forces, steering and response in place of those of points.
     """
     new_forces = forces.copy()
     new_steering = steering.copy()
@@ -176,7 +194,7 @@ def compute_drive_command(
         heading = steering[i, 0]
         hx = math.cos(heading)
         hy = math.sin(heading)
-        # The wheels grip, so no sideways velocity remains.
+        # The wheels do not slip, so that no sideways velocity remains.
         motion = _Motion(max(vx * hx + vy * hy, 0.0), steering[i, 1])
         limits = _get_wheel_limits(wheels, response, i)
         forward_change, sideways_change = _compute_point_change(forces, response, i, motion.speed, hx, hy)
@@ -185,7 +203,7 @@ def compute_drive_command(
         new_heading = _wrap_angle(heading + motion.turning_rate * dt)
         new_steering[i, 0] = new_heading
         new_steering[i, 1] = motion.turning_rate
-        # The force that gives the robot exactly this motion, and the response without viscosity or limits.
+        # The force that gives the robot exactly this motion, under a response without viscosity or limits.
         force_per_velocity = response.force_per_velocity[i]
         new_forces[i, 0] = (motion.speed * math.cos(new_heading) - vx) * force_per_velocity
         new_forces[i, 1] = (motion.speed * math.sin(new_heading) - vy) * force_per_velocity
@@ -218,10 +236,10 @@ def _get_wheel_limits(wheels: Wheels, response: MotionResponse, i: int) -> _Whee
 def _compute_point_change(
     forces: Array, response: MotionResponse, i: int, speed: float, hx: float, hy: float
 ) -> tuple[float, float]:
-    """Return the change of velocity of a point robot in place of robot i, m/s.
+    """Return the change of velocity in a substep, m/s, of a point robot in place of robot i.
 
-    The robot has the given speed in the direction (hx, hy) of its heading. The first component of the change
-    is along the heading, the second one to the left of it.
+    The point has the given speed in the direction (hx, hy) of the heading. The first component of the change
+    is along the heading, the second one to the left of the heading.
     """
     loss = response.velocity_loss[i]
     gain = response.velocity_per_force[i]
@@ -233,7 +251,7 @@ def _compute_point_change(
 
 @kernel
 def _wrap_angle(angle: float) -> float:
-    """Return the angle from -π up to π with the same direction."""
+    """Return the equivalent angle in the interval from -π to π."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
@@ -241,23 +259,23 @@ def _wrap_angle(angle: float) -> float:
 def _choose_motion(
     motion: _Motion, forward_change: float, sideways_change: float, limits: _WheelLimits, dt: float
 ) -> _Motion:
-    """Choose the speed and the turning rate that the wheels should approach.
+    """Choose the target speed and turning rate, which the wheels should approach.
 
     A point robot would change its velocity in this substep by `forward_change` along the heading and by
-    `sideways_change` to the left of it, m/s. The unicycle turns toward the velocity that the point would have
-    after the response time. Turning at a speed also changes the velocity sideways. If that change is less
-    than the one of the point, the unicycle brakes by the difference.
+    `sideways_change` to the left of the heading, m/s. The unicycle turns toward the velocity that the point
+    would have after the response time. Turning while driving also changes the velocity sideways. If this
+    change is less than that of the point, the unicycle brakes by the difference.
     """
     response_substeps = RESPONSE_TIME_S / dt
     future_forward = motion.speed + forward_change * response_substeps
     future_sideways = sideways_change * response_substeps
     angle_error = math.atan2(future_sideways, future_forward)
-    # Turning is damped if the point would be slower than this after the response time.
+    # Turning is damped if the point would be slower than this speed after the response time.
     damping_speed = _DAMPING_FRACTION * limits.max_change * response_substeps
     damping = min(1.0, math.hypot(future_forward, future_sideways) / damping_speed)
     turning_rate = _choose_turning_rate(angle_error, damping, limits, dt)
 
-    # The current turning rate, if the turn is toward the target.
+    # The current turning rate toward the target; 0 if the robot turns away from the target.
     turning_rate_to_target = max(motion.turning_rate * math.copysign(1.0, angle_error), 0.0)
     change_by_turning = motion.speed * turning_rate_to_target * dt
     braking = max(abs(sideways_change) - change_by_turning, 0.0)
@@ -268,13 +286,13 @@ def _choose_motion(
 
 @kernel
 def _choose_turning_rate(angle_error: float, damping: float, limits: _WheelLimits, dt: float) -> float:
-    """Choose the rate of a turn by an angle, rad, within the limits and such that it can stop at its end."""
+    """Choose the target rate, rad/s, of a turn by an angle, within the limits and able to stop in time."""
     turning_rate = min(
         limits.max_turning_rate,
         limits.max_speed / limits.half_track,
         abs(angle_error) / RESPONSE_TIME_S * damping,
     )
-    # With the wheels' deceleration, this rate decreases to 0 within the angle.
+    # A rate ω decreases to 0 within the angle ω² / (2 α), where α is the maximum angular deceleration.
     stopping_rate = math.sqrt(2.0 * limits.max_change / (limits.half_track * dt) * abs(angle_error))
     return math.copysign(min(turning_rate, stopping_rate), angle_error)
 
@@ -283,12 +301,12 @@ def _choose_turning_rate(angle_error: float, damping: float, limits: _WheelLimit
 def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> _Motion:
     """Return the motion after a substep in which the wheels approach the target within their limits.
 
-    The wheels run at the speed of the robot's center plus and minus its turning speed. The changes of these
-    two speeds therefore share the maximum change of a wheel's speed: braking takes its share first, then the
-    turn, then speeding up. The two speeds share the maximum speed of a wheel in the same way.
+    The speed of a wheel is the speed of the robot's center plus or minus the turning speed. The changes of
+    these two speeds therefore share the maximum change of a wheel's speed: braking takes its share first,
+    then the turn, then speeding up. The two speeds share the maximum speed of a wheel in the same way.
     """
     speed_change = clip_magnitude(target.speed - motion.speed, limits.max_change)
-    # The turning speed is that of the right wheel relative to the center of the robot, m/s.
+    # The turning speed is the speed of the right wheel relative to the center of the robot, m/s.
     turning_speed = motion.turning_rate * limits.half_track
     target_turning_speed = target.turning_rate * limits.half_track
     braking = max(-speed_change, 0.0)
@@ -299,7 +317,7 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
         max_turning_speed = max(limits.max_speed - motion.speed - speed_change, 0.0)
         new_turning_speed = clip_magnitude(new_turning_speed, max_turning_speed)
     else:
-        # The turn has taken its share; speeding up gets the remainder.
+        # The turn has taken its share. Speeding up gets the remainder.
         max_increase_by_acceleration = limits.max_change - abs(new_turning_speed - turning_speed)
         max_increase_by_speed = limits.max_speed - abs(new_turning_speed) - motion.speed
         speed_change = max(min(speed_change, max_increase_by_acceleration, max_increase_by_speed), 0.0)
@@ -310,21 +328,23 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 def remove_sideways_velocity(
     velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
 ) -> Array:
-    """Remove the velocity that a contact has caused but the wheels of unicycles do not allow.
+    """Remove the velocity of unicycles that a contact has caused and that wheels do not allow.
 
     Parameters
     ----------
     velocities : (n, 2) array, m/s
+        Velocities after a contact.
     steering : (n, 2) array, rad and rad/s
+        Heading and turning rate.
     max_speed : (n,) array, m/s
-        Largest forward speed.
+        Maximum forward speed.
     is_rolling : (n,) bool array
-        Mask of the unicycles that their wheels move. All other robots keep their velocity.
+        Whether wheels move each robot. All other robots keep their velocity.
 
     Returns
     -------
     (n, 2) array, m/s
-        Along the heading and at most `max_speed` for these unicycles.
+        Velocities. For robots moved by wheels, they are along the heading, and at most `max_speed`.
     """
     remaining = velocities.copy()
     for i in range(len(velocities)):

@@ -1,4 +1,4 @@
-"""The world of a team that stays the same: its robots, driven by forces, among obstacles."""
+"""The world of a team that stays the same: robots under forces, among obstacles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robocov.arrays import Array, BoolArray, compute_lengths
 from robocov.errors import ParameterError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
-from robocov.world.bodies import MAX_TEAMS_PER_SPACE, compute_mover_states
+from robocov.world.bodies import MAX_TEAMS_PER_SPACE, compute_obstacle_states
 from robocov.world.contacts import ContactDetector, ContactSolver
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
 from robocov.world.obstacle_pieces import Obstacles
@@ -26,24 +26,27 @@ from robocov.world.unicycles import (
 )
 
 MAX_SUBSTEP_S = 0.02
-"""Longest period over which motion is integrated at once."""
+"""Longest duration of a substep."""
 MAX_MASS_RATIO = 1000.0
-"""Largest ratio of the masses of two robots; beyond it contacts cannot be resolved."""
+"""Largest ratio of the masses of two robots. With larger ratios, contacts cannot be resolved."""
 
 _NO_FORCES = np.zeros((0, 2))
-"""External forces of a step without any."""
-_ROUNDING = 1e-9
-"""Tolerance of the number of substeps for rounding errors."""
+"""External forces of a step without external forces."""
+_SUBSTEP_COUNT_TOLERANCE = 1e-9
+"""Largest rounding error of a number of substeps."""
 
 
 @dataclass(frozen=True, eq=False)
 class _SpeedLimits:
-    """Speeds that robots may reach in a substep, each (n,) m/s."""
+    """Largest speeds of robots at the end of a substep, (n,) m/s each.
 
-    driving: Array
-    """Under their own force. A robot that is faster than its limit brakes as hard as it can."""
+    A robot that is faster than its maximum speed brakes as hard as it can.
+    """
+
+    driven: Array
+    """Without external forces."""
     pushed: Array
-    """Under external forces as well."""
+    """With external forces."""
 
 
 class World:
@@ -58,21 +61,23 @@ class World:
     positions : (n, 2) array, m
         Centers of the robots.
     velocities : (n, 2) array or None, m/s
-        By default robots are at rest.
+        Velocities of the robots. By default, robots are at rest.
     steering : (n, 2) array or None, rad and rad/s
-        Heading and turning rate of unicycles; by default they face the direction in which they move.
+        Heading and turning rate of unicycles. By default, they face the direction in which they move.
     runs : int
-        Number of independent runs with teams of equal size. Row ``r * n / runs + i`` is robot i of run r;
-        robots of different runs pass through each other.
+        Number of independent runs with teams of equal size. Row ``r * n / runs + i`` is robot i of run r.
+        Robots of different runs pass through each other.
 
     Attributes
     ----------
-    positions, velocities : (n, 2) arrays, m and m/s
-        Read-only.
+    positions : (n, 2) array, m
+        Centers of the robots. Read-only.
+    velocities : (n, 2) array, m/s
+        Velocities of the robots. Read-only.
     steering : (n, 2) array or None, rad and rad/s
-        Heading and turning rate of unicycles; None for a team without any. Read-only.
+        Heading and turning rate of unicycles; None for a team without unicycles. Read-only.
     working : (n,) bool array
-        Mask of the robots that work; all of them do.
+        Whether each robot works; all robots do.
 
     Raises
     ------
@@ -86,14 +91,14 @@ class World:
 
     Notes
     -----
-    In each step the controllers' forces, the viscous term of (28) and the kinematic limits are combined into
-    the net forces that pymunk integrates. Contacts are resolved by pymunk, in substeps fine enough that no
-    robot sinks into a static wall or another robot by more than `contacts.MAX_PENETRATION`. A step depends
+    In each step, the forces of the controllers, the viscous term of (28) and the kinematic limits are
+    combined into the net forces that pymunk integrates. Pymunk resolves contacts, in substeps so fine that no
+    robot sinks into a static wall or another robot by more than `contacts.MAX_PENETRATION_M`. A step depends
     on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
 
-    Moving obstacles keep to their path and push robots aside. They may press a robot deeper into a wall, by
-    some millimeters and in very acute corners by centimeters. Walls take precedence: where no space is left
-    between a moving obstacle and a wall, the robot stays in front of the wall and the obstacle passes over
+    Moving obstacles stay on their paths and push robots aside. They may press a robot deeper into a wall: by
+    some millimeters, and in very acute corners by centimeters. Walls take precedence. If no space is left
+    between a moving obstacle and a wall, the robot stays in front of the wall, and the obstacle passes over
     it. Once there is space, the robot is pushed out on the nearest side.
 
     Examples
@@ -140,11 +145,11 @@ class World:
         self._set_state(
             np.array(positions, dtype=float), velocities, initialize_steering(team, velocities, steering)
         )
-        # Each substep sets the states of moving obstacles first; the values before do not matter.
-        self._mover_states = compute_mover_states(obstacles.movers, time=0.0, dt=1.0)
+        # These values do not matter, because each substep sets the states of moving obstacles first.
+        self._obstacle_states = compute_obstacle_states(obstacles.moving_obstacles, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
-        # Both are built on demand, and are the only objects that a step changes in place.
+        # Both are built when they are needed first, and are the only objects that a step changes in place.
         self._spaces: list[tuple[slice, ContactDetector]] | None = None
         self._contact_solver: ContactSolver | None = None
 
@@ -156,6 +161,7 @@ class World:
         run : int
             Index of the run, from 0.
         positions : (n / runs, 2) array, m
+            New centers of the robots.
         """
         rows = self._get_rows(run)
         new_positions = self.positions.copy()
@@ -170,16 +176,17 @@ class World:
         self._update_spaces()
 
     def copy(self) -> World:
-        """Return an independent world in the same state, which continues identically.
+        """Return an independent copy in the same state, which continues identically.
 
         Returns
         -------
         World
+            The copy.
         """
         return copy(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Both are rebuilt on demand: they contain nothing that is not in the other attributes.
+        # Both contain nothing that is not in the other attributes, and are rebuilt when they are needed.
         return {**vars(self), "_spaces": None, "_contact_solver": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -189,47 +196,48 @@ class World:
     def step(
         self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
     ) -> None:
-        """Advance by `dt` seconds under the controllers' forces, viscosity and limits.
+        """Move all robots in a step, under forces, viscosity and limits.
 
         Parameters
         ----------
         forces : (n, 2) array, N
-            The controllers' forces.
+            Forces of the controllers.
         dt : float, s
-            Duration; the physics takes substeps if it needs them.
+            Duration of the step, which is divided into substeps if necessary.
         external_forces : (n, 2) array or None, N
-            Further forces to which no limits apply, such as those of a pointer that drags a robot. A robot
-            that they have pushed beyond its maximum speed brakes as hard as it can.
+            Further forces to which no limits apply, such as the force of a mouse that drags a robot. A robot
+            that was pushed beyond its maximum speed brakes as hard as it can.
         time : float, s
-            Simulation time at the beginning, on which moving obstacles depend.
+            Simulation time at the start of the step, which determines the positions of moving obstacles.
         """
         external = _NO_FORCES
         if external_forces is not None:
             external = np.array(external_forces, dtype=float)
-        substeps = self._count_substeps(external, dt)
-        substep = dt / substeps
-        for k in range(substeps):
-            if self._obstacles.movers:
+        substep_count = self._count_substeps(external, dt)
+        substep = dt / substep_count
+        for k in range(substep_count):
+            if self._obstacles.moving_obstacles:
                 self._move_obstacles(time + k * substep, substep)
             self._run_substep(forces, external, substep)
 
     def _count_substeps(self, external: Array, dt: float) -> int:
-        """Return the number of substeps in which no robot can cross a thin wall."""
-        speed = self._max_team_speed
+        """Return the number of substeps in a step, so that no robot can cross a thin wall in one of them."""
+        max_speed = self._max_team_speed
         if self._may_exceed_max_speed or len(external) > 0:
             possible_speeds = self._compute_speeds() + self._compute_external_acceleration(external) * dt
-            speed = max(speed, float(possible_speeds.max()))
-        crossed_radii = (speed + self._obstacles.max_speed) * dt / self._min_radius
-        return max(math.ceil(dt / MAX_SUBSTEP_S - _ROUNDING), math.ceil(crossed_radii))
+            max_speed = max(max_speed, float(possible_speeds.max()))
+        # In a substep, a robot moves by no more than its radius relative to any obstacle.
+        travel_in_radii = (max_speed + self._obstacles.max_speed) * dt / self._min_radius
+        return max(math.ceil(dt / MAX_SUBSTEP_S - _SUBSTEP_COUNT_TOLERANCE), math.ceil(travel_in_radii))
 
     def _run_substep(self, forces: Array, external: Array, dt: float) -> None:
-        """Move all robots by `dt` seconds: freely at first, then again where they touch something."""
+        """Move all robots in a substep: first without contacts, then again those that touch something."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
         may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
         if may_exceed_max_speed:
             limits = self._compute_speed_limits(external, dt)
-            response = response._replace(max_speed=limits.driving)
+            response = response._replace(max_speed=limits.driven)
             max_speed_after_contact = limits.pushed
         is_rolling = self._find_rolling(external)
         steering = self.steering
@@ -261,10 +269,11 @@ class World:
     def _compute_drive_command(
         self, forces: Array, steering: Array, is_rolling: BoolArray, response: MotionResponse, dt: float
     ) -> DriveCommand:
-        """Return the motion of the wheels in a substep. Robots that external forces carry do not turn."""
+        """Compute the motion of the wheels in a substep. Robots that are not rolling do not turn."""
         return compute_drive_command(
             forces=forces,
             velocities=self.velocities,
+            # The heading stays, and the turning rate of robots that are not rolling becomes 0.
             steering=steering * np.column_stack([np.ones(len(is_rolling)), is_rolling]),
             response=response,
             wheels=Wheels(self.team.track_width, self.team.turning_rate, is_rolling),
@@ -272,33 +281,35 @@ class World:
         )
 
     def _get_response(self, dt: float) -> MotionResponse:
-        """Return the response of the team for substeps of `dt`, which is the same in nearly all substeps."""
+        """Return the response of the team, which is computed again only if the duration has changed."""
         if self._response is None or self._response_dt != dt:
             self._response = compute_response(self.team, dt)
             self._response_dt = dt
         return self._response
 
     def _compute_speed_limits(self, external: Array, dt: float) -> _SpeedLimits:
+        """Compute the largest speeds of robots at the end of a substep."""
         speeds = self._compute_speeds()
-        driving = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
-        pushed = driving
+        driven = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
+        pushed = driven
         if len(external) > 0:
-            pushed = np.maximum(driving, speeds + self._compute_external_acceleration(external) * dt)
-        return _SpeedLimits(driving, pushed)
+            pushed = np.maximum(driven, speeds + self._compute_external_acceleration(external) * dt)
+        return _SpeedLimits(driven, pushed)
 
     def _find_rolling(self, external: Array) -> BoolArray:
-        """Return a mask of the unicycles that their wheels move, because no external force carries them."""
+        """Return whether each robot is moved by wheels: unicycles on which no external force acts, (n,)."""
         if len(external) > 0:
             return self._is_unicycle & ~external.any(axis=1)
         return self._is_unicycle
 
     def _compute_external_acceleration(self, external: Array) -> Array:
-        """Return the accelerations due to external forces, (n,) m/s², or (1,) zero without such forces."""
+        """Return the accelerations due to external forces, (n,) m/s²; a single 0 if there are no forces."""
         if len(external) == 0:
             return np.zeros(1)
         return compute_lengths(external) / self.team.mass
 
     def _compute_speeds(self) -> Array:
+        """Return the speeds of the robots, (n,) m/s."""
         return compute_lengths(self.velocities)
 
     def _set_state(self, positions: Array, velocities: Array, steering: Array | None) -> None:
@@ -309,6 +320,7 @@ class World:
         self._protect_state()
 
     def _protect_state(self) -> None:
+        """Make the arrays of the state read-only."""
         for array in (self.positions, self.velocities, self.steering):
             if array is not None:
                 array.setflags(write=False)
@@ -320,7 +332,7 @@ class World:
     def _get_spaces(self) -> list[tuple[slice, ContactDetector]]:
         """Return the spaces that move robots and detect contacts, each with the rows of its robots.
 
-        They are built by the first call. Each space contains the teams of up to `MAX_TEAMS_PER_SPACE` runs.
+        The spaces are built by the first call. Each contains the teams of up to `MAX_TEAMS_PER_SPACE` runs.
         """
         if self._spaces is None:
             self._spaces = []
@@ -334,7 +346,7 @@ class World:
                     velocities=self.velocities[rows],
                     team_count=(rows.stop - rows.start) // self._team_size,
                 )
-                space.set_movers(self._mover_states)
+                space.set_moving_obstacles(self._obstacle_states)
                 self._spaces.append((rows, space))
         return self._spaces
 
@@ -345,9 +357,10 @@ class World:
                 space.set_robots(self.positions[rows], self.velocities[rows])
 
     def _move_obstacles(self, time: float, dt: float) -> None:
-        self._mover_states = compute_mover_states(self._obstacles.movers, time, dt)
+        """Set the states of moving obstacles at the start of a substep."""
+        self._obstacle_states = compute_obstacle_states(self._obstacles.moving_obstacles, time, dt)
         for _, space in self._get_spaces():
-            space.set_movers(self._mover_states)
+            space.set_moving_obstacles(self._obstacle_states)
 
     def _move_freely(self, net_forces: Array, dt: float) -> Array:
         """Return the states after a substep without contacts, (n, 4): x, y, vx, vy."""
@@ -355,49 +368,61 @@ class World:
         return states[0] if len(states) == 1 else np.concatenate(states)
 
     def _list_touching_robots(self) -> list[int]:
-        """Return the robots that touched something in the last free substep, ascending."""
-        touching: list[int] = []
+        """Return the robots that touched something in the last substep without contacts, ascending."""
+        robots: list[int] = []
         for rows, space in self._get_spaces():
-            touching += [rows.start + robot for robot in space.list_touching_robots()]
-        return touching
+            robots += [rows.start + robot for robot in space.list_touching_robots()]
+        return robots
 
     def _resolve_contacts(self, states: Array, net_forces: Array, max_speed: Array, dt: float) -> bool:
-        """Correct, in place, the states of robots that touch something; return whether any do."""
+        """Change, in place, the states of robots that touch something; return whether there are any."""
         touching_by_run: dict[int, list[int]] = {}
         for robot in self._list_touching_robots():
             touching_by_run.setdefault(robot // self._team_size, []).append(robot)
-        for run, touching in touching_by_run.items():
+        for run, touching_robots in touching_by_run.items():
             self._resolve_contacts_in_run(
-                run=run, touching=touching, states=states, net_forces=net_forces, max_speed=max_speed, dt=dt
+                run=run,
+                touching_robots=touching_robots,
+                states=states,
+                net_forces=net_forces,
+                max_speed=max_speed,
+                dt=dt,
             )
         return bool(touching_by_run)
 
     def _resolve_contacts_in_run(
-        self, run: int, touching: list[int], states: Array, net_forces: Array, max_speed: Array, dt: float
+        self,
+        run: int,
+        touching_robots: list[int],
+        states: Array,
+        net_forces: Array,
+        max_speed: Array,
+        dt: float,
     ) -> None:
-        """Move the robots in contact again, together with all robots that they are pushed into."""
+        """Move the robots in contact again, together with all robots into which they are pushed."""
         if self._contact_solver is None:
             self._contact_solver = ContactSolver(self.team, self._obstacles)
         rows = self._get_rows(run)
         radius = self.team.radius[rows]
-        before = np.column_stack([self.positions, self.velocities])
+        initial_states = np.column_stack([self.positions, self.velocities])
         is_resolved = np.zeros(self._team_size, dtype=bool)
-        robots = np.array(touching)
+        robots = np.array(touching_robots)
         while True:
             states[robots] = self._contact_solver.move(
                 robots=robots,
-                states=before[robots],
+                states=initial_states[robots],
                 net_forces=net_forces[robots],
-                mover_states=self._mover_states,
+                obstacle_states=self._obstacle_states,
                 max_speed=max_speed[robots],
                 dt=dt,
             )
             is_resolved[robots - rows.start] = True
             positions = np.ascontiguousarray(states[rows, :2])
-            first, second, distance = find_close_pairs(positions, 2.0 * float(radius.max()))
-            overlaps = distance < radius[first] + radius[second]
-            is_reached = is_resolved[first] & ~is_resolved[second] & overlaps
-            if not is_reached.any():
+            first, second, distances = find_close_pairs(positions, 2.0 * float(radius.max()))
+            is_overlapping = distances < radius[first] + radius[second]
+            is_pushed = is_resolved[first] & ~is_resolved[second] & is_overlapping
+            if not is_pushed.any():
                 return
-            is_resolved[second[is_reached]] = True
+            # Move all these robots once more from their initial states, together with the pushed ones.
+            is_resolved[second[is_pushed]] = True
             robots = rows.start + np.flatnonzero(is_resolved)

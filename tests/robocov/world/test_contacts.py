@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robocov.team import Team
-from robocov.world import MAX_PENETRATION, World
+from robocov.world import MAX_PENETRATION_M, World
 from robocov.world.obstacle_pieces import Obstacles
 
 DT = 1 / 60
@@ -38,9 +38,9 @@ def test_a_light_robot_between_a_heavy_one_and_a_wall_is_not_squeezed(ratio: flo
     for _ in range(60):
         world.step(np.array([[0.0, 0.0], [50.0 * ratio, 0.0]]), DT)
         light_x, heavy_x = world.positions[:, 0]
-        assert light_x <= 0.9 + MAX_PENETRATION
-        assert light_x - heavy_x >= 0.2 - MAX_PENETRATION
-    assert light_x == pytest.approx(0.9, abs=MAX_PENETRATION)
+        assert light_x <= 0.9 + MAX_PENETRATION_M
+        assert light_x - heavy_x >= 0.2 - MAX_PENETRATION_M
+    assert light_x == pytest.approx(0.9, abs=MAX_PENETRATION_M)
 
 
 def test_pushes_are_passed_on_along_a_row_of_robots() -> None:
@@ -60,6 +60,6 @@ def test_pushes_are_passed_on_along_a_row_of_robots() -> None:
     assert world._list_touching_robots() == [0, 1]
     assert (world.positions[1:, 0] > starts[1:, 0] + 0.01).all()
     for _ in range(30):
-        assert np.diff(world.positions[:, 0]).min() >= 0.2 - MAX_PENETRATION
+        assert np.diff(world.positions[:, 0]).min() >= 0.2 - MAX_PENETRATION_M
         assert (np.hypot(*world.velocities.T) <= max_speed * (1 + 1e-12)).all()
         world.step(np.zeros((n, 2)), DT)

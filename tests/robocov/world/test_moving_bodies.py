@@ -15,7 +15,7 @@ from robocov.errors import StartError
 from robocov.metrics import MAX_RATE_WITH_MOVING_OBSTACLES_HZ, compute_clearances, compute_cost_history
 from robocov.simulation import Simulation, TeamState
 from robocov.team import Team
-from robocov.world import MAX_PENETRATION
+from robocov.world import MAX_PENETRATION_M
 
 IDLE = Rapf(k_rep=0.0, k_att=0.0)
 
@@ -85,7 +85,7 @@ def test_a_robot_that_is_pushed_into_a_corner_stays_in_front_of_both_walls(speed
     simulation = Simulation(corner, IDLE, [[2.9, 2.9]])
     for _ in range(int(3.0 / speed * 60)):
         simulation.step()
-        assert simulation.positions.max() <= 3.9 + MAX_PENETRATION
+        assert simulation.positions.max() <= 3.9 + MAX_PENETRATION_M
     assert simulation.positions.max() > 3.89
 
 
@@ -114,7 +114,7 @@ def test_robots_are_not_pushed_through_a_wall_that_an_obstacle_passes(wall_thick
     simulation = Simulation(rooms, IDLE, [[2.5, 1.0]])
     for _ in range(60 * 7):
         simulation.step()
-        assert simulation.positions[0, 0] <= 3.0 - wall_thickness / 2 - 0.1 + MAX_PENETRATION
+        assert simulation.positions[0, 0] <= 3.0 - wall_thickness / 2 - 0.1 + MAX_PENETRATION_M
 
 
 def test_robots_that_were_run_over_come_out_again() -> None:

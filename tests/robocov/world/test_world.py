@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.team import Team
-from robocov.world import MAX_PENETRATION, World
+from robocov.world import MAX_PENETRATION_M, World
 from robocov.world.obstacle_pieces import Obstacles, build_obstacles
 
 DT = 1 / 60
@@ -61,7 +61,7 @@ def test_limits_hold_under_any_forces(cluttered: Environment, seed: int, max_for
     for _ in range(40):
         world.step(rng.normal(scale=max_force, size=(8, 2)), DT)
         assert np.hypot(*world.velocities.T).max() <= 1.0 + 1e-12
-    assert compute_wall_distance(cluttered, world.positions) > 0.1 - MAX_PENETRATION
+    assert compute_wall_distance(cluttered, world.positions) > 0.1 - MAX_PENETRATION_M
 
 
 def test_acceleration_is_limited_without_contacts(empty: Environment) -> None:
@@ -82,7 +82,7 @@ def test_no_robot_enters_a_wall_however_it_is_driven(cluttered: Environment, dt:
         force = np.tile([1000 * np.cos(angle), 1000 * np.sin(angle)], (8, 1))
         for _ in range(int(6 / dt)):
             world.step(force, dt)
-            assert compute_wall_distance(cluttered, world.positions) > 0.1 - MAX_PENETRATION
+            assert compute_wall_distance(cluttered, world.positions) > 0.1 - MAX_PENETRATION_M
 
 
 @pytest.mark.parametrize(
@@ -113,10 +113,10 @@ def test_a_pressed_crowd_neither_overlaps_nor_sinks_into_walls(
             distances = np.hypot(offsets[:, :, 0], offsets[:, :, 1])
             np.fill_diagonal(distances, np.inf)
             overlap = radius[:, None] + radius - distances
-            assert overlap.max() <= MAX_PENETRATION
+            assert overlap.max() <= MAX_PENETRATION_M
             wall_distances = shapely.distance(empty.free.boundary, shapely.points(world.positions))
             assert shapely.contains_xy(empty.free, world.positions).all()
-            assert (radius - wall_distances).max() <= MAX_PENETRATION
+            assert (radius - wall_distances).max() <= MAX_PENETRATION_M
     assert overlap.max() > 0.0
 
 

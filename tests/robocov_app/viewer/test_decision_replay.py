@@ -98,9 +98,9 @@ def test_panes_on_the_same_map_share_a_sensor(monkeypatch):
     sensors = []
     build_sensor = module.RangeSensor
 
-    def count_sensor(pieces, movers=()):
+    def count_sensor(pieces, moving_obstacles=()):
         sensors.append(pieces)
-        return build_sensor(pieces, movers)
+        return build_sensor(pieces, moving_obstacles)
 
     monkeypatch.setattr(module, "RangeSensor", count_sensor)
     module.get_sensor.cache_clear()

@@ -19,7 +19,7 @@ from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
 from robocov.voronoi import partition_by_travel_time
-from robocov.world.obstacle_pieces import build_movers, build_solid_pieces
+from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 
 RECORD_TOLERANCE = 1e-9
@@ -145,4 +145,4 @@ def _build_radio(setup: PaneSetup, dt: float) -> Radio:
 @lru_cache(maxsize=4)
 def get_sensor(environment: Environment) -> RangeSensor:
     """Return the range sensor on a map, which is cached."""
-    return RangeSensor(build_solid_pieces(environment), build_movers(environment))
+    return RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
