@@ -131,7 +131,7 @@ def add_random_points(rng: np.random.Generator, area: BaseGeometry, max_count: i
     """
     low_x, low_y, high_x, high_y = area.bounds
     bounding_box_area = (high_x - low_x) * (high_y - low_y)
-    # Candidates are drawn in the bounding box. If the area is thin, most of them are outside of it.
+    # Candidates are drawn in the bounding box. If the area is thin, most candidates are outside the area.
     area_fraction = max(area.area / bounding_box_area, _MIN_AREA_FRACTION)
     points = np.empty((0, 2))
     shapely.prepare(area)

@@ -206,7 +206,7 @@ class ArrayCache:
         Parameters
         ----------
         key : str
-            See `compute_key`.
+            Key of the arrays; see `compute_key`.
 
         Returns
         -------
@@ -238,7 +238,7 @@ class ArrayCache:
         Parameters
         ----------
         key : str
-            See `compute_key`.
+            Key of the arrays; see `compute_key`.
         arrays : mapping of str to array
             Arrays by name.
         """

@@ -358,7 +358,7 @@ def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
 
 
 def _require_result_file(name: str) -> None:
-    """Raise ValueError unless a relative path may be that of a file in the folder of a result.
+    """Raise ValueError unless a relative path can be the path of a file of a result.
 
     Without this check, a manifest from an untrusted source could make robocov replace or remove any file.
     """

@@ -16,7 +16,7 @@ from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import MapRequest
 
 _TILT_DEVIATIONS_RAD = (0.0, 0.05, 0.1)
-"""Possible standard deviations of the tilts of streets; each town has one of them."""
+"""Possible standard deviations of the tilts of the streets of a town."""
 _MAX_TILT_DEVIATIONS = 1.5
 """Largest tilt of a street, in standard deviations."""
 _MAX_WIDENING_GAPS = 1.2
@@ -341,7 +341,7 @@ def _find_feasible_widening(cells: list[Cell], request: MapRequest, corner_disc:
 
 
 def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
-    """Build the block of a cell; return an empty polygon if nothing remains of it.
+    """Build the block of a cell; return an empty polygon if nothing remains of the cell.
 
     The block is the cell without the streets along its edges, whose widths follow from the widening of the
     first street. It is outside the square around the start disc. A trim cuts off one of its corners.

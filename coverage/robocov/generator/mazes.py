@@ -158,24 +158,24 @@ def _compute_union_area(walls: list[WallObstacle]) -> float:
 
 
 def _compute_line_coordinates(
-    request: MapRequest, length: float, count: int, thickness: float
+    request: MapRequest, length: float, cell_count: int, thickness: float
 ) -> list[float]:
-    """Return the coordinates, m, of the lines that divide the map's side into `count` columns or rows.
+    """Return the coordinates, m, of the lines that divide the map's side into `cell_count` columns or rows.
 
     Walls are centered on the inner lines. The boundary has no thickness. All corridors are equally wide, also
     those along the boundary.
     """
     # The sum of one corridor's width and the thickness of one wall.
-    pitch = (length + thickness) / count
-    inner_lines = np.arange(1, count, dtype=np.float64) * pitch - thickness / 2.0
+    pitch = (length + thickness) / cell_count
+    inner_lines = np.arange(1, cell_count, dtype=np.float64) * pitch - thickness / 2.0
     return [0.0, *request.round_points(inner_lines).tolist(), float(length)]
 
 
 def _compute_corridor_width(request: MapRequest, shape: GridShape, thickness: float) -> float:
     """Return the width of the narrowest corridor, m."""
     widths = []
-    for length, count in zip((request.width, request.height), shape, strict=True):
-        lines = _compute_line_coordinates(request, length, count, thickness)
+    for length, cell_count in zip((request.width, request.height), shape, strict=True):
+        lines = _compute_line_coordinates(request, length, cell_count, thickness)
         # The boundary is treated as two walls outside the map, whose inner faces are the sides of the map.
         center_lines = [-thickness / 2.0, *lines[1:-1], lines[-1] + thickness / 2.0]
         widths.append(float(np.diff(center_lines).min()) - thickness)

@@ -22,7 +22,7 @@ from robocov.generator.request import MapRequest
 _CORRIDOR_PROBABILITY = 0.5
 """Probability that a building with enough rooms has a corridor."""
 _MIN_CORRIDOR_ROOMS = 5
-"""Smallest number of rooms of a building with a corridor, which is one of them."""
+"""Smallest number of rooms of a building with a corridor. The corridor counts as a room."""
 _MIN_CORRIDOR_WIDTH_GAPS = 1.6
 _MAX_CORRIDOR_WIDTH_GAPS = 2.2
 """Smallest and largest width of a corridor."""

@@ -215,7 +215,7 @@ KEYS = {
 
 
 def _build_model(described_class: Any, kind: str | None = None) -> type[Model]:
-    """Build the model of a class from those of its fields that are in `KEYS`.
+    """Build the model of a class from the fields of the class that are in `KEYS`.
 
     Fields with a default are optional. `kind` is the value of an additional key, by which the model is
     chosen.

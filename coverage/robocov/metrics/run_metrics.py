@@ -247,7 +247,7 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
 
 
 def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, float | None]:
-    """Compute the metrics of a run that describe all of it by one number each.
+    """Compute the metrics that describe a whole run by one number each.
 
     Parameters
     ----------

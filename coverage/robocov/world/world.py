@@ -221,7 +221,7 @@ class World:
             self._run_substep(forces, external, substep)
 
     def _count_substeps(self, external: Array, dt: float) -> int:
-        """Return the number of substeps in a step, so that no robot can cross a thin wall in one of them."""
+        """Return the number of substeps in a step, so that no robot can cross a thin wall in a substep."""
         max_speed = self._max_team_speed
         if self._may_exceed_max_speed or len(external) > 0:
             possible_speeds = self._compute_speeds() + self._compute_external_acceleration(external) * dt
