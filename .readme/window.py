@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import add_rectangle
-from robocov_app.editor.ui.import_dialog import SET_COLOR, ImportDialog
+from robocov_app.editor.ui.importing.dialog import SET_COLOR, ImportDialog
 from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.viewer.launch import HEADLESS_FPS, ViewerLauncher
 from robocov_app.viewer.session.controller_choice import ControllerChoice

@@ -32,8 +32,8 @@ from robocov_app.look.hues import ColorScheme
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.density_text import get_cost_name
-from robocov_app.render.distance_map.field import DistanceField
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import DistanceField
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import PictureFrame, draw_map
 from robocov_app.report.replay import build_replay_html, read_asset

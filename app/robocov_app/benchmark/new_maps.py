@@ -18,7 +18,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.generator import GENERATORS, generate_map
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.floor_plans import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
 
 TRACK = "ideal"
 """Track of the runs on new maps."""

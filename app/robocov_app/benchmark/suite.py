@@ -17,7 +17,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name, quote
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
-from robocov_app.benchmark.floor_plans import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study import Study, StudyMap
 

@@ -20,7 +20,7 @@ from robocov_app.terminal.progress import report_compilation, show_progress
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from robocov_app.bench.measure import Row
+    from robocov_app.speed_benchmarks.measure import Row
 
 
 class Part(NamedTuple):
@@ -31,7 +31,7 @@ class Part(NamedTuple):
     title : str
         Title of its table.
     module : str
-        Name of a module in `robocov_app.bench`.
+        Name of a module in `robocov_app.speed_benchmarks`.
     function : str
         Name of the module's function that returns the cases.
     """
@@ -87,8 +87,8 @@ def command(options: Arguments) -> None:
         cases = _collect_cases(options.part, is_quick=options.quick)
         interruption = _measure(cases, rows, quiet=options.json)
     if options.plot is not None and rows:
-        from robocov_app.bench.plot import save_ratios
         from robocov_app.look.theme import get_theme
+        from robocov_app.speed_benchmarks.plot import save_ratios
 
         save_ratios(rows, options.plot, get_theme(options.theme))
     machine = _describe_machine()
@@ -114,7 +114,9 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
         names = list(PARTS)
         if importlib.util.find_spec("gymnasium") is None:
             names.remove("learning")
-    modules = {name: importlib.import_module(f"robocov_app.bench.{PARTS[name].module}") for name in names}
+    modules = {
+        name: importlib.import_module(f"robocov_app.speed_benchmarks.{PARTS[name].module}") for name in names
+    }
     if "cost" in names and not modules["cost"].has_yardstick():
         message = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
         if part_name == "cost":

@@ -48,7 +48,7 @@ from robocov_app.render.distance_map.colors import (
     compute_line_opacities,
     list_color_ticks,
 )
-from robocov_app.render.distance_map.field import DistanceField
+from robocov_app.render.distance_map.pixel_distances import DistanceField
 
 DOTS_PER_PIXEL = 2
 """Dots of a map image per pixel of the page."""

@@ -11,7 +11,7 @@ from robocov.arrays import IntArray
 from robocov.observation import Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
-from robocov_app.render.distance_map.field import DistanceFields
+from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.scene import Scene
 

@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
-from robocov_app.render.distance_map.field import DistanceField
+from robocov_app.render.distance_map.pixel_distances import DistanceField
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
 from robocov_app.render.sensed_points import SensedPoints
 

@@ -328,8 +328,8 @@ def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[Dista
         Snapshots of the runs in which at least one robot works at the end.
     """
     from robocov_app.figures.coverage import DistanceSnapshot
-    from robocov_app.render.distance_map.field import DistanceField
-    from robocov_app.render.distance_map.lattice import FieldLattice
+    from robocov_app.render.distance_map.pixel_distances import DistanceField
+    from robocov_app.render.distance_map.site_lattice import FieldLattice
 
     environment = runs[0].record.environment
     cost = refine_cost_for_figures(environment, cost)

@@ -111,8 +111,8 @@ def save_distance_figure(
     """
     from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage
     from robocov_app.figures.files import save_figure
-    from robocov_app.render.distance_map.field import DistanceField
-    from robocov_app.render.distance_map.lattice import FieldLattice
+    from robocov_app.render.distance_map.pixel_distances import DistanceField
+    from robocov_app.render.distance_map.site_lattice import FieldLattice
 
     team = Team.homogeneous(len(positions), radius=radius)
     field = DistanceField(FieldLattice(cost.sites), cost(positions, speeds))

@@ -11,7 +11,7 @@ from robocov.arrays import Array, IntArray
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.density_text import format_cost, get_cost_name
-from robocov_app.render.distance_map.field import DistanceFields
+from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.painter import Painter

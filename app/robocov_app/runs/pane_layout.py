@@ -14,7 +14,7 @@ from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import Theme
 from robocov_app.render.annotations.legend_strip import MARGIN_PX, ROW_HEIGHT_PX, render_legend_image
 from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
-from robocov_app.render.distance_map.field import DistanceFields
+from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.layer_catalog import build_pane_layers
 from robocov_app.render.painter import Painter, choose_scale
 from robocov_app.render.panel_grid import choose_column_count

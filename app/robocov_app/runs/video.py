@@ -13,7 +13,7 @@ from robocov.files.result_names import COMPARISON_VIDEO_FILE, FRAMES_FOLDER, RUN
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.distance_map.colors import choose_color_limit
-from robocov_app.render.distance_map.field import DistanceFields
+from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.layer_catalog import build_pane_layers
 from robocov_app.runs.cost import MIN_VIDEO_LATTICE, build_cost, refine_cost_for_figures
 from robocov_app.runs.encoding import Frame, save_frames_and_video

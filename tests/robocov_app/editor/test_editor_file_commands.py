@@ -22,7 +22,7 @@ from robocov_app.editor.edits.properties import set_background
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.map_draft import find_recoverable
-from robocov_app.editor.ui.import_dialog import ImportDialog
+from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.launch import EditorLauncher, offer_recovery
 from robocov_app.editor.ui.typed_commands import run_typed_command
 from robocov_app.editor.ui.window import EditorWindow

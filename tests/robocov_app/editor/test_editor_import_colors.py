@@ -10,15 +10,15 @@ import shapely
 from driven_editor import EditorDriver, build_sheet, open_editor
 from PIL import Image, ImageDraw
 
-from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.import_sheet import (
+from robocov_app.editor.ui.importing.dialog import ImportDialog
+from robocov_app.editor.ui.importing.file_colors import (
     build_color_sheet,
     choose_next_role,
     find_role,
     list_declared_colors,
     set_role,
 )
-from robocov_app.editor.ui.importing import ImportService
+from robocov_app.editor.ui.importing.service import ImportService
 from robocov_app.formats import IMPORTERS, ReadOptions
 from robocov_app.jobs.workers import DirectWorker
 

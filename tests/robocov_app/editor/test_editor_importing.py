@@ -13,8 +13,9 @@ from driven_editor import EditorDriver, build_sheet, open_editor
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.edits.properties import set_title
-from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import ImportService, list_options
+from robocov_app.editor.ui.importing.dialog import ImportDialog
+from robocov_app.editor.ui.importing.options import list_options
+from robocov_app.editor.ui.importing.service import ImportService
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping
 from robocov_app.jobs.workers import DirectWorker, LatestWorker
 from robocov_app.toolkit.dialogs import Question
@@ -102,7 +103,9 @@ def wait_for_import(dialog: ImportDialog) -> None:
 @pytest.mark.slow
 def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
     # every older import is given up
-    worker: Any = LatestWorker("robocov_app.editor.ui.importing:ImportService", "imports", patience=0.0)
+    worker: Any = LatestWorker(
+        "robocov_app.editor.ui.importing.service:ImportService", "imports", patience=0.0
+    )
     dialog = build_dialog(plan, worker)
     for text in ("0", "0.", "0.1"):
         dialog.form.set_text("cell", text)

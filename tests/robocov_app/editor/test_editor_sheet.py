@@ -16,7 +16,7 @@ from PIL import Image
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.outlines import Outlines, build_outline
 from robocov_app.editor.canvas.sheet import Sheet, compute_grid_steps, compute_hull_excess
-from robocov_app.editor.canvas.view import View, choose_outside_color
+from robocov_app.editor.canvas.sheet_view import View, choose_outside_color
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection

@@ -14,8 +14,8 @@ from robocov_app.figures.curves import DISTANCE, TIME, TimeCurve
 from robocov_app.figures.files import save_figure
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_map.colors import MAX_LEVEL, build_palette, choose_color_limit
-from robocov_app.render.distance_map.field import DistanceField
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import DistanceField
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 
 T = np.linspace(0.0, 60.0, 61)
 COSTS = {map_.name: CoverageCost(map_, 64) for map_ in (ROOMS, HALL, CORRIDOR, SHAFT)}

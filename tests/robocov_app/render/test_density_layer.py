@@ -15,8 +15,8 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
 from robocov_app.figures.arena import build_map_handles, draw_map, set_meter_axes
 from robocov_app.look.theme import DARK, LIGHT
-from robocov_app.render.distance_map.field import DistanceField
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import DistanceField
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 

@@ -23,8 +23,8 @@ from robocov_app.render.distance_map.colors import (
     compute_line_opacities,
     list_color_ticks,
 )
-from robocov_app.render.distance_map.field import BorderPixels, DistanceField, DistanceFields
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import BorderPixels, DistanceField, DistanceFields
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 
 SEALED = Environment("sealed", ((0, 0), (10, 0), (10, 6), (0, 6)), (WallObstacle(((6, 0), (6, 6)), 0.3),))
 

@@ -10,8 +10,8 @@ from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.distance_map.colors import MAX_LEVEL, build_palette
-from robocov_app.render.distance_map.field import DistanceField, DistanceFields
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import DistanceField, DistanceFields
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 from robocov_app.render.layer_catalog import check_layer_names
 from robocov_app.render.layers import distances
 from robocov_app.render.painter import Painter

@@ -23,8 +23,8 @@ from robocov_app.replication.claims.goals import (
 from robocov_app.replication.claims.rivals import judge_rivals
 from robocov_app.replication.design.contenders import TARGETS, TEAMS, UNTUNED, build_contender
 from robocov_app.replication.design.plan import FULL
+from robocov_app.replication.results.controller_speed import StepTimes
 from robocov_app.replication.results.outcomes import Outcomes, PairedComparison, ProblemInstance
-from robocov_app.replication.results.step_times import StepTimes
 from robocov_app.replication.results.study_results import Degradation
 
 pytestmark = pytest.mark.usefixtures("few_resamples")

@@ -40,7 +40,7 @@ from robocov_app.replication.figures.figure_files import FigureFile
 from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_figure, find_arrival_time
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.pages import study_pages
-from robocov_app.replication.results import step_times
+from robocov_app.replication.results import controller_speed
 from robocov_app.sweep.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
@@ -56,7 +56,7 @@ def small_parts():
         patch.setattr(
             contenders, "GAIN_GRIDS", {name: (grid[0], grid[-1]) for name, grid in GAIN_GRIDS.items()}
         )
-        patch.setattr(step_times, "STEPS_PER_BLOCK", 3)
+        patch.setattr(controller_speed, "STEPS_PER_BLOCK", 3)
         yield
 
 

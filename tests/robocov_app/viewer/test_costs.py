@@ -13,7 +13,7 @@ from sample_sessions import HALL
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov_app.jobs.workers import DirectWorker
-from robocov_app.render.distance_map.field import DistanceField
+from robocov_app.render.distance_map.pixel_distances import DistanceField
 from robocov_app.viewer.costs import costs as module
 from robocov_app.viewer.costs.costs import Costs, CostService
 

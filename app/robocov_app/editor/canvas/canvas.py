@@ -12,7 +12,7 @@ from robocov_app.editor.canvas.layers import build_layers
 from robocov_app.editor.canvas.legend import build_legend_entries
 from robocov_app.editor.canvas.scene import EditorScene
 from robocov_app.editor.canvas.sheet import Sheet, compute_hull_excess
-from robocov_app.editor.canvas.view import View
+from robocov_app.editor.canvas.sheet_view import View
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits import transform
 from robocov_app.editor.model.geometry import distance
@@ -30,7 +30,7 @@ from robocov_app.render.density_text import describe_density_range
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.render.layers.density import build_density_entry
 from robocov_app.render.surface_cache import LatestValue
-from robocov_app.toolkit.tools.viewport import zoom_about
+from robocov_app.toolkit.tools.viewport import pan_within, zoom_about
 from robocov_app.toolkit.window.layout import Layout, is_inside
 
 # Lengths in pixels at scale 1.
@@ -40,7 +40,7 @@ SCROLL_MARGIN_PX = 80  # a problem nearer to the edge is moved to the center of 
 BADGE_REACH_PX = 10
 SCALE_BAR_LABEL_PX = 90
 
-MAX_PAN_FRACTION = 0.45  # of the view: maximum shift of the map from its center
+MAX_PAN_FRACTION = 0.45  # of the view: maximum distance of its center from the map
 EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # visible part of an empty sheet
 MIN_VIEW_M = 0.2  # minimum width and height of a fitted view
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
@@ -175,15 +175,8 @@ class EditorCanvas:
 
     def pan(self, dx: float, dy: float) -> None:
         """Move the view by a number of pixels, but not so far that the map leaves it."""
-        camera = self.camera.pan(dx, dy)
-        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY_VIEW_M
-        _, _, width, height = camera.view
-        margin_x = MAX_PAN_FRACTION * width / camera.zoom
-        margin_y = MAX_PAN_FRACTION * height / camera.zoom
-        low = (low_x - margin_x, low_y - margin_y)
-        high = (high_x + margin_x, high_y + margin_y)
-        x, y = np.clip(camera.center, low, high).tolist()
-        self._set_camera(replace(camera, center=(x, y)))
+        bounds = self.editor.sketch.bounds or EMPTY_VIEW_M
+        self._set_camera(pan_within(self.camera, (dx, dy), bounds, margin_fraction=MAX_PAN_FRACTION))
 
     def _set_camera(self, camera: Camera) -> None:
         self.camera = camera

@@ -8,7 +8,7 @@ from pygame import Rect, Surface
 from shapely import total_bounds
 
 from robocov_app.editor.canvas.outlines import Outline, build_outline
-from robocov_app.editor.canvas.view import View, compute_pixel_box
+from robocov_app.editor.canvas.sheet_view import View, compute_pixel_box
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color
 

@@ -6,7 +6,7 @@ from pygame import Rect
 
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.hatching import draw_hatch_pattern
-from robocov_app.editor.canvas.view import choose_hull_excess_color, choose_hull_excess_edge
+from robocov_app.editor.canvas.sheet_view import choose_hull_excess_color, choose_hull_excess_edge
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color, mix
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry

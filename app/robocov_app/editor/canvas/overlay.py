@@ -13,7 +13,7 @@ from pygame import Rect, Surface
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
 from robocov_app.editor.canvas.outlines import build_outline
-from robocov_app.editor.canvas.view import View, compute_pixel_box
+from robocov_app.editor.canvas.sheet_view import View, compute_pixel_box
 from robocov_app.editor.model.geometry import distance, format_length
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem

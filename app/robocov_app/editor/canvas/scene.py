@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pygame import Surface
 
 from robocov.environment import Point
-from robocov_app.editor.canvas.view import View
+from robocov_app.editor.canvas.sheet_view import View
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Selection

@@ -11,7 +11,7 @@ from pygame import Rect, Surface
 from robocov.arrays import Array
 from robocov_app.editor.canvas.outlines import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
-from robocov_app.editor.canvas.view import (
+from robocov_app.editor.canvas.sheet_view import (
     View,
     choose_hull_excess_color,
     choose_hull_excess_edge,

@@ -20,8 +20,8 @@ from robocov_app.editor.model.map_draft import MapDraft, is_open_elsewhere
 from robocov_app.editor.model.map_file import SUFFIX, FileChangedError
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import MAX_RECENT
-from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.importing import Imported, ImportService
+from robocov_app.editor.ui.importing.dialog import ImportDialog
+from robocov_app.editor.ui.importing.service import Imported, ImportService
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect_format, export_map
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.storage.regular_files import require_regular_file

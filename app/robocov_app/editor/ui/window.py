@@ -20,7 +20,7 @@ from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.editor.ui.commands import GROUPS, PALETTE_HINT, EditorWindowActions, list_commands
 from robocov_app.editor.ui.context_menu import list_menu_commands
 from robocov_app.editor.ui.file_commands import FileCommands
-from robocov_app.editor.ui.import_dialog import ImportDialog
+from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel, find_object_kind
 from robocov_app.editor.ui.play_mode.mode import PlayMode

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from robocov.arrays import Array
 from robocov_app.look.theme import Theme
-from robocov_app.render.distance_map.field import BorderPixels, DistanceField
+from robocov_app.render.distance_map.pixel_distances import BorderPixels, DistanceField
 
 MAX_LEVEL = 253
 """Index in the palette of distances at the end of the scale and beyond."""

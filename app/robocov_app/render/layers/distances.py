@@ -11,7 +11,7 @@ from robocov_app.look import legend
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.distance_map.colors import build_palette, compute_color_levels, compute_line_opacities
-from robocov_app.render.distance_map.field import DistanceField, compute_block_middles
+from robocov_app.render.distance_map.pixel_distances import DistanceField, compute_block_middles
 from robocov_app.render.layers.density import build_gradient_entry
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.pixel_arrays import build_palette_surface, convert_axes_to_world

@@ -33,8 +33,8 @@ from robocov_app.replication.claims.thresholds import (
 from robocov_app.replication.design.contenders import Contender, select_strongest
 from robocov_app.replication.design.plan import Plan
 from robocov_app.replication.formatting import format_amount
+from robocov_app.replication.results.controller_speed import StepTimes
 from robocov_app.replication.results.outcomes import Outcomes, PairedComparison
-from robocov_app.replication.results.step_times import StepTimes
 
 _RESAMPLES = 2000
 _LIMIT_QUANTILES = (0.025, 0.975)

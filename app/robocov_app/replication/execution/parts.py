@@ -39,6 +39,7 @@ from robocov_app.replication.execution.runner import (
     run_studies,
     run_study,
 )
+from robocov_app.replication.results.controller_speed import StepTimes, measure_step_times
 from robocov_app.replication.results.degradations import read_degradations
 from robocov_app.replication.results.outcome_tables import read_gain_outcomes, read_outcomes
 from robocov_app.replication.results.outcomes import (
@@ -49,7 +50,6 @@ from robocov_app.replication.results.outcomes import (
     merge_outcomes,
 )
 from robocov_app.replication.results.references import References
-from robocov_app.replication.results.step_times import StepTimes, measure_step_times
 from robocov_app.replication.results.study_results import (
     BeyondResults,
     DensityResults,

@@ -33,7 +33,7 @@ from robocov_app.replication.figures.figure_files import FigureFile
 from robocov_app.replication.figures.paper_figures import CAPTIONS, FIGURES
 from robocov_app.replication.formatting import NO_VALUE, format_amount, format_interval
 from robocov_app.replication.pages.svg_marks import DotStrip, draw_interval_bar, draw_strips
-from robocov_app.replication.results import step_times
+from robocov_app.replication.results import controller_speed
 from robocov_app.replication.results.outcomes import Outcomes, ProblemInstance
 from robocov_app.replication.results.study_results import BeyondResults, FigureRun, PaperResults
 from robocov_app.report.embedding import ReplayRun
@@ -286,7 +286,7 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         contenders=contenders,
         studies=studies,
         study_maps=study_maps,
-        step_times=step_times,
+        controller_speed=controller_speed,
         draw_bar=draw_interval_bar,
         amount=format_amount,
         format_interval=format_interval,

@@ -3,6 +3,6 @@
 - `outcomes`, `outcome_tables`: outcomes of contenders on the same problem instances, and reading them
 - `degradations`: final costs with disturbances, relative to those under ideal conditions
 - `references`: the reference placement of every map
-- `step_times`: computing times of a step of every controller
+- `controller_speed`: computing times of a step of every controller
 - `study_results`: all results together
 """

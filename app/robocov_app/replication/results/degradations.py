@@ -10,7 +10,7 @@ from robocov_app.figures.statistics import MIN_BOOTSTRAP_MAPS, bootstrap
 from robocov_app.replication.design import studies
 from robocov_app.replication.design.contenders import RAPF_SHARED
 from robocov_app.replication.design.plan import Plan
-from robocov_app.replication.results.step_times import UNKNOWN
+from robocov_app.replication.results.controller_speed import UNKNOWN
 from robocov_app.replication.results.study_results import IDEAL, Degradation
 from robocov_app.sweep.parameters import name_parameter_column
 

@@ -9,9 +9,9 @@ from robocov.record import Record
 from robocov_app.figures.statistics import Interval
 from robocov_app.replication.design.contenders import Contender
 from robocov_app.replication.design.plan import Plan
+from robocov_app.replication.results.controller_speed import StepTimes
 from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, ProblemInstance
 from robocov_app.replication.results.references import References
-from robocov_app.replication.results.step_times import StepTimes
 
 ShownRuns: TypeAlias = list[tuple[ProblemInstance, Record]]
 """Runs that were repeated with trajectories, so that they can be shown."""

@@ -1,4 +1,8 @@
-"""The view of a map in a window: reach of the pointer, zoom limits, and steps of the zoom and pan keys."""
+"""The view of a map in a window: reach of the pointer, limits of zooming and panning, steps of their keys."""
+
+from dataclasses import replace
+
+import numpy as np
 
 from robocov_app.render.camera import Camera
 
@@ -30,3 +34,34 @@ def zoom_about(camera: Camera, factor: float, pixel: tuple[float, float], map_si
     min_zoom = MIN_MAP_PX / map_size
     zoom = min(max(camera.zoom * factor, min_zoom), MAX_MAP_ZOOM_PX_PER_M)
     return camera.zoom_at(zoom / camera.zoom, pixel)
+
+
+def pan_within(
+    camera: Camera,
+    shift: tuple[float, float],
+    bounds: tuple[float, float, float, float],
+    *,
+    margin_fraction: float = 0.0,
+) -> Camera:
+    """Return a camera panned by a number of pixels, whose center stays on the map or near it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The present camera.
+    shift : (dx, dy), px
+        Shift of the map in the window.
+    bounds : (low x, low y, high x, high y), m
+        Bounding box of the map.
+    margin_fraction : float
+        Maximum distance of the center of the view from the bounding box, as a fraction of the view.
+    """
+    panned = camera.pan(*shift)
+    low_x, low_y, high_x, high_y = bounds
+    _, _, width, height = camera.view
+    margin_x = margin_fraction * width / camera.zoom
+    margin_y = margin_fraction * height / camera.zoom
+    low = (low_x - margin_x, low_y - margin_y)
+    high = (high_x + margin_x, high_y + margin_y)
+    x, y = np.clip(panned.center, low, high).tolist()
+    return replace(panned, center=(x, y))

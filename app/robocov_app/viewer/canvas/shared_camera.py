@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov.environment import Point
 from robocov_app.render.camera import Camera
 from robocov_app.render.painter import Painter
-from robocov_app.toolkit.tools.viewport import zoom_about
+from robocov_app.toolkit.tools.viewport import pan_within, zoom_about
 from robocov_app.viewer.canvas.camera_glide import CameraGlide
 from robocov_app.viewer.presenter import Presenter
 
@@ -74,9 +74,8 @@ class SharedCamera:
         The center of the view stays within the bounds of the map.
         """
         self._viewer.inspection.followed = None
-        camera = self._painters[0].camera.pan(dx, dy)
-        x, y = np.clip(camera.center, *self._get_bounds()).tolist()
-        self._show(replace(camera, center=(x, y)))
+        bounds = self._viewer.session.displayed.environment.region.bounds
+        self._show(pan_within(self._painters[0].camera, (dx, dy), bounds))
 
     def center_on(self, point: Point) -> None:
         """Move a point of the map, m, to the middle of the view; zoom in first if the whole map is shown."""

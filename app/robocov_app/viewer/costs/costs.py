@@ -17,8 +17,8 @@ from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
 from robocov_app.jobs.messages import Channel, Codec
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
-from robocov_app.render.distance_map.field import DistanceField
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.pixel_distances import DistanceField
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 
 PROGRESS_INTERVAL_S = 0.05  # between progress reports while a map is prepared
 MIN_LISTED_TIME_S = 1.0  # a shorter remaining time is not shown

@@ -7,8 +7,8 @@ from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
-from robocov_app.viewer.explanation.first_sentence import describe_motion
-from robocov_app.viewer.explanation.motion import classify_motion
+from robocov_app.viewer.explanation.motion_classification import classify_motion
+from robocov_app.viewer.explanation.motion_sentence import describe_motion
 from robocov_app.viewer.explanation.sentences import (
     ReportLine,
     build_position_line,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from robocov_app.viewer.explanation.motion import Motion
+from robocov_app.viewer.explanation.motion_classification import Motion
 from robocov_app.viewer.explanation.quantities import (
     MIN_FORCE_N,
     format_direction,

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.errors import MapError, quote
 from robocov_app.formats.geometry.polygons import to_multipolygon
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
-from robocov_app.formats.geometry.shapes.shape_types import BOUNDARY, ClosedOutline
+from robocov_app.formats.geometry.shapes.drawn_shapes import BOUNDARY, ClosedOutline
 from robocov_app.formats.geometry.shapes.snapping import (
     are_edge_to_edge,
     close_gaps,

@@ -18,16 +18,16 @@ from robocov_app.formats.foreign_map import ForeignMap, Painted
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.shapes.boundary_search import find_surrounding
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
-from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
-from robocov_app.formats.geometry.shapes.interpretation import interpret
-from robocov_app.formats.geometry.shapes.label_filter import LabelFilter
-from robocov_app.formats.geometry.shapes.shape_types import (
+from robocov_app.formats.geometry.shapes.drawn_shapes import (
     BOUNDARY,
     ClosedOutline,
     SourceGeometry,
     WallLine,
-    get_obstacle_name,
 )
+from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
+from robocov_app.formats.geometry.shapes.interpretation import interpret
+from robocov_app.formats.geometry.shapes.label_filter import LabelFilter
+from robocov_app.formats.geometry.shapes.obstacle_names import get_obstacle_name
 from robocov_app.formats.omissions import Omissions
 from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.repairs import Repairs

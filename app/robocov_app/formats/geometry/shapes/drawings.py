@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle
 from robocov_app.formats.foreign_map import Primitive
-from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline, WallLine
+from robocov_app.formats.geometry.shapes.drawn_shapes import ClosedOutline, WallLine
 from robocov_app.formats.geometry.shapes.snapping import close_gaps, compute_default_snap
 from robocov_app.formats.options import ReadOptions
 

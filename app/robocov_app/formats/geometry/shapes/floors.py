@@ -9,6 +9,7 @@ from shapely import LineString, MultiPolygon, Polygon
 from robocov_app.formats.colors import WHITE, count_colors
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport, get_outlines
+from robocov_app.formats.geometry.shapes.drawn_shapes import ClosedOutline
 from robocov_app.formats.geometry.shapes.painting import (
     PaintLayer,
     find_evident_floors,
@@ -16,7 +17,6 @@ from robocov_app.formats.geometry.shapes.painting import (
     is_pale,
     split_alternating,
 )
-from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline
 from robocov_app.formats.reports import format_area
 
 _MIN_BACKGROUND_SHARE = 0.98

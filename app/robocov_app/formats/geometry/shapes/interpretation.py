@@ -47,6 +47,7 @@ from robocov_app.formats.geometry.shapes.drawings import (
     fill_area_holes,
     get_outlines,
 )
+from robocov_app.formats.geometry.shapes.drawn_shapes import ClosedOutline, WallLine
 from robocov_app.formats.geometry.shapes.floors import (
     Floors,
     build_ground,
@@ -55,7 +56,6 @@ from robocov_app.formats.geometry.shapes.floors import (
     is_background,
 )
 from robocov_app.formats.geometry.shapes.painting import PaintLayer, uncover
-from robocov_app.formats.geometry.shapes.shape_types import ClosedOutline, WallLine
 
 _MAX_EXTENT_M = 10.0 * MAX_SIZE_M
 """Largest extent of all shapes together. Shapes farther apart cannot be one map."""

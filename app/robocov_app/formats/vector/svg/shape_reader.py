@@ -18,8 +18,8 @@ from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M, flatten_arc
 from robocov_app.formats.geometry.frames import transform_points
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
+from robocov_app.formats.geometry.shapes.drawn_shapes import PenStroke
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule
-from robocov_app.formats.geometry.shapes.shape_types import PenStroke
 from robocov_app.formats.options import get_or_default
 from robocov_app.formats.vector.svg.element_state import ElementState
 from robocov_app.formats.vector.svg.numbers import METERS_PER_UNIT, parse_length, parse_numbers

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from robocov_app.replication.design.plan import QUICK
-from robocov_app.replication.results import step_times as steps
-from robocov_app.replication.results.step_times import StepTimes, measure_step_times
+from robocov_app.replication.results import controller_speed as steps
+from robocov_app.replication.results.controller_speed import StepTimes, measure_step_times
 
 
 @pytest.fixture(autouse=True)

@@ -10,14 +10,14 @@ import pygame
 from pygame import Rect, Surface
 
 from robocov.errors import RobocovError
-from robocov_app.editor.ui.import_form import ImportForm
-from robocov_app.editor.ui.import_preview import ImportPreview
-from robocov_app.editor.ui.import_sheet import (
+from robocov_app.editor.ui.importing.file_colors import (
     ColorSheet,
     find_role,
     list_declared_colors,
 )
-from robocov_app.editor.ui.importing import Imported
+from robocov_app.editor.ui.importing.form import ImportForm
+from robocov_app.editor.ui.importing.preview import ImportPreview
+from robocov_app.editor.ui.importing.service import Imported
 from robocov_app.formats import Importer
 from robocov_app.formats.colors import Color, name_color
 from robocov_app.jobs.workers import Worker

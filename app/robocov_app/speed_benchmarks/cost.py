@@ -20,7 +20,7 @@ from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
+from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interleaved
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)

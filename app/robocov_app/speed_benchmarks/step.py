@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation, SimulationBatch
-from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
+from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interleaved
 
 
 class Ratios(NamedTuple):

@@ -7,10 +7,10 @@ from typing import cast
 
 from matplotlib.axes import Axes
 
-from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.theme import LIGHT, Theme
+from robocov_app.speed_benchmarks.measure import Row
 
 NOTE = "medians of alternating calls on one thread; below 1 robocov is faster; a bar marks the goal"
 HEADINGS = {

@@ -1,7 +1,7 @@
 """The first sentence of the report on a robot, by its motion."""
 
 from robocov.metrics import SETTLED_DISTANCE_M
-from robocov_app.viewer.explanation.motion import Motion
+from robocov_app.viewer.explanation.motion_classification import Motion
 from robocov_app.viewer.explanation.quantities import (
     MIN_FORCE_N,
     format_direction,

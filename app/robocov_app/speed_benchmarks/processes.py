@@ -9,7 +9,7 @@ from functools import partial
 from itertools import count
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row, measure_interleaved
+from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 

@@ -13,10 +13,10 @@ import pytest
 from called import read_complaint
 from matplotlib.figure import Figure
 
-from robocov_app.bench import cost, learning, plot, processes, render, step, window
-from robocov_app.bench.measure import Row, measure_interleaved
 from robocov_app.cli import main
 from robocov_app.commands import bench
+from robocov_app.speed_benchmarks import cost, learning, plot, processes, render, step, window
+from robocov_app.speed_benchmarks.measure import Row, measure_interleaved
 
 KEYS = ["part", "name", "parameters", "seconds", "yardstick", "yardstick_seconds", "goal"]
 KEYS += ["goal_seconds", "note", "before", "ratio", "met"]

@@ -10,8 +10,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, Row, measure_interleaved
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
+from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
 
 ROBOTS = 6
 LATTICE = 32

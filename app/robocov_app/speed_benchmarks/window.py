@@ -11,9 +11,9 @@ import pygame
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row, measure_interleaved
-from robocov_app.bench.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
 from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
+from robocov_app.speed_benchmarks.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_display
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.costs.costs import Costs

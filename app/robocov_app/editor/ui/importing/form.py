@@ -5,8 +5,8 @@ from dataclasses import fields
 from typing import Any
 
 from robocov.environment import Point
-from robocov_app.editor.ui.import_sheet import choose_next_role, find_role, set_role
-from robocov_app.editor.ui.importing import ImportOption, list_options
+from robocov_app.editor.ui.importing.file_colors import choose_next_role, find_role, set_role
+from robocov_app.editor.ui.importing.options import ImportOption, list_options
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.colors import Color
 from robocov_app.toolkit.overlay import wrap_text

@@ -1,6 +1,5 @@
 """Shapes of drawings: geometries as in a file, and the outlines and walls in meters built from them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -12,10 +11,9 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
-from robocov.errors import to_one_line
-from robocov.mapfile.models import MAX_LABEL_CHARACTERS
 from robocov_app.formats.colors import Color, Role
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule
+from robocov_app.formats.geometry.shapes.obstacle_names import get_obstacle_name
 from robocov_app.formats.geometry.shapes.painting import PaintLayer
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
@@ -201,10 +199,3 @@ class WallLine:
         stretch = np.hypot(*(segments @ linear.T).T) / np.hypot(*segments.T)
         widths = stroke.width * abs(np.linalg.det(linear)) / np.maximum(stretch, 1e-300)
         return float(widths.min()), float(widths.max())
-
-
-def get_obstacle_name(labels: Sequence[str]) -> str | None:
-    """Return the name of an obstacle with these labels, or None. Layer "0" of a DXF file is not a name."""
-    if not labels or labels[0] == "0":
-        return None
-    return to_one_line(labels[0])[:MAX_LABEL_CHARACTERS].strip() or None

@@ -13,12 +13,12 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Call, Case, Row, measure_interleaved
 from robocov_app.render.painter import Painter
 from robocov_app.render.record_scene import build_record_scene
 from robocov_app.runs.encoding import encode_png, save_video
 from robocov_app.runs.frames import draw_frames
 from robocov_app.runs.settings import VideoSettings
+from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interleaved
 
 SIZE_PX = (1280, 720)
 FRAME_GOALS_S = {50: 4e-3}

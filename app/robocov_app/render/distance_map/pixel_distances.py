@@ -15,7 +15,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
-from robocov_app.render.distance_map.lattice import FieldLattice
+from robocov_app.render.distance_map.site_lattice import FieldLattice
 
 _MIN_DISTANCE_GROWTH = 0.05
 """Minimum growth of the difference of two distances per meter, so that the division below stays finite.
