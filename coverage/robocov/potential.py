@@ -2,12 +2,13 @@
 
 Three cases that the paper leaves open are decided as follows:
 
-- *Contact*: (24) is singular at distance zero. Below `CONTACT_DISTANCE` its magnitude is constant and the
-  potential continues linearly, so that F = -grad U holds everywhere.
+- *Contact*: the force (24) is infinite at distance zero. Below `CONTACT_DISTANCE`, its magnitude is constant
+  and the potential is linear in the distance, so that F = -grad U holds everywhere.
 - *Robots at the same position*: there is no direction from one to the other. They are pushed apart in
-  opposite directions that depend only on their two numbers.
-- *Saturation*: (27) grows with the third power of the distance, without bound, and would push robots
-  through the repulsion of walls. A limit caps its magnitude; the potential continues linearly there.
+  opposite directions that depend only on the indices of the two robots.
+- *Saturation*: the force (27) grows with the third power of the distance, without bound, and would push
+  robots against the repulsion of walls and through them. Its magnitude is therefore limited. Where the limit
+  applies, the potential is linear in the distance.
 """
 
 from typing import NamedTuple
@@ -20,12 +21,12 @@ from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 from robocov.observation.neighbors import NeighborPositions
 
 CONTACT_DISTANCE = 0.01
-"""Distance below which the repulsion no longer grows, m: a tenth of a robot's radius."""
+"""Distance below which the repulsion no longer grows, m: a tenth of the default radius of a robot."""
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-"""The golden angle, rad: its multiples are spread evenly over all directions."""
+"""The golden angle, rad, whose multiples are spread evenly over all directions."""
 
 _MIN_DISTANCE = 1e-12
-"""Distance that is assumed between robots at the same position, m."""
+"""Distance that is assumed between robots that are closer together, such as at the same position, m."""
 _MIN_GOAL_DISTANCE = 1e-300
 """Smallest distance to the goal used as a divisor, which prevents division by zero, m."""
 
@@ -52,18 +53,18 @@ class PotentialGains(NamedTuple):
 
 
 class PotentialForces(NamedTuple):
-    """Forces on each robot, (n, 2) N each.
+    """The forces on n robots.
 
     Attributes
     ----------
-    total
-        Sum of the other three.
-    attraction
+    total : (n, 2) array, N
+        Sum of the other three forces on each robot.
+    attraction : (n, 2) array, N
         The force (27) toward the goal.
-    robots
-        Sum of (24) over the robots within `rho_0`.
-    obstacle
-        (24) from the closest obstacle point.
+    robots : (n, 2) array, N
+        Sum of the forces (24) from the other robots within `rho_0`.
+    obstacle : (n, 2) array, N
+        The force (24) from the closest obstacle point.
     """
 
     total: Array
@@ -80,16 +81,18 @@ def compute_potential_forces(
     goals: Array,
     gains: PotentialGains,
 ) -> PotentialForces:
-    """Compute the forces (25) + (27) on each robot.
+    """Compute the repulsion (25) from neighbors and obstacles, and the attraction (27), of each robot.
 
     Parameters
     ----------
     positions : (n, 2) array, m
+        Positions of the robots.
     neighbors : NeighborPositions
-        Robots that repel each other.
+        The other robots that repel each robot.
     obstacle_points : (n, 2) array, m
         Closest obstacle point of each robot; nan if none is in range.
     goals : (n, 2) array, m
+        Point toward which each robot is attracted.
     gains : PotentialGains
 
     Returns
@@ -115,9 +118,9 @@ def compute_potential_forces(
         attraction[i, 0] = factor * dx
         attraction[i, 1] = factor * dy
     if neighbors.is_complete:
-        robots = _sum_repulsion_of_all_robots(positions, gains)
+        robots = _sum_team_repulsion(positions, gains)
     else:
-        robots = _sum_repulsion_of_neighbors(positions, neighbors, gains)
+        robots = _sum_neighbor_repulsion(positions, neighbors, gains)
     total = attraction + robots + obstacle
     return PotentialForces(total, attraction, robots, obstacle)
 
@@ -129,7 +132,7 @@ def compute_separations(robots: IntArray, neighbors: IntArray) -> Array:
     Parameters
     ----------
     robots, neighbors : (m,) int array
-        Numbers of the two robots of each pair.
+        Indices of the first and the second robot of each pair.
 
     Returns
     -------
@@ -145,16 +148,17 @@ def compute_separations(robots: IntArray, neighbors: IntArray) -> Array:
 
 
 def compute_spread_directions(numbers: IntArray) -> Array:
-    """Compute directions that are spread evenly: multiples of the golden angle.
+    """Compute directions that are spread evenly, one for each of several whole numbers.
 
     Parameters
     ----------
     numbers : (k,) int array
+        Multiples of the golden angle.
 
     Returns
     -------
     (k, 2) array
-        Unit vectors.
+        Unit vectors at these multiples, which are spread evenly over all directions.
     """
     angles = GOLDEN_ANGLE * numbers
     return np.column_stack([np.cos(angles), np.sin(angles)])
@@ -162,7 +166,7 @@ def compute_spread_directions(numbers: IntArray) -> Array:
 
 @kernel
 def _compute_repulsion_factor(distance: float, k_rep: float, rho_0: float) -> float:
-    """Return the magnitude of the repulsion (24) divided by the distance, N/m; zero at distance zero."""
+    """Return the magnitude of the repulsion (24) divided by the distance, N/m; 0 if the distance is 0."""
     inverse = 1.0 / max(distance, CONTACT_DISTANCE)
     magnitude = k_rep * max(inverse - 1.0 / rho_0, 0.0) * inverse * inverse
     return magnitude / distance if distance > 0.0 else 0.0
@@ -176,10 +180,8 @@ def _compute_attraction_factor(squared_distance: float, k_att: float, max_attrac
 
 
 @kernel
-def _sum_repulsion_of_neighbors(
-    positions: Array, neighbors: NeighborPositions, gains: PotentialGains
-) -> Array:
-    """Return the sums of (24) over the robots that each robot knows of, (n, 2) N."""
+def _sum_neighbor_repulsion(positions: Array, neighbors: NeighborPositions, gains: PotentialGains) -> Array:
+    """Return the sum of the forces (24) on each robot from its neighbors, (n, 2) N."""
     sums = np.zeros((len(positions), 2))
     for i in range(len(positions)):
         for k in range(neighbors.indptr[i], neighbors.indptr[i + 1]):
@@ -195,8 +197,12 @@ def _sum_repulsion_of_neighbors(
 
 
 @kernel
-def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Array:
-    """Return the sums of (24) over all other robots in range, (n, 2) N."""
+def _sum_team_repulsion(positions: Array, gains: PotentialGains) -> Array:
+    """Return the sum of the forces (24) on each robot from all other robots in range, (n, 2) N.
+
+    Robots are sorted into square bins whose sides are at least the range, so that only nearby ones are
+    examined.
+    """
     n = len(positions)
     sums = np.zeros((n, 2))
     if n == 0:
@@ -205,8 +211,8 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
     order = np.empty(n, np.intp)
     bins = sort_into_bins(positions, 0, n, gains.rho_0, starts, order)
     for i in range(n):
-        # Robots in range are in the same bin or in one of the eight around it. The bins of a row follow each
-        # other, and so do the robots in them, in `order`.
+        # The robots in range are in the bin of robot i or in one of the eight around it. In `order`, the
+        # robots are sorted by bin, row by row, so that those in the three bins of a row are consecutive.
         column = find_bin(positions[i, 0] - bins.left, bins.scale)
         row = find_bin(positions[i, 1] - bins.bottom, bins.scale)
         first_column = max(column - 1, 0)
@@ -225,7 +231,7 @@ def _sum_repulsion_of_all_robots(positions: Array, gains: PotentialGains) -> Arr
 
 @kernel
 def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: PotentialGains) -> None:
-    """Add the repulsion (24) of robot j on robot i to the sum of i; (dx, dy) is the vector from j to i."""
+    """Add the repulsion (24) that robot j exerts on robot i to the sum of i; (dx, dy) leads from j to i."""
     squared_distance = dx * dx + dy * dy
     if squared_distance > gains.rho_0 * gains.rho_0:
         return

@@ -137,7 +137,7 @@ class RangeLimited(BaseController):
         if seen.density is not None and not seen.density.is_uniform:
             polygons = build_disc_limited_polygons(cells.edges, radius)
             uniform_centroids = seen.positions + offsets
-            _, centroids = seen.density.compute_mass_and_centroid(
+            _, centroids = seen.density.compute_masses_and_centroids(
                 polygons, seen.positions, area, uniform_centroids
             )
             offsets = centroids - seen.positions

@@ -267,7 +267,7 @@ def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
         tile_robot_count = _list_nearest_candidates(
             tiles.boxes, tile, robots, search.group_robots, group_robot_count, search.tile_robots
         )
-        _find_nearest_robots_of_tile(tiles, search, robots, tile, tile_robot_count)
+        _find_nearest_robots_in_tile(tiles, search, robots, tile, tile_robot_count)
 
 
 @kernel
@@ -316,7 +316,7 @@ def _list_robots_within(
 
 
 @kernel
-def _find_nearest_robots_of_tile(
+def _find_nearest_robots_in_tile(
     tiles: Tiles, search: Search, robots: Array, tile: int, candidate_count: int
 ) -> None:
     """Find the robot that is nearest to each site of a tile in a straight line.

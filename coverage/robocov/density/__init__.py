@@ -1,12 +1,13 @@
 """The density φ: how important each point of the region is, and its integrals over cells.
 
-- `base`: the interface of densities, and the uniform one
-- `gaussians`, `polygons`, `raster`: sums of Gaussians, weighted areas, and images
-- `cell_edges`: cells as edges, over which densities are integrated
-- `polygon_masses`: integrals over other polygons
+- `base`: the interface of all densities, and the uniform density
+- `gaussians`, `polygons`, `raster`: sums of Gaussians, areas of constant weight, and images
+- `cell_edges`: the edges of cells, over which densities are integrated
+- `polygon_masses`: integrals over polygons that are not cells
 
-Each density is integrated over all Voronoi cells at once, in closed form or by an exact quadrature. By
-the divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
+Each density is integrated over all Voronoi cells at the same time, in closed form or by an exact quadrature.
+By the divergence theorem, the integral over a cell is a sum over the edges of the cell. Therefore, no cell is
+ever intersected with the areas or pixels of a density.
 """
 
 from robocov.density.base import MAX_WEIGHT, Density, Uniform

@@ -1,4 +1,4 @@
-"""The interface of densities, and the uniform one."""
+"""The interface of all densities, and the uniform density."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -14,11 +14,14 @@ MAX_WEIGHT = 1e6
 """Maximum value of a weight."""
 
 _MIN_MEAN_DENSITY = 1e-9
-"""Smallest mean density with which a centroid is computed, as a fraction of the largest density."""
+"""Smallest mean density for which the centroid of a cell is computed, as a fraction of the maximum
+density."""
 
 
 class Density(ABC):
-    """Importance of each point: φ of equation (4), dimensionless, never negative, and immutable.
+    """The importance φ of each point, as in equation (4). It is dimensionless and never negative.
+
+    A density is immutable.
 
     See Also
     --------
@@ -45,7 +48,7 @@ class Density(ABC):
     """
 
     kind: ClassVar[str]
-    """Name in map files."""
+    """Name of this kind of density in map files."""
 
     @property
     @abstractmethod
@@ -59,32 +62,36 @@ class Density(ABC):
 
     @abstractmethod
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the density.
+        """Evaluate the density at points.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            φ at each point.
         """
 
     @abstractmethod
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells about given points.
+        """Compute mass, first moments and polar moment of each cell about its origin.
 
         Parameters
         ----------
         edges : CellEdges
-            Edges of n closed polygons of any kind, holes clockwise, relative to the origins.
+            Edges of n cells, relative to the origins. The cells may be any closed polygons, with the edges of
+            holes in clockwise order.
         origins : (n, 2) array, m
-            For Voronoi cells, these are the generators.
+            Origin of each cell: for Voronoi cells, the generator.
 
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
-            Integrals of φ, φ (q - o) and ``φ |q - o|²`` over each cell, with o its origin.
+            Integrals of φ, of the two components of φ (q - o), and of ``φ |q - o|²`` over the points q of
+            each cell, where o is the origin of the cell.
         """
 
     @property
@@ -92,35 +99,42 @@ class Density(ABC):
         """Whether the density is the same everywhere."""
         return self.min_value == self.max_value
 
-    def compute_mass_and_centroid(
-        self, edges: CellEdges, origins: Array, area: Array, centroid: Array
+    def compute_masses_and_centroids(
+        self, edges: CellEdges, origins: Array, areas: Array, area_centroids: Array
     ) -> tuple[Array, Array]:
-        """Compute mass and centroid of cells, M and C of equation (2).
+        """Compute the masses and centroids of cells, M and C of equation (2).
 
         Parameters
         ----------
         edges, origins
             See `compute_moments`.
-        area : (n,) array, m²
+        areas : (n,) array, m²
             Areas of the cells.
-        centroid : (n, 2) array, m
-            Centroids for density 1. Cells without area or mass keep them. If the mean density of a cell is
-            below 1e-9 of the maximum, uniform mass is added to make up the difference, because rounding
-            would otherwise decide where the centroid is.
+        area_centroids : (n, 2) array, m
+            Centroids of the cells for density 1.
 
         Returns
         -------
-        mass : (n,) array, m²
-        centroid : (n, 2) array, m
+        masses : (n,) array, m²
+            Integral of φ over each cell.
+        centroids : (n, 2) array, m
+            Center of mass of each cell. A cell without mass and area keeps its centroid for density 1.
+
+        Notes
+        -----
+        If the mean density of a cell is below 1e-9 of the maximum, rounding could decide where the centroid
+        is. For the centroid, a uniform mass is therefore added to the cell, so that its mean density is 1e-9
+        of the maximum.
         """
         moments = self.compute_moments(edges, origins)
-        mass = np.maximum(moments[:, MASS], 0.0)
-        added_mass = np.maximum(_MIN_MEAN_DENSITY * self.max_value * area - mass, 0.0)
-        weight = mass + added_mass
-        first_moments = moments[:, [MOMENT_X, MOMENT_Y]] + added_mass[:, None] * (centroid - origins)
-        has_weight = weight > 0.0
-        offset = first_moments / np.where(has_weight, weight, 1.0)[:, None]
-        return mass, np.where(has_weight[:, None], origins + offset, centroid)
+        masses = np.maximum(moments[:, MASS], 0.0)
+        added_masses = np.maximum(_MIN_MEAN_DENSITY * self.max_value * areas - masses, 0.0)
+        weights = masses + added_masses
+        added_moments = added_masses[:, None] * (area_centroids - origins)
+        first_moments = moments[:, [MOMENT_X, MOMENT_Y]] + added_moments
+        has_weight = weights > 0.0
+        offsets = first_moments / np.where(has_weight, weights, 1.0)[:, None]
+        return masses, np.where(has_weight[:, None], origins + offsets, area_centroids)
 
 
 def require_weight(name: str, value: float, *, above_zero: bool = False) -> None:
@@ -129,10 +143,11 @@ def require_weight(name: str, value: float, *, above_zero: bool = False) -> None
     Parameters
     ----------
     name : str
-        Name of the parameter, for the message.
+        Name of the parameter in the error message.
     value : float
+        The weight.
     above_zero : bool
-        Whether zero is out of range as well.
+        Whether 0 is out of range as well.
 
     Raises
     ------
@@ -153,7 +168,7 @@ class Uniform(Density):
     Parameters
     ----------
     weight : float
-        Above 0.
+        The density at every point, above 0.
 
     Raises
     ------
@@ -190,20 +205,22 @@ class Uniform(Density):
         return self.weight
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the density: the weight at every point.
+        """Evaluate the density, which is the weight at every point.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            The weight, once for each point.
         """
         return np.full(len(points), float(self.weight))
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute the moments of cells: the moments for density 1, times the weight.
+        """Compute mass, first moments and polar moment of each cell: those for density 1 times the weight.
 
         Parameters
         ----------
@@ -213,5 +230,6 @@ class Uniform(Density):
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
+            See `Density.compute_moments`.
         """
         return self.weight * edges.compute_moments(len(origins))

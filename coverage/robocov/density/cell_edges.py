@@ -1,4 +1,4 @@
-"""Cells as edges: polygons, moments and adjacency of all cells at once."""
+"""The edges of all cells, and the polygons, moments and adjacency that follow from them."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,7 +9,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
 from robocov.compiled import kernel
 
 REGION = -1
-"""Used in place of the cell on the other side of an edge that lies on the region's boundary."""
+"""Used in place of the cell on the other side of an edge if the edge lies on the boundary of the region."""
 
 MASS = 0
 """Column of the moments of cells: the integral of φ, m²."""
@@ -27,23 +27,23 @@ errors."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellEdges:
-    """All edges of all cells, grouped by cell, counter-clockwise around each cell.
+    """The edges of all cells, sorted by cell, and counter-clockwise around each cell.
 
     Attributes
     ----------
-    start, end : (s, 2) arrays, m
-        Ends of the edges **relative to the generator** of their cell, so that a tiny cell far from the origin
-        keeps its full precision.
-    cell : (s,) int array
-        Cell of each edge, ascending.
-    other_cell : (s,) int array
-        The cell on the other side of each edge, or `REGION`.
+    starts, ends : (e, 2) arrays, m
+        Start and end of each edge **relative to the generator** of its cell, so that the coordinates of a
+        tiny cell far from the origin keep their full precision.
+    cells : (e,) int array
+        Index of the cell of each edge, in ascending order.
+    other_cells : (e,) int array
+        Index of the cell on the other side of each edge, or `REGION`.
     """
 
-    start: Array
-    end: Array
-    cell: IntArray
-    other_cell: IntArray
+    starts: Array
+    ends: Array
+    cells: IntArray
+    other_cells: IntArray
 
     def build_polygons(self, generators: Array) -> list[Array]:
         """Build the polygon of each cell.
@@ -51,17 +51,18 @@ class CellEdges:
         Parameters
         ----------
         generators : (n, 2) array, m
+            Generators of the cells.
 
         Returns
         -------
         list of (k, 2) arrays, m
-            Counter-clockwise rings, whose first vertex is not repeated. Edges of length zero are left out; an
-            empty cell is a (0, 2) array.
+            Vertices of each cell, counter-clockwise; the first one is not repeated. Edges without length are
+            left out. The array of an empty cell has the shape (0, 2).
         """
         has_length = self._has_length()
-        cell = self.cell[has_length]
-        vertices = self.start[has_length] + generators[cell]
-        stops = np.cumsum(np.bincount(cell, minlength=len(generators))).tolist()
+        cells = self.cells[has_length]
+        vertices = self.starts[has_length] + generators[cells]
+        stops = np.cumsum(np.bincount(cells, minlength=len(generators))).tolist()
         return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
     def compute_moments(self, cell_count: int) -> Array:
@@ -77,7 +78,7 @@ class CellEdges:
         (n, 4) array, m², m³, m³ and m⁴
             Area, first moments in x and y, and polar moment.
         """
-        return _sum_moments(self.start, self.end, self.cell, cell_count)
+        return _sum_moments(self.starts, self.ends, self.cells, cell_count)
 
     def list_adjacent_pairs(self) -> IntArray:
         """List the pairs of cells that share an edge.
@@ -85,46 +86,47 @@ class CellEdges:
         Returns
         -------
         (m, 2) int array
-            Pairs (i, j) with i < j, in ascending order.
+            Pairs of cells (i, j) with i < j, in ascending order.
         """
-        is_shared = (self.other_cell != REGION) & self._has_length()
-        first_cell = self.cell[is_shared]
-        second_cell = self.other_cell[is_shared]
-        cell_count = int(max(first_cell.max(initial=0), second_cell.max(initial=0))) + 1
-        # Each pair is encoded as one number, because sorting rows of an array takes several times as long. An
-        # edge is listed by both of its cells; `np.unique` keeps each pair once.
-        low = np.minimum(first_cell, second_cell)
-        high = np.maximum(first_cell, second_cell)
+        is_shared = (self.other_cells != REGION) & self._has_length()
+        first_cells = self.cells[is_shared]
+        second_cells = self.other_cells[is_shared]
+        cell_count = int(max(first_cells.max(initial=0), second_cells.max(initial=0))) + 1
+        # Each pair is encoded as one number, because sorting rows of an array takes several times as long.
+        # Both cells of a pair have a common edge; `np.unique` keeps the pair only once.
+        low = np.minimum(first_cells, second_cells)
+        high = np.maximum(first_cells, second_cells)
         codes = np.unique(low * cell_count + high)
         return np.column_stack(np.divmod(codes, cell_count)).astype(np.intp, copy=False)
 
     def _has_length(self) -> BoolArray:
-        """Return whether each edge is longer than the rounding error of its coordinates, (s,)."""
-        length = compute_lengths(self.end - self.start)
-        distance = compute_lengths(self.start) + compute_lengths(self.end)
-        return np.asarray(length > _MIN_RELATIVE_LENGTH * distance)
+        """Return whether each edge is longer than the rounding errors of its coordinates, (e,)."""
+        lengths = compute_lengths(self.ends - self.starts)
+        distances = compute_lengths(self.starts) + compute_lengths(self.ends)
+        return np.asarray(lengths > _MIN_RELATIVE_LENGTH * distances)
 
 
 @kernel
-def _sum_moments(start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
+def _sum_moments(starts: Array, ends: Array, cells: IntArray, cell_count: int) -> Array:
     """Return the moments of cells, (n, 4): area, first moments in x and y, and polar moment.
 
-    They are sums over the triangles between the edges of a cell and its generator, which is the origin. The
-    `cross` of the ends of an edge is twice the area of its triangle.
+    They are sums over the edges of a cell. The contribution of an edge is the moment of the triangle that it
+    forms with the generator, which is the origin. Twice the area of this triangle is `cross`.
     """
-    sums = np.zeros((cell_count, 4))
-    for k in range(len(cell)):
-        start_x = start[k, 0]
-        start_y = start[k, 1]
-        end_x = end[k, 0]
-        end_y = end[k, 1]
-        c = cell[k]
+    moments = np.zeros((cell_count, 4))
+    for k in range(len(cells)):
+        start_x = starts[k, 0]
+        start_y = starts[k, 1]
+        end_x = ends[k, 0]
+        end_y = ends[k, 1]
+        i = cells[k]
         cross = start_x * end_y - end_x * start_y
         sum_x = start_x + end_x
         sum_y = start_y + end_y
-        sums[c, MASS] += cross / 2.0
-        sums[c, MOMENT_X] += cross * sum_x / 6.0
-        sums[c, MOMENT_Y] += cross * sum_y / 6.0
-        squares = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
-        sums[c, POLAR_MOMENT] += cross * squares / 12.0
-    return sums
+        moments[i, MASS] += cross / 2.0
+        moments[i, MOMENT_X] += cross * sum_x / 6.0
+        moments[i, MOMENT_Y] += cross * sum_y / 6.0
+        # The polar moment of the triangle with the corners 0, s and e is cross (s·s + s·e + e·e) / 12.
+        sum_of_products = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
+        moments[i, POLAR_MOMENT] += cross * sum_of_products / 12.0
+    return moments

@@ -1,13 +1,19 @@
 """Sums of Gaussians, and their integrals over polygons in closed form.
 
-Let g = exp(-|q|²/2), and let an edge lie at the signed distance d from the center along its outward
-normal n, between s₁ and s₂ along its direction t. As div[(1 - g) q / |q|²] = g, an edge adds to the mass
+Let g = exp(-|q|²/2) be the standard Gaussian, whose center is the origin. Let d be the signed distance of an
+edge from the center along the outward normal n, and let s run from s₁ to s₂ along the edge in its direction
+t. By the divergence theorem, integrals over a polygon are sums over its edges:
 
-    ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂
+- Since div[(1 - g) q / |q|²] = g, an edge adds to the mass
 
-where T is Owen's function (Owen 1956). From q g = -grad g, it adds -n E₀ to the first moment, where
-E₀ = ∫ g ds. From ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds -∫ (d n + s t) nᵀ g ds = -(d E₀ n + E₁ t) nᵀ to the
-second moments minus the mass, where E₁ = ∫ s g ds. Any other Gaussian is an affine map of this one.
+      ∫ d (1 - g) / (d² + s²) ds = [atan(s/d) - 2π T(d, s/d)] from s₁ to s₂,
+
+  where T is Owen's function (Owen 1956).
+- Since q g = -grad g, it adds -n E₀ to the first moment, where E₀ = ∫ g ds.
+- Since ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, it adds ∫ (d n + s t) nᵀ g ds = (d E₀ n + E₁ t) nᵀ to the difference
+  between the mass (times the identity) and the second moments, where E₁ = ∫ s g ds.
+
+Any other Gaussian becomes the standard one by an affine map, under which edges stay straight.
 """
 
 import math
@@ -25,11 +31,12 @@ Matrix: TypeAlias = tuple[Point, Point]
 """A 2 x 2 matrix, row by row."""
 
 _MIN_RELATIVE_DETERMINANT = 1e-9
-"""A covariance counts as singular if its determinant is at most this fraction of the diagonal's product."""
+"""A covariance counts as singular if its determinant is at most this fraction of the product of its
+diagonal."""
 
 
-class _Factor(NamedTuple):
-    """Lower triangular factor L of a covariance S = L Lᵀ, m: its diagonal, and the entry below it."""
+class _CholeskyFactor(NamedTuple):
+    """Entries of the lower triangular matrix L for which the covariance is L Lᵀ, m."""
 
     xx: float
     yy: float
@@ -37,34 +44,40 @@ class _Factor(NamedTuple):
 
 
 class _StandardMoments(NamedTuple):
-    """Moments of the standard Gaussian over cells, or contributions of edges to them, one array each.
+    """Moments of the standard Gaussian over n cells, or the contributions of e edges to them.
 
-    The second moments are stored as deficits, the direct results of integrals along edges: the mass minus
-    the moment xx, the moment xy with its sign reversed, and the mass minus the moment yy.
+    In place of the second moments, there are the *deficits*, which the integrals along edges give directly:
+    the entries of the mass times the identity matrix minus the second moments.
     """
 
     mass: Array
+    """Integral of the Gaussian g."""
     x: Array
+    """Integral of x g."""
     y: Array
+    """Integral of y g."""
     deficit_xx: Array
+    """Mass minus the integral of x² g."""
     deficit_xy: Array
+    """Minus the integral of x y g."""
     deficit_yy: Array
+    """Mass minus the integral of y² g."""
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """One Gaussian, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``.
+    """A Gaussian, ``weight exp(-½ (q - c)ᵀ S⁻¹ (q - c))``.
 
     Parameters
     ----------
     center : (x, y), m
-        c, the position of the maximum.
+        The center c, where the Gaussian has its maximum.
     weight : float
         Value at the center, at least 0.
     sigma : float or None, m
-        Standard deviation, above 0.
+        Standard deviation in all directions, above 0.
     covariance : 2 x 2 nested tuples or None, m²
-        S, symmetric and positive definite; an alternative to `sigma`.
+        Covariance S, a symmetric and positive definite matrix: an alternative to `sigma`.
 
     Raises
     ------
@@ -104,22 +117,24 @@ class Gaussian:
 
     @property
     def matrix(self) -> Matrix:
-        """Covariance S, m²."""
+        """The covariance S, m²."""
         if self.covariance is not None:
             return self.covariance
         assert self.sigma is not None
         return (self.sigma**2, 0.0), (0.0, self.sigma**2)
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the Gaussian.
+        """Evaluate the Gaussian at points.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            Value at each point.
         """
         standard = self._standardize(points - np.array(self.center))
         x = standard[:, 0]
@@ -127,7 +142,7 @@ class Gaussian:
         return np.asarray(self.weight * np.exp(-0.5 * (x * x + y * y)))
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells.
+        """Compute mass, first moments and polar moment of each cell.
 
         Parameters
         ----------
@@ -137,20 +152,22 @@ class Gaussian:
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
+            See `Density.compute_moments`.
         """
-        # In standard coordinates, in which the covariance S = L Lᵀ is the identity, edges stay straight.
+        # In standard coordinates, this is the standard Gaussian. The area element is L_xx L_yy times as
+        # large.
         factor = self._factorize()
-        offset = origins - np.array(self.center)
-        edge_offset = offset[edges.cell]
-        start = self._standardize(edges.start + edge_offset)
-        end = self._standardize(edges.end + edge_offset)
+        offsets = origins - np.array(self.center)
+        edge_offsets = offsets[edges.cells]
+        starts = self._standardize(edges.starts + edge_offsets)
+        ends = self._standardize(edges.ends + edge_offsets)
         scale = self.weight * factor.xx * factor.yy
         sums: list[Array] = [
-            np.asarray(np.bincount(edges.cell, contribution, minlength=len(origins)) * scale)
-            for contribution in _integrate_along_edges(start, end)
+            np.asarray(np.bincount(edges.cells, contributions, minlength=len(origins)) * scale)
+            for contributions in _integrate_along_edges(starts, ends)
         ]
         standard = _StandardMoments(*sums)
-        # Convert the moments in standard coordinates to moments about the center of the Gaussian.
+        # Convert the moments in standard coordinates to moments about the center of the Gaussian, in meters.
         mass = standard.mass
         x = factor.xx * standard.x
         y = factor.yx * standard.x + factor.yy * standard.y
@@ -160,34 +177,41 @@ class Gaussian:
             + factor.yy * factor.yy * (mass - standard.deficit_yy)
         )
         # Convert them to moments about the origins of the cells.
-        offset_x = offset[:, 0]
-        offset_y = offset[:, 1]
-        squared_offset = (offset * offset).sum(axis=1)
+        offset_x = offsets[:, 0]
+        offset_y = offsets[:, 1]
+        squared_offset = (offsets * offsets).sum(axis=1)
         polar = polar - 2.0 * (offset_x * x + offset_y * y) + squared_offset * mass
         return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
 
-    def _factorize(self) -> _Factor:
-        """Return the Cholesky factor of the covariance."""
+    def _factorize(self) -> _CholeskyFactor:
+        """Return the Cholesky factor L of the covariance."""
         (xx, xy), (_, yy) = self.matrix
         factor_xx = math.sqrt(xx)
         factor_yx = xy / factor_xx
-        return _Factor(factor_xx, math.sqrt(yy - factor_yx * factor_yx), factor_yx)
+        factor_yy = math.sqrt(yy - factor_yx * factor_yx)
+        return _CholeskyFactor(xx=factor_xx, yy=factor_yy, yx=factor_yx)
 
-    def _standardize(self, offset: Array) -> Array:
-        """Return (s, 2) offsets from the center in the coordinates in which this is the standard Gaussian."""
+    def _standardize(self, offsets: Array) -> Array:
+        """Convert offsets from the center, (k, 2) m, to coordinates in which this is the standard Gaussian.
+
+        An offset in meters is the Cholesky factor L times the offset in these coordinates.
+        """
         factor = self._factorize()
-        u = offset[:, 0] / factor.xx
-        return np.column_stack([u, (offset[:, 1] - factor.yx * u) / factor.yy])
+        x = offsets[:, 0] / factor.xx
+        y = (offsets[:, 1] - factor.yx * x) / factor.yy
+        return np.column_stack([x, y])
 
 
 @dataclass(frozen=True)
 class Gaussians(Density):
-    """A sum of Gaussians and a constant. Its integrals are closed forms of erf and Owen's T function.
+    """A density that is the sum of Gaussians and a constant.
+
+    Its integrals over cells are computed in closed form, with the error function and Owen's T function.
 
     Parameters
     ----------
     peaks : tuple of Gaussian
-        The Gaussians that are added.
+        The Gaussians.
     floor : float
         The constant, at least 0.
 
@@ -198,7 +222,7 @@ class Gaussians(Density):
 
     See Also
     --------
-    Gaussian : One peak.
+    Gaussian : A peak of this density.
     Density : The interface of all densities.
 
     Examples
@@ -222,24 +246,26 @@ class Gaussians(Density):
 
     @property
     def min_value(self) -> float:
-        """The constant, which is a lower bound everywhere."""
+        """The constant, which is a lower bound on the density."""
         return self.floor
 
     @property
     def max_value(self) -> float:
-        """The sum of the constant and all peaks, an upper bound that is reached if their centers coincide."""
+        """The sum of the constant and all weights, an upper bound that is reached if all centers coincide."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the sum of the constant and all peaks.
+        """Evaluate the density at points.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            Sum of the constant and all peaks at each point.
         """
         points = np.asarray(points, dtype=float)
         total = np.full(len(points), float(self.floor))
@@ -248,7 +274,7 @@ class Gaussians(Density):
         return total
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells in closed form.
+        """Compute mass, first moments and polar moment of each cell in closed form.
 
         Parameters
         ----------
@@ -258,6 +284,7 @@ class Gaussians(Density):
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
+            See `Density.compute_moments`.
         """
         total = self.floor * edges.compute_moments(len(origins))
         for peak in self.peaks:
@@ -265,39 +292,38 @@ class Gaussians(Density):
         return total
 
 
-def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
-    """Return the contributions of edges to the moments of a standard Gaussian g = exp(-|q|²/2) over cells.
+def _integrate_along_edges(starts: Array, ends: Array) -> _StandardMoments:
+    """Return the contributions of edges to the moments of the standard Gaussian g = exp(-|q|²/2) over cells.
 
-    The edges lead from `start` to `end`, (s, 2) each, relative to the center. By Green's theorem, integrals
-    over a cell become integrals along its edges. An edge lies at the signed distance d from the center along
-    its outward normal n, and from s1 to s2 along its direction t. With e0 = ∫ g ds and e1 = ∫ s g ds along
-    the edge, and T Owen's function, it adds
+    The edges lead from `starts` to `ends`, (e, 2) each, relative to the center. Let d be the signed distance
+    of an edge from the center along the outward normal n, and let s run from s1 to s2 along the edge in its
+    direction t. With e0 = ∫ g ds, e1 = ∫ s g ds, and Owen's function T, an edge adds
 
     - [atan(s/d) - 2π T(d, s/d)] from s1 to s2 to the mass,
     - -n e0 to the first moment, and
-    - (d e0 n + e1 t) nᵀ to the mass minus the second moments (the deficits).
+    - (d e0 n + e1 t) nᵀ to the deficits; see the description of the module.
     """
     # SciPy is imported only here, because loading a map does not need it.
     from scipy.special import erf, owens_t
 
-    along = end - start
-    length = compute_lengths(along)
-    has_length = length > 0.0
-    tangent_x, tangent_y = (along / np.where(has_length, length, 1.0)[:, None]).T
+    along = ends - starts
+    lengths = compute_lengths(along)
+    has_length = lengths > 0.0
+    tangent_x, tangent_y = (along / np.where(has_length, lengths, 1.0)[:, None]).T
     normal_x = tangent_y
     normal_y = -tangent_x
-    d = start[:, 0] * normal_x + start[:, 1] * normal_y
-    s1 = start[:, 0] * tangent_x + start[:, 1] * tangent_y
-    s2 = end[:, 0] * tangent_x + end[:, 1] * tangent_y
+    d = starts[:, 0] * normal_x + starts[:, 1] * normal_y
+    s1 = starts[:, 0] * tangent_x + starts[:, 1] * tangent_y
+    s2 = ends[:, 0] * tangent_x + ends[:, 1] * tangent_y
     has_distance = d != 0.0
     divisor = np.where(has_distance, d, 1.0)
     with np.errstate(over="ignore"):
         ratio1 = s1 / divisor
         ratio2 = s2 / divisor
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
-    # An edge whose line passes through the center adds nothing.
+    # If the line of an edge passes through the center, the integrand is zero.
     mass[~has_distance] = 0.0
-    # Far from the center, squares may overflow. The exponential is then zero, as it should be.
+    # Far from the center, squares may overflow to infinity. The exponential is then zero, which is correct.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
@@ -309,8 +335,8 @@ def _integrate_along_edges(start: Array, end: Array) -> _StandardMoments:
         deficit_xy=normal_y * (normal_x * (d * e0) + tangent_x * e1),
         deficit_yy=normal_y * (normal_y * (d * e0) + tangent_y * e1),
     )
-    for contribution in contributions:
-        contribution[~has_length] = 0.0
+    for values in contributions:
+        values[~has_length] = 0.0
     return contributions
 
 

@@ -19,12 +19,14 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     Parameters
     ----------
     density : Density
+        The density.
     polygons : sequence of k shapely polygons, m
-        Valid polygons. Their holes are left out.
+        Valid polygons, which may have holes.
 
     Returns
     -------
     (k,) array, m²
+        Integral of the density over each polygon, without its holes.
 
     Examples
     --------
@@ -32,47 +34,51 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     >>> compute_polygon_masses(Uniform(2.0), [shapely.box(0.0, 0.0, 3.0, 1.0)])
     array([6.])
     """
-    # Integrate as over cells, whose edges are relative to an origin: here, the centroid of each polygon.
+    # The polygons are treated like cells, whose edges are relative to an origin: the centroid of each
+    # polygon.
     polygons = shapely.orient_polygons(polygons)
-    rings, polygon_of_ring = shapely.get_rings(polygons, return_index=True)
+    rings, ring_polygons = shapely.get_rings(polygons, return_index=True)
     origins = shapely.get_coordinates(shapely.centroid(polygons))
-    points, ring_of_point = shapely.get_coordinates(rings, return_index=True)
-    polygon_of_point = polygon_of_ring[ring_of_point]
-    points -= origins[polygon_of_point]
+    points, point_rings = shapely.get_coordinates(rings, return_index=True)
+    point_polygons = ring_polygons[point_rings]
+    points -= origins[point_polygons]
     # No edge leads from the last point of a ring to the first point of the next one.
-    is_edge = ring_of_point[1:] == ring_of_point[:-1]
-    edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], polygon_of_point[:-1][is_edge])
+    is_edge = point_rings[1:] == point_rings[:-1]
+    edges = _build_edges(points[:-1][is_edge], points[1:][is_edge], point_polygons[:-1][is_edge])
     return np.maximum(density.compute_moments(edges, origins)[:, MASS], 0.0)
 
 
 def compute_square_means(density: Density, centers: Array, side: float) -> Array:
-    """Compute the mean density of axis-parallel squares.
+    """Compute the mean density in each of several axis-parallel squares of the same size.
 
     Parameters
     ----------
     density : Density
+        The density.
     centers : (k, 2) array, m
+        Centers of the squares.
     side : float, m
         Length of the sides.
 
     Returns
     -------
     (k,) array
+        Mean density of each square.
     """
     corners = 0.5 * side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     next_corners = np.roll(corners, -1, axis=0)
     masses = np.empty(len(centers))
-    for batch_start in range(0, len(centers), _SQUARES_PER_BATCH):
-        batch = centers[batch_start : batch_start + _SQUARES_PER_BATCH]
-        start = np.tile(corners, (len(batch), 1))
-        end = np.tile(next_corners, (len(batch), 1))
-        edges = _build_edges(start, end, np.repeat(np.arange(len(batch)), 4))
-        masses[batch_start : batch_start + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
+    for first in range(0, len(centers), _SQUARES_PER_BATCH):
+        batch = centers[first : first + _SQUARES_PER_BATCH]
+        starts = np.tile(corners, (len(batch), 1))
+        ends = np.tile(next_corners, (len(batch), 1))
+        edges = _build_edges(starts, ends, np.repeat(np.arange(len(batch)), 4))
+        masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
     # Rounding must not produce values outside the range of the density, such as negative ones.
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 
 
-def _build_edges(start: Array, end: Array, cell: IntArray) -> CellEdges:
-    """Return edges of polygons without neighbors."""
-    other_cell = np.full(len(cell), REGION)
-    return CellEdges(start, end, cell.astype(np.intp, copy=False), other_cell)
+def _build_edges(starts: Array, ends: Array, polygons: IntArray) -> CellEdges:
+    """Return the edges of polygons as those of cells that do not border on each other."""
+    other_cells = np.full(len(polygons), REGION)
+    return CellEdges(starts, ends, polygons.astype(np.intp, copy=False), other_cells)

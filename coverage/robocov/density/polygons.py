@@ -1,15 +1,16 @@
-"""Areas of constant weight, and their exact integrals over polygons, without clipping.
+"""Areas of constant weight, and their exact integrals over cells, without clipping.
 
-A polygon is a signed sum of strips, one for each edge: the area to the left of a rising edge counts
-as positive, that to the left of a falling edge as negative. The integral over the intersection of two
-polygons is therefore a signed sum over the pairs of their edges e and f. Each term is the integral of a
-polynomial over the area between f and e,
+A polygon is a signed sum of strips, one for each edge. The strip of an edge is the area to its left, up to
+infinity. It is added if the edge rises, and subtracted if the edge falls. The integral over the intersection
+of two polygons is therefore a signed sum over all pairs of an edge e of one and an edge f of the other. For
+the area, a term of this sum is
 
-    ∫ max(0, x_e(y) - x_f(y)) dy          (the area; over the heights y common to both edges)
+    ∫ max(0, x_e(y) - x_f(y)) dy,
 
-and the same with other powers of x and y in it. Both edges are straight, so that this is an integral of
-a polynomial in y over one interval. Rounding decides nothing: each pair adds a term that depends
-continuously on all end points, however edges meet, touch or coincide.
+where y runs over the heights that both edges have in common, and for the other moments, the integrand is
+multiplied by powers of x and y. Since both edges are straight, the integrand is a polynomial in y. The result
+does not depend on decisions that rounding errors could change: each term is a continuous function of the end
+points, even where edges meet, touch or coincide.
 """
 
 from dataclasses import dataclass
@@ -26,30 +27,34 @@ from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, C
 from robocov.errors import ParameterError
 
 _LOW_X = 0
+"""Column of a jump, a line across which the density changes: x of its lower end, m."""
 _LOW_Y = 1
+"""Column of a jump: y of its lower end, m."""
 _HIGH_X = 2
+"""Column of a jump: x of its upper end, m."""
 _HIGH_Y = 3
-"""Columns of a jump: its lower and its upper end, m."""
+"""Column of a jump: y of its upper end, m."""
 _STEP = 4
-"""Column of a jump: φ to the right of it minus φ to the left."""
+"""Column of a jump: the density to the right of the line minus the density to the left."""
 _JUMP_COLUMNS = 5
+"""Number of columns of a jump."""
 
 _GAUSS_NODE = 0.5 - 0.5 / 3.0**0.5
-"""First node of the Gauss rule with two points on [0, 1], which is exact for cubic polynomials."""
+"""First node of the Gauss rule with two nodes on [0, 1], which is exact for cubic polynomials."""
 
 
 @dataclass(frozen=True)
 class WeightedArea:
-    """A polygon of constant weight.
+    """A polygon in which a density is constant.
 
     Parameters
     ----------
     vertices : tuple of (x, y), m
-        Outer ring, in either direction. The first vertex is not repeated.
+        Vertices of the outer ring, in either direction. The first vertex is not repeated.
     weight : float
-        At least 0.
+        The density in the polygon, at least 0.
     holes : tuple of rings
-        Rings like `vertices`.
+        Vertices of each hole, like `vertices`.
     name : str or None
         Displayed name of the area.
 
@@ -86,12 +91,14 @@ class WeightedArea:
 
 @dataclass(frozen=True)
 class WeightedPolygons(Density):
-    """A density that is constant in each of several polygons and outside them. Its integrals are exact.
+    """A density that is constant in each of several polygons, and outside all of them.
+
+    Its integrals over cells are exact.
 
     Parameters
     ----------
     areas : tuple of WeightedArea
-        Where areas overlap, the weight is that of the last one.
+        The polygons. Where several of them overlap, the density is the weight of the last one.
     background : float
         Density outside all areas, at least 0.
 
@@ -102,7 +109,7 @@ class WeightedPolygons(Density):
 
     See Also
     --------
-    WeightedArea : One polygon.
+    WeightedArea : A polygon of this density.
     Density : The interface of all densities.
 
     Examples
@@ -129,46 +136,48 @@ class WeightedPolygons(Density):
 
     @property
     def min_value(self) -> float:
-        """The smallest weight, of the areas and the background."""
+        """The smallest of the weights and the background."""
         return min([self.background, *(area.weight for area in self.areas)])
 
     @property
     def max_value(self) -> float:
-        """The largest weight, of the areas and the background."""
+        """The largest of the weights and the background."""
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
     def _jumps(self) -> Array:
-        """The lines across which φ jumps, (j, 5): the edges of the visible parts of the areas.
+        """The lines across which the density changes, (j, 5): the edges of the visible parts of the areas.
 
-        A row contains x and y of the lower end, then of the upper end, and the change of φ from left to
-        right. Horizontal edges are left out, because their strips have no height.
+        For the columns, see `_LOW_X` and the following constants. Horizontal edges are left out, because
+        their strips have no height.
         """
-        jumps = [np.empty((0, _JUMP_COLUMNS))]
+        jumps_by_ring = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()
-        # The last area is on top.
+        # The last area is on top, and covers the others.
         for area in reversed(self.areas):
             visible = area.polygon if covered.is_empty else shapely.difference(area.polygon, covered)
             covered = shapely.union(covered, area.polygon)
             # Where areas touch, the difference may contain points and lines, which have no rings.
             for ring in shapely.get_rings(shapely.orient_polygons(shapely.get_parts(visible))):
                 points = shapely.get_coordinates(ring)
-                jumps.append(_build_jumps(points, area.weight - self.background))
-        all_jumps = np.concatenate(jumps)
+                jumps_by_ring.append(_build_jumps(points, area.weight - self.background))
+        all_jumps = np.concatenate(jumps_by_ring)
         is_horizontal = all_jumps[:, _LOW_Y] >= all_jumps[:, _HIGH_Y]
         has_step = all_jumps[:, _STEP] != 0.0
         return np.asarray(all_jumps[~is_horizontal & has_step])
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the weight of the last area that contains each point, or the background.
+        """Evaluate the density at points.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            Weight of the last area that contains each point, or the background if no area does.
         """
         x, y = np.asarray(points, dtype=float).T
         values = np.full(len(x), float(self.background))
@@ -177,7 +186,7 @@ class WeightedPolygons(Density):
         return values
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells without clipping them.
+        """Compute mass, first moments and polar moment of each cell exactly.
 
         Parameters
         ----------
@@ -187,32 +196,33 @@ class WeightedPolygons(Density):
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
+            See `Density.compute_moments`.
         """
         moments = self.background * edges.compute_moments(len(origins))
-        _add_jumps(moments, self._jumps, edges.start, edges.end, edges.cell, np.ascontiguousarray(origins))
+        _add_jumps(moments, self._jumps, edges.starts, edges.ends, edges.cells, np.ascontiguousarray(origins))
         return moments
 
 
 def _build_jumps(points: Array, step: float) -> Array:
-    """Convert a closed, counter-clockwise ring to jumps, one for each edge.
+    """Return the jumps across the edges of a closed, counter-clockwise ring, (k, 5).
 
-    The density φ inside the ring exceeds φ outside by `step`. A jump runs from the lower to the upper end of
-    its edge, and contains the change of φ from its left side to its right side: -step if the inside of the
-    ring is on the left, and +step if it is on the right.
+    The density inside the ring exceeds that outside by `step`. A jump runs from the lower to the upper end of
+    its edge, and contains the change of the density from its left side to its right side: -step if the inside
+    of the ring is on the left, and +step if it is on the right.
     """
-    start = points[:-1]
-    end = points[1:]
-    # A column, (k, 1), which applies to both coordinates of each end.
-    is_falling = start[:, 1:] > end[:, 1:]
-    low = np.where(is_falling, end, start)
-    high = np.where(is_falling, start, end)
-    # The inside of the polygon lies to the left of a rising edge.
-    signed_step = np.where(is_falling, 1.0, -1.0) * step
-    return np.hstack([low, high, signed_step])
+    starts = points[:-1]
+    ends = points[1:]
+    # The array has one column, so that it selects both coordinates of an end.
+    is_falling = starts[:, 1:] > ends[:, 1:]
+    low_ends = np.where(is_falling, ends, starts)
+    high_ends = np.where(is_falling, starts, ends)
+    # The inside of the ring lies to the left of a rising edge.
+    signed_steps = np.where(is_falling, 1.0, -1.0) * step
+    return np.hstack([low_ends, high_ends, signed_steps])
 
 
 class _Segment(NamedTuple):
-    """An edge or a jump that is not horizontal, from its lower to its upper end, relative to a generator."""
+    """An edge or a jump that is not horizontal, from its lower to its upper end, relative to an origin."""
 
     low_x: float
     low_y: float
@@ -221,10 +231,15 @@ class _Segment(NamedTuple):
 
 
 class _Strip(NamedTuple):
-    """The area between a jump, on the left, and an edge, on the right, over the heights common to both."""
+    """The area between a jump, on the left, and an edge, on the right, at the heights common to both.
+
+    If the two cross, the jump is on the left only below or above the crossing.
+    """
 
     bottom: float
+    """The smallest common height."""
     top: float
+    """The largest common height."""
     left_bottom: float
     """x of the jump at the bottom."""
     left_top: float
@@ -237,29 +252,30 @@ class _Strip(NamedTuple):
 
 @kernel
 def _add_jumps(
-    moments: Array, jumps: Array, start: Array, end: Array, cell: IntArray, origins: Array
+    moments: Array, jumps: Array, starts: Array, ends: Array, cells: IntArray, origins: Array
 ) -> None:
-    """Add the contribution of areas of constant weight to the moments of cells, (n, 4).
+    """Add the contribution of the jumps of a density to the moments of cells, (n, 4).
 
-    A jump is a line across which the density changes: an edge of an area. An edge is one of a cell. With the
-    change of the density to the right of a jump as its weight, the integral over a cell is the sum, over all
-    pairs of an edge and a jump, of integrals over the strip between them: the area to the right of the jump
-    and to the left of the edge, at the heights y that both of them span. Strips of rising edges are added,
-    and those of falling edges subtracted, so that only what lies inside the cell remains.
+    Edges bound the cells, and jumps are the lines across which the density changes. The strip of an edge and
+    a jump is the area to the left of the edge and to the right of the jump, at the heights that both have in
+    common. A jump changes the density everywhere to its right. The integral over a cell is therefore the sum,
+    over all pairs of an edge and a jump, of the change of the density integrated over their strip. The strips
+    of rising edges are added and those of falling edges subtracted, so that only the inside of the cell
+    counts.
 
-    Edges run from `start` to `end`, relative to the origin of their cell; horizontal ones span no area.
+    The edges run from `starts` to `ends`, relative to the origins of their cells.
     """
-    for k in range(len(cell)):
-        cell_index = cell[k]
-        origin_x = origins[cell_index, 0]
-        origin_y = origins[cell_index, 1]
-        # A falling edge is reversed, and its integrals are subtracted.
-        if start[k, 1] < end[k, 1]:
+    for k in range(len(cells)):
+        cell = cells[k]
+        origin_x = origins[cell, 0]
+        origin_y = origins[cell, 1]
+        # A falling edge is reversed, and its integrals are subtracted. A horizontal edge has no strip.
+        if starts[k, 1] < ends[k, 1]:
             sign = 1.0
-            edge = _Segment(start[k, 0], start[k, 1], end[k, 0], end[k, 1])
-        elif start[k, 1] > end[k, 1]:
+            edge = _Segment(starts[k, 0], starts[k, 1], ends[k, 0], ends[k, 1])
+        elif starts[k, 1] > ends[k, 1]:
             sign = -1.0
-            edge = _Segment(end[k, 0], end[k, 1], start[k, 0], start[k, 1])
+            edge = _Segment(ends[k, 0], ends[k, 1], starts[k, 0], starts[k, 1])
         else:
             continue
         for jump_index in range(len(jumps)):
@@ -269,7 +285,7 @@ def _add_jumps(
                 jumps[jump_index, _HIGH_X] - origin_x,
                 jumps[jump_index, _HIGH_Y] - origin_y,
             )
-            # Skip pairs without a common height, and edges that are entirely to the left of the jump.
+            # Skip pairs without a common height, or with the edge entirely to the left of the jump.
             bottom = max(edge.low_y, jump.low_y)
             top = min(edge.high_y, jump.high_y)
             if bottom >= top or max(edge.low_x, edge.high_x) <= min(jump.low_x, jump.high_x):
@@ -282,17 +298,16 @@ def _add_jumps(
                 right_bottom=_find_x(edge, bottom),
                 right_top=_find_x(edge, top),
             )
-            _add_strip(moments, cell_index, strip, sign * jumps[jump_index, _STEP])
+            _add_strip(moments, cell, strip, sign * jumps[jump_index, _STEP])
 
 
 @inlined_kernel
-def _add_strip(moments: Array, cell_index: int, strip: _Strip, weight: float) -> None:
+def _add_strip(moments: Array, cell: int, strip: _Strip, weight: float) -> None:
     """Add the integrals of a weight over a strip to the moments of a cell.
 
-    A strip is the area between a jump of the density, on its left, and an edge of the cell, on its right. The
-    part where the jump is to the right of the edge is left out. At a height y, the strip extends from `left`
-    to `right`, and the integrals over x are polynomials in y of degree 3 at most. The Gauss rule with two
-    nodes is therefore exact.
+    At each height, the strip extends from the jump, at x = left, to the edge, at x = right. Heights at which
+    the jump is to the right of the edge are left out. The integrals over x are polynomials of the height, of
+    degree 3 at most, so that the Gauss rule with two nodes is exact.
     """
     width_bottom = strip.right_bottom - strip.left_bottom
     width_top = strip.right_top - strip.left_top
@@ -314,15 +329,15 @@ def _add_strip(moments: Array, cell_index: int, strip: _Strip, weight: float) ->
             mass = node_weight * (right - left)
             height = strip.bottom + t * (strip.top - strip.bottom)
             mean_square = (right * right + right * left + left * left) / 3.0
-            moments[cell_index, MASS] += mass
-            moments[cell_index, MOMENT_X] += 0.5 * mass * (right + left)
-            moments[cell_index, MOMENT_Y] += height * mass
-            moments[cell_index, POLAR_MOMENT] += mass * (mean_square + height * height)
+            moments[cell, MASS] += mass
+            moments[cell, MOMENT_X] += 0.5 * mass * (right + left)
+            moments[cell, MOMENT_Y] += height * mass
+            moments[cell, POLAR_MOMENT] += mass * (mean_square + height * height)
 
 
 @kernel
 def _find_x(segment: _Segment, height: float) -> float:
-    """Return the x coordinate of a segment at a height."""
+    """Return the x coordinate of a segment at a height between its ends."""
     fraction = (height - segment.low_y) / (segment.high_y - segment.low_y)
     fraction = min(max(fraction, 0.0), 1.0)
     return segment.low_x + fraction * (segment.high_x - segment.low_x)

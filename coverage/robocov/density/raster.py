@@ -1,4 +1,4 @@
-"""An image of a density: constant in each of its pixels, or linear between their centers."""
+"""A density given by an image: constant in each pixel, or interpolated between the centers of pixels."""
 
 from __future__ import annotations
 
@@ -22,52 +22,63 @@ MAX_RASTER_SIZE = 1024
 """Maximum number of rows, and of columns, of a raster."""
 
 Interpolation: TypeAlias = Literal["cells", "bilinear"]
-"""Whether a raster is constant in each of its pixels, or linear between their centers in both directions."""
+"""Whether a raster is constant in each pixel ("cells") or bilinear between the centers of four pixels."""
 
 _MAX_CACHED_GRIDS = 4
-"""A grid takes ten times the memory of its image. While a user paints a raster, a new grid is built for each
-change, but only the last few are still in use."""
+"""Maximum number of grids that are cached. A grid takes ten times the memory of its image. While a user
+paints a raster, a new grid is built for each change, but only the last few are still in use."""
 
 _ONE = 0
+"""Column of the integrals of a grid over cells: the integral of φ."""
 _U = 1
+"""Column of the same integrals: the integral of φ u."""
 _V = 2
+"""Column of the same integrals: the integral of φ v."""
 _UU = 3
+"""Column of the same integrals: the integral of φ u²."""
 _VV = 4
-"""Columns of the integrals of φ times 1, u, v, u² and v² over cells."""
+"""Column of the same integrals: the integral of φ v²."""
 _INTEGRAL_COLUMNS = 5
+"""Number of columns of these integrals."""
 
 _CONSTANT = 0
+"""Row of the coefficients of a grid: the constants; see `_Grid`."""
 _SLOPE_X = 1
+"""Row of the same coefficients: the slopes in x."""
 _SLOPE_Y = 2
+"""Row of the same coefficients: the slopes in y."""
 _TWIST = 3
-"""Rows of the coefficients of a grid; see `_Grid`."""
+"""Row of the same coefficients: the twists."""
 
 _TIMES_ONE = 0
+"""Row of the integrals along the rows of a grid: the integrals of φ; see `_Grid`."""
 _TIMES_U = 1
+"""Row of the same integrals: the integrals of φ u."""
 _TIMES_UU = 2
-"""Rows of the integrals of φ times 1, u and u² along rows; see `_Grid`."""
+"""Row of the same integrals: the integrals of φ u²."""
 
 _GAUSS_NODE = 0.5 * 0.6**0.5
-"""Distance of the outer nodes of the Gauss rule with three points on [0, 1] from the middle one."""
+"""Distance of the outer nodes of the Gauss rule with three nodes on [0, 1] from the middle node."""
 _MIDDLE_NODE = 1
 """Index of the middle node."""
 _MIDDLE_WEIGHT = 8.0 / 18.0
+"""Weight of the middle node."""
 _OUTER_WEIGHT = 5.0 / 18.0
-"""Weights of the middle node and of the outer nodes."""
+"""Weight of each outer node."""
 
 
 @dataclass(frozen=True, eq=False)
 class Raster(Density):
-    """An image of the density. Its integrals are exact.
+    """A density given by an image. Its integrals over cells are exact.
 
     Parameters
     ----------
     values : (rows, columns) array
-        At least 0, **the lowest row first**. The attribute is read-only.
+        Values of the pixels, at least 0, **the lowest row first**. The attribute is read-only.
     extent : (x_min, y_min, x_max, y_max), m
         Extent of the image. Points outside have the value of the nearest border pixel.
     interpolation : {"bilinear", "cells"}
-        Between the centers of pixels, or constant within each pixel.
+        "bilinear" interpolates between the centers of pixels; with "cells", each pixel is constant.
 
     Raises
     ------
@@ -146,31 +157,33 @@ class Raster(Density):
         return float(self.values.max())
 
     def evaluate(self, points: Array) -> Array:
-        """Evaluate the image. Points outside have the value of the nearest border pixel.
+        """Evaluate the density at points. Points outside have the value of the nearest border pixel.
 
         Parameters
         ----------
         points : (k, 2) array, m
+            The points.
 
         Returns
         -------
         (k,) array
+            Value of the image at each point.
         """
         grid = _build_grid(self)
         u, v = ((np.asarray(points, dtype=float) - grid.origin) / grid.step).T
-        rows, columns = grid.coefficients.shape[1:]
-        column = np.clip(np.floor(u), 0, columns - 1).astype(np.intp)
-        row = np.clip(np.floor(v), 0, rows - 1).astype(np.intp)
-        # In a square of the grid, the density is a polynomial in ξ and η, the offsets from its lower left
-        # corner; see `_Grid`. Outside the grid, the coefficients of the nearest square hold: they make the
-        # density constant outwards, so that ξ and η need no limits.
-        constant, slope_x, slope_y, twist = grid.coefficients[:, row, column]
-        xi = u - column
-        eta = v - row
-        return np.asarray(constant + slope_x * xi + (slope_y + twist * xi) * eta)
+        row_count, column_count = grid.coefficients.shape[1:]
+        columns = np.clip(np.floor(u), 0, column_count - 1).astype(np.intp)
+        rows = np.clip(np.floor(v), 0, row_count - 1).astype(np.intp)
+        # In a square of the grid, the density is a polynomial in ξ and η, the offsets from the lower left
+        # corner of the square; see `_Grid`. Beyond the grid, the polynomial of the nearest square is constant
+        # in the outward direction, so that ξ and η need no limits.
+        constants, slopes_x, slopes_y, twists = grid.coefficients[:, rows, columns]
+        xi = u - columns
+        eta = v - rows
+        return np.asarray(constants + slopes_x * xi + (slopes_y + twists * xi) * eta)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of cells exactly.
+        """Compute mass, first moments and polar moment of each cell exactly.
 
         Parameters
         ----------
@@ -180,15 +193,16 @@ class Raster(Density):
         Returns
         -------
         (n, 4) array, m², m³, m³ and m⁴
+            See `Density.compute_moments`.
         """
         grid = _build_grid(self)
         offsets = origins - grid.origin
-        edge_offsets = offsets[edges.cell]
+        edge_offsets = offsets[edges.cells]
         integrals = _integrate_cells(
             grid,
-            (edges.start + edge_offsets) / grid.step,
-            (edges.end + edge_offsets) / grid.step,
-            edges.cell,
+            (edges.starts + edge_offsets) / grid.step,
+            (edges.ends + edge_offsets) / grid.step,
+            edges.cells,
             len(origins),
         )
         # Convert the integrals of φ times 1, u, v, u² and v² from grid steps to meters.
@@ -199,26 +213,29 @@ class Raster(Density):
         y = integrals[:, _V] * step_y
         xx = integrals[:, _UU] * (step_x * step_x)
         yy = integrals[:, _VV] * (step_y * step_y)
-        # Convert moments about the origin of the grid to moments about the origins of the cells, at offsets a
-        # from there: the integral of (x - a)² is that of x² - a (2 x - a).
+        # Convert moments about the origin of the grid to moments about the origins of the cells. If the
+        # origin of a cell is at the offset a, the integral of (x - a)² is that of x² - a (2 x - a).
         offset_x, offset_y = offsets.T
         polar = xx - offset_x * (2.0 * x - offset_x * mass) + yy - offset_y * (2.0 * y - offset_y * mass)
         return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
 
 
 def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
-    """Sample a density at the centers of pixels, and return it as a bilinear raster.
+    """Sample a density at the centers of pixels.
 
     Parameters
     ----------
     density : Density or None
-        None means 1 everywhere.
+        The density; None means 1 everywhere.
     extent : (x_min, y_min, x_max, y_max), m
+        Extent of the image.
     columns, rows : int
+        Number of columns and rows of the image.
 
     Returns
     -------
     Raster
+        A bilinear raster with these values.
     """
     x_min, y_min, x_max, y_max = extent
     x = x_min + (np.arange(columns) + 0.5) * ((x_max - x_min) / columns)
@@ -229,20 +246,24 @@ def sample_density(density: Density | None, extent: Iterable[float], columns: in
 
 
 class _Grid(NamedTuple):
-    """A density that is bilinear in each square of a grid, and integrals of it.
+    """A density φ that is bilinear in each square of a grid, and its integrals along rows.
 
-    u and v are coordinates in steps of the grid, from its lower left corner. In the square of column i and
-    row j, the density is ``constant + slope_x ξ + slope_y η + twist ξ η``, with ξ = u - i and η = v - j from
-    0 to 1. The outermost squares extend to infinity; their slopes and twists are chosen so that the density
-    is constant outwards.
+    The coordinates u and v are in steps of the grid, from its lower left corner. In the square of column i
+    and row j, the density is ``constant + slope_x ξ + slope_y η + twist ξ η``, with ξ = u - i and η = v - j
+    from 0 to 1. The outermost squares extend to infinity. Their slopes and twists are such that the density
+    is constant in the outward direction.
 
     Attributes
     ----------
-    origin, step : (2,) arrays, m
+    origin : (2,) array, m
+        Lower left corner of the grid.
+    step : (2,) array, m
+        Width and height of a square.
     coefficients : (4, rows, columns) array
-        Constants, slopes in x, slopes in y, and twists; see `_CONSTANT` and the following constants.
+        Coefficients of each square; for the rows, see `_CONSTANT` and the following constants.
     left : (3, rows, columns) array
-        Integrals of φ, u φ and u² φ along a row, from the left side of the grid to each square, at η = 0.
+        Integrals along a row, at η = 0, from the left side of the grid to each square. For the rows of this
+        array, see `_TIMES_ONE` and the following constants.
     left_change : (3, rows, columns) array
         Change of these integrals from η = 0 to η = 1. In between, they are linear in η.
     """
@@ -265,16 +286,16 @@ class _Edge(NamedTuple):
 
 @lru_cache(maxsize=_MAX_CACHED_GRIDS)
 def _build_grid(raster: Raster) -> _Grid:
-    """Build the grid of a raster, in whose squares the density is a polynomial.
+    """Build the grid of a raster.
 
-    For the interpolation "cells", the squares are the pixels, and the density is constant in each. For
-    "bilinear", they lie between the centers of four pixels.
+    With the interpolation "cells", the squares of the grid are the pixels, and the density is constant in
+    each. With "bilinear", the corners of each square are the centers of four pixels.
     """
     values = raster.values
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # Beyond the image, the pixels of its border are repeated.
+        # Around the image, the border pixels are repeated.
         padded = np.pad(values, 1, mode="edge")
         lower_left = padded[:-1, :-1]
         lower_right = padded[:-1, 1:]
@@ -290,8 +311,8 @@ def _build_grid(raster: Raster) -> _Grid:
         slope_x = np.zeros_like(values)
         slope_y = np.zeros_like(values)
         twist = np.zeros_like(values)
-    # φ = (constant + slope_x ξ) + η (slope_y + twist ξ): the first term is φ at η = 0, and the second one its
-    # change to η = 1.
+    # φ = (constant + slope_x ξ) + η (slope_y + twist ξ). The first term is φ at η = 0, and the factor of η is
+    # the change of φ from η = 0 to η = 1.
     return _Grid(
         origin=origin,
         step=step,
@@ -302,72 +323,76 @@ def _build_grid(raster: Raster) -> _Grid:
 
 
 def _integrate_rows(start: Array, slope: Array) -> Array:
-    """Integrate f, u f and u² f along rows, from the left side of the grid to each square.
+    """Return the integrals of f, u f and u² f along rows, from the left side of the grid to each square.
 
-    In the square of column i, f is start + slope ξ, with u = i + ξ. The result is (3, rows, columns).
+    In the square of column i, f is start + slope ξ, with u = i + ξ. The result has the shape (3, rows,
+    columns).
     """
     i = np.arange(start.shape[1])
     # Integrals over ξ from 0 to 1 of f, ξ f and ξ² f.
     zeroth = start + slope / 2
     first = start / 2 + slope / 3
     second = start / 3 + slope / 4
-    squares = np.stack([zeroth, i * zeroth + first, i * i * zeroth + 2 * i * first + second])
-    left = np.zeros_like(squares)
-    np.cumsum(squares[..., :-1], axis=-1, out=left[..., 1:])
+    square_integrals = np.stack([zeroth, i * zeroth + first, i * i * zeroth + 2 * i * first + second])
+    left = np.zeros_like(square_integrals)
+    np.cumsum(square_integrals[..., :-1], axis=-1, out=left[..., 1:])
     return left
 
 
 @kernel
-def _integrate_cells(grid: _Grid, start: Array, end: Array, cell: IntArray, cell_count: int) -> Array:
+def _integrate_cells(grid: _Grid, starts: Array, ends: Array, cells: IntArray, cell_count: int) -> Array:
     """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges in grid steps.
 
-    With P(u, v) the integral of φ at height v from the left side of the image to u, the integral of φ over a
-    polygon is that of P dv along its edges. P is a prefix sum over squares and a polynomial within a square.
-    Each edge is therefore split where it crosses into another square, and the Gauss rule is exact on each
-    section.
+    Let P(u, v) be the integral of φ along the row at height v, from the left side of the image to u. By
+    Green's theorem, the integral of φ over a cell is the integral of P dv along its edges. In a square of the
+    grid, P is the sum of the integrals over the squares to the left and of a polynomial. Each edge is
+    therefore divided into sections that lie in one square each. The Gauss rule is exact on each section.
     """
-    _, rows, columns = grid.coefficients.shape
+    _, row_count, column_count = grid.coefficients.shape
     sums = np.zeros((cell_count, _INTEGRAL_COLUMNS))
-    for e in range(len(cell)):
-        edge = _Edge(start[e, 0], start[e, 1], end[e, 0] - start[e, 0], end[e, 1] - start[e, 1])
+    for e in range(len(cells)):
+        edge = _Edge(starts[e, 0], starts[e, 1], ends[e, 0] - starts[e, 0], ends[e, 1] - starts[e, 1])
         if edge.dv == 0.0:
             # Along a horizontal edge, P dv is zero.
             continue
-        line_u = _find_first_line(edge.u, edge.du, columns)
-        line_v = _find_first_line(edge.v, edge.dv, rows)
+        # The next vertical and horizontal grid lines that the edge crosses, and t, the fraction of the edge
+        # that has been integrated.
+        line_u = _find_first_line(edge.u, edge.du, column_count)
+        line_v = _find_first_line(edge.v, edge.dv, row_count)
         t = 0.0
         while t < 1.0:
-            next_u = _find_crossing(line_u, edge.u, edge.du, columns)
-            next_v = _find_crossing(line_v, edge.v, edge.dv, rows)
-            # The section ends where the edge crosses the next grid line, or at its end.
+            next_u = _find_crossing(line_u, edge.u, edge.du, column_count)
+            next_v = _find_crossing(line_v, edge.v, edge.dv, row_count)
+            # The section ends where the edge crosses the next grid line, or where the edge ends.
             section_end = max(min(next_u, next_v, 1.0), t)
             if next_u <= section_end:
                 line_u += 1 if edge.du > 0.0 else -1
             if next_v <= section_end:
                 line_v += 1 if edge.dv > 0.0 else -1
-            _add_section(sums, cell[e], grid, edge, t, section_end)
+            _add_section(sums, cells[e], grid, edge, t, section_end)
             t = section_end
     return sums
 
 
 @inlined_kernel
-def _add_section(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, end: float) -> None:
-    """Add the contribution of a section of an edge, within one square of the grid, to the sums of cell k.
+def _add_section(sums: Array, cell: int, grid: _Grid, edge: _Edge, start: float, end: float) -> None:
+    """Add the contribution of a section of an edge, within one square of the grid, to the sums of a cell.
 
     The section runs from t = start to t = end, where t goes from 0 to 1 along the edge. By Green's theorem,
-    the integral of φ over a cell is that of P dv along its edges, with P the integral of φ along the row at
-    height v, from the left side of the image to the edge. P is a sum over the squares to the left, in
-    `grid.left`, plus an integral within the square. The same holds for φ times u and u²; v is constant along
-    a row. The Gauss rule with three nodes is exact for these polynomials.
+    the integral of φ over a cell is the integral of P dv along its edges, where P is the integral of φ along
+    the row at height v, from the left side of the image to the edge. P is the sum of the integrals over the
+    squares to the left, in `grid.left`, and of an integral within the square. The same holds for φ u and φ
+    u². For φ v and φ v², P is multiplied by v or v², which are constant along a row. The Gauss rule with
+    three nodes is exact for these polynomials.
     """
     coefficients = grid.coefficients
     left = grid.left
     left_change = grid.left_change
-    _, rows, columns = coefficients.shape
+    _, row_count, column_count = coefficients.shape
     # The square, in column i and row j, that contains the middle of the section.
     middle = 0.5 * (start + end)
-    i = min(max(int(np.floor(edge.u + middle * edge.du)), 0), columns - 1)
-    j = min(max(int(np.floor(edge.v + middle * edge.dv)), 0), rows - 1)
+    i = min(max(int(np.floor(edge.u + middle * edge.du)), 0), column_count - 1)
+    j = min(max(int(np.floor(edge.v + middle * edge.dv)), 0), row_count - 1)
     constant = coefficients[_CONSTANT, j, i]
     slope_x = coefficients[_SLOPE_X, j, i]
     slope_y = coefficients[_SLOPE_Y, j, i]
@@ -379,42 +404,47 @@ def _add_section(sums: Array, k: int, grid: _Grid, edge: _Edge, start: float, en
         v = edge.v + t * edge.dv
         xi = edge.u + t * edge.du - i
         eta = v - j
-        # Along the row, at the given η, φ is row_start + row_slope ξ. The integrals of φ times 1, ξ and ξ²
-        # start at the left side of the square.
+        # Along the row at this η, φ is row_start + row_slope ξ. These are the integrals of φ, φ ξ and φ ξ²
+        # from the left side of the square.
         row_start = constant + slope_y * eta
         row_slope = slope_x + twist * eta
         zeroth = xi * (row_start + xi * row_slope / 2.0)
         first = xi * xi * (row_start / 2.0 + xi * row_slope / 3.0)
         second = xi * xi * xi * (row_start / 3.0 + xi * row_slope / 4.0)
-        # The integrals of φ times 1, u and u² start at the left side of the image.
+        # The integrals of φ, φ u and φ u² from the left side of the image to the square, and to the edge.
         left_one = left[_TIMES_ONE, j, i] + eta * left_change[_TIMES_ONE, j, i]
         left_u = left[_TIMES_U, j, i] + eta * left_change[_TIMES_U, j, i]
         left_uu = left[_TIMES_UU, j, i] + eta * left_change[_TIMES_UU, j, i]
         row_one = left_one + zeroth
         row_u = left_u + i * zeroth + first
         row_uu = left_uu + i * (i * zeroth + 2.0 * first) + second
-        sums[k, _ONE] += weight * row_one
-        sums[k, _U] += weight * row_u
-        sums[k, _V] += weight * v * row_one
-        sums[k, _UU] += weight * row_uu
-        sums[k, _VV] += weight * v * v * row_one
+        sums[cell, _ONE] += weight * row_one
+        sums[cell, _U] += weight * row_u
+        sums[cell, _V] += weight * v * row_one
+        sums[cell, _UU] += weight * row_uu
+        sums[cell, _VV] += weight * v * v * row_one
 
 
 @kernel
-def _find_first_line(start: float, step: float, line_count: int) -> int:
-    """Return the first inner grid line that is crossed from coordinate `start` in the direction of `step`."""
-    if step > 0.0:
-        return int(max(np.floor(start) + 1.0, 1.0))
-    return int(min(np.ceil(start), float(line_count)) - 1.0)
+def _find_first_line(start: float, change: float, square_count: int) -> int:
+    """Return the first inner grid line that an edge crosses, for vertical or for horizontal lines.
 
-
-@kernel
-def _find_crossing(line: int, start: float, step: float, line_count: int) -> float:
-    """Return the fraction of an edge at which it crosses a grid line; inf unless that is an inner line.
-
-    `start` is the coordinate of the start of the edge across the lines, and `step` the change to its end. The
-    outermost squares extend to infinity, so that the first and the last line are not crossed.
+    `start` is the coordinate at which the edge starts, and `change` the change of this coordinate to its end.
+    There are `square_count` squares side by side, and the inner lines are between them, from 1 up to that
+    number.
     """
-    if 0 < line < line_count and step != 0.0:
-        return (line - start) / step
+    if change > 0.0:
+        return int(max(np.floor(start) + 1.0, 1.0))
+    return int(min(np.ceil(start), float(square_count)) - 1.0)
+
+
+@kernel
+def _find_crossing(line: int, start: float, change: float, square_count: int) -> float:
+    """Return the fraction of an edge at which it crosses a grid line; inf if that is not an inner line.
+
+    The parameters are those of `_find_first_line`. The outermost squares extend to infinity, so that only the
+    lines between squares count.
+    """
+    if 0 < line < square_count and change != 0.0:
+        return (line - start) / change
     return np.inf

@@ -1,8 +1,9 @@
 """Exact shortest distances and paths in the free space of a map: the geodesic distance of equation (22).
 
 `Geodesics` computes distances and paths. It searches a graph of the corners that see each other
-(`corner_graph`). An index of the walls around a point (`angular_index`) tells quickly what the point sees.
-Walls and corners (`walls`) have integer coordinates (`grid`), so that visibility does not depend on rounding.
+(`corner_graph`). With an index of the walls around a point (`angular_index`), visibility from the point is
+quickly tested. Walls and corners (`walls`) have integer coordinates (`grid`), so that visibility does not
+depend on rounding.
 """
 
 from robocov.geodesic.geodesics import Geodesics

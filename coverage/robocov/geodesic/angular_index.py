@@ -2,7 +2,7 @@
 
 The directions from a source are divided into angular bins. Each bin has a list of the walls that face the
 source in these directions. To test whether the source sees a point, only the walls in one bin are examined,
-and mostly none: all points up to the *clear distance* of a bin are visible, and all points beyond its
+and in most cases none: all points up to the *clear distance* of a bin are visible, and all points beyond its
 *horizon* are hidden.
 
 A wall from a to b, with free space on its left, hides a point q from a source p if and only if p is not

@@ -64,12 +64,12 @@ def build_box_tree(low: Array, high: Array) -> Array:
     return np.concatenate([unused_row, *levels]) * [1.0, 1.0, -1.0, -1.0]
 
 
-def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
+def compute_z_order(columns: IntArray, rows: IntArray) -> IntArray:
     """Compute the positions of cells along a Z-order curve, which mostly puts neighbors close together.
 
     Parameters
     ----------
-    column, row : (n,) int array
+    columns, rows : (n,) int array
         Coordinates of the cells, from 0 to ``2**Z_ORDER_BITS - 1``.
 
     Returns
@@ -83,11 +83,11 @@ def compute_z_order(column: IntArray, row: IntArray) -> IntArray:
     array([0, 1, 2, 3])
     """
     # Interleave the bits of both coordinates.
-    key = np.zeros(len(column), dtype=np.int64)
+    keys = np.zeros(len(columns), dtype=np.int64)
     for bit in range(Z_ORDER_BITS):
-        key |= ((column >> bit) & 1) << (2 * bit)
-        key |= ((row >> bit) & 1) << (2 * bit + 1)
-    return key
+        keys |= ((columns >> bit) & 1) << (2 * bit)
+        keys |= ((rows >> bit) & 1) << (2 * bit + 1)
+    return keys
 
 
 @kernel

@@ -53,8 +53,8 @@ class CornerComputation(Protocol):
     """A function that computes rows of two tables for the corners from `first` up to `end`.
 
     It writes whole numbers, such as the indices of corners, to the rows of `indices`, and lengths to the same
-    rows of `lengths`. The function decides what the columns mean. It returns the number of rows that it has
-    written, or `NO_SPACE` if these tables or the wall index are too small.
+    rows of `lengths`. The function decides on the meaning of the columns. It returns the number of rows that
+    it has written, or `NO_SPACE` if these tables or the wall index are too small.
     """
 
     def __call__(

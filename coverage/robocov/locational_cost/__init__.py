@@ -1,9 +1,9 @@
 """The locational cost (4) of cells, its derivatives, and its optima.
 
-- `performance`: the functions f of the distance that the cost integrates
+- `performance`: the functions f of the distance, whose integral over a cell is the cost
 - `integrals`: the cost, its gradient (11) and its Hessian, for density 1
-- `weighted_derivatives`: gradient and Hessian for any density, by quadrature
-- `best_points`: the best point of each cell, which is the target of its robot
+- `weighted_derivatives`: the gradient and the Hessian for any density, by quadrature
+- `best_points`: the point of each cell with the best cost, which is the target of its robot
 """
 
 from robocov.locational_cost.integrals import (

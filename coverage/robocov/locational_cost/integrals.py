@@ -1,17 +1,19 @@
 """The locational cost (4) of cells, its gradient (11) and its Hessian, for density 1.
 
-All are integrals over the boundary of a cell. By the divergence theorem
+All three are sums over the edges of a cell. The point p may lie anywhere. By the divergence theorem, the
+gradient is
 
     ∂/∂p ∫_V f(|q-p|) dq = -∮_∂V f(|q-p|) n dq ,      n the outward unit normal,
 
-so that an edge adds -n ∫ f(√(s²+d²)) ds: d is the distance from p to the edge's line, and s runs from the
-foot of the perpendicular along the edge. For f = 1/(r²+h²) that is Δ/w with w² = d²+h² and Δ the angle
-atan(s₂/w) - atan(s₁/w): equations (15)-(20) of the paper, without its special case for vertical edges, and
-without the second integral of (18), which is printed with the wrong sign but sums to zero around a cell. The
-cost itself is a sum over the triangles that p spans with the edges. p may lie anywhere.
+so that an edge adds -n ∫ f(√(s²+d²)) ds. Here d is the distance of p from the line of the edge, and s is the
+coordinate along the edge, from s₁ to s₂, which is zero at the foot of the perpendicular from p. With
+w² = d²+h² and the angle Δ = atan(s₂/w) - atan(s₁/w), the integral is Δ/w for f = 1/(r²+h²). These are
+equations (15)-(20) of the paper, without its special case for vertical edges, and without the second integral
+of (18), which is printed with the wrong sign but sums to zero around a cell. The cost itself is a sum over
+the triangles between p and the edges.
 
-Sums are formed in the order of a cell's edges, so that the results for a cell do not depend on other cells,
-to the last bit.
+The terms are added in the order of the edges of a cell, so that the result for a cell does not depend on
+other cells, to the last bit.
 """
 
 from typing import NamedTuple
@@ -24,13 +26,14 @@ from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost.performance import DISTANCE, SQUARED_DISTANCE, Performance
 
 _GAUSS_RULE = np.stack(np.polynomial.legendre.leggauss(16))
-"""Nodes, in the first row, and weights on [-1, 1]."""
+"""Gauss-Legendre rule with 16 nodes on [-1, 1]: the nodes, then the weights."""
 _NODES = 0
+"""Row of `_GAUSS_RULE` that contains the nodes."""
 _WEIGHTS = 1
-"""Rows of `_GAUSS_RULE`."""
+"""Row of `_GAUSS_RULE` that contains the weights."""
 _PANEL_LENGTH = 2.0
-"""Length of a panel of the quadrature in τ, where s = w sinh τ. The integrand is analytic for |Im τ| < π/2,
-and 16 nodes per panel leave less than a rounding error."""
+"""Maximum length of a panel of the quadrature in τ, where s = w sinh τ. The integrand is analytic for |Im τ|
+< π/2, so that with 16 nodes per panel, the error is less than that of rounding."""
 _MIN_RELATIVE_LENGTH = 1e-12
 """Lengths of edges up to this fraction of half the perimeter of the cell may be rounding errors."""
 _MIN_LENGTH_M = 1e-300
@@ -38,23 +41,26 @@ _MIN_LENGTH_M = 1e-300
 _MAX_SERIES_SQUARE = 0.0625
 """Square of x below which x - atan x is computed from a series."""
 _SERIES_TERMS = 15
-"""Number of terms of that series, which leave less than a rounding error."""
+"""Number of terms of that series, with which the error is less than that of rounding."""
 
 
 class CellDerivatives(NamedTuple):
-    """Derivatives of the locational cost with respect to the points, and shapes of the cells, (n,) each.
+    """Derivatives of the locational costs of n cells with respect to their points, and shapes of the cells.
 
     Attributes
     ----------
-    x, y : gradient
-    xx, xy, yy : Hessian
-    clearance : m
-        Distance of the point from the boundary of its cell: negative outside the cell, 0 if the cell is
-        empty. In a cell that is not convex, it is the distance from the boundary of the part from which
-        all of the cell is visible.
-    half_perimeter : m
-        Half of the perimeter, which is at least the diameter.
-    area : m²
+    x, y : (n,) array
+        Components of the gradients.
+    xx, xy, yy : (n,) array
+        Entries of the Hessians.
+    clearances : (n,) array, m
+        Distance of each point from the boundary of its cell: negative outside the cell, 0 if the cell is
+        empty. If the cell is not convex, it is the distance from the boundary of its kernel, which consists
+        of the points from which the whole cell is visible.
+    half_perimeters : (n,) array, m
+        Half of the perimeter of each cell, which is an upper bound on its diameter.
+    areas : (n,) array, m²
+        Area of each cell.
     """
 
     x: Array
@@ -62,34 +68,35 @@ class CellDerivatives(NamedTuple):
     xx: Array
     xy: Array
     yy: Array
-    clearance: Array
-    half_perimeter: Array
-    area: Array
+    clearances: Array
+    half_perimeters: Array
+    areas: Array
 
 
 class _RelativeEdge(NamedTuple):
-    """An edge relative to a point.
-
-    In the symbols of the module docstring, `distance` is d, which is negative if the point lies on the outer
-    side of the edge, and `start` is s₁.
-    """
+    """An edge relative to a point p. For s and d, see the description of the module."""
 
     normal_x: float
+    """x of the outward unit normal n."""
     normal_y: float
+    """y of the outward unit normal n."""
     length: float
+    """Length of the edge, m."""
     distance: float
+    """Distance d of p from the line of the edge, m; negative if p lies on the outer side."""
     start: float
+    """Coordinate s₁ of the start of the edge, m."""
 
 
 class _EdgeIntegral(NamedTuple):
-    """Integrals along an edge, in the symbols of the module docstring."""
+    """Integrals along an edge. For s and d, see the description of the module."""
 
     total: float
     """∫ f ds"""
     along: float
-    """∫ f'(r)/r s ds, the derivative of `total` as the point moves backwards along the edge."""
+    """∫ f'(r)/r s ds, the derivative of `total` if s₁ and s₂ grow by the same amount."""
     across: float
-    """∫ f'(r)/r d ds, the derivative of `total` with respect to the distance d."""
+    """∫ f'(r)/r d ds, the derivative of `total` with respect to d."""
 
 
 def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) -> Array:
@@ -102,11 +109,12 @@ def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) ->
     points : (n, 2) array, m
         Point p of each cell, relative to the generator of the cell.
     f : Performance
+        The function f of the distance.
 
     Returns
     -------
     (n,) array
-        ∫ f(|q-p|) dq over each cell.
+        Integral of f(|q-p|) over the points q of each cell.
 
     Examples
     --------
@@ -118,11 +126,13 @@ def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) ->
     array([2.666667])
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    return _sum_edge_costs(edges.start, edges.end, edges.cell, points, f.kind, f.height, _GAUSS_RULE)
+    return _sum_edge_costs(edges.starts, edges.ends, edges.cells, points, f.kind, f.height, _GAUSS_RULE)
 
 
 def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
-    """Compute the gradients of the locational costs of cells with respect to their points.
+    """Compute the gradient of the locational cost of each cell with respect to its point, for density 1.
+
+    The cells do not move with the points.
 
     Parameters
     ----------
@@ -135,18 +145,18 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
 
     Notes
     -----
-    At the generators this is equation (11) of the paper (the numbers are those of its equations). The cells
-    move with their generators. Nevertheless, this is also the gradient of the sum of all costs: what a moving
-    boundary adds to one cell, it takes from the other, (8)-(10).
+    If the points are the generators, this is equation (11) of the paper. Although the cells change if the
+    generators move, this is then also the gradient of the sum of all costs: what a moving boundary adds to
+    the cost of one cell, it takes from that of the other, (8)-(10).
     """
     derivatives = compute_derivatives(edges, points, f)
     return np.column_stack([derivatives.x, derivatives.y])
 
 
 def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> CellDerivatives:
-    """Compute gradients and Hessians of the locational costs of cells with respect to their points.
+    """Compute the derivatives of the locational cost of each cell with respect to its point, for density 1.
 
-    The cells do not move.
+    The cells do not move with the points.
 
     Parameters
     ----------
@@ -156,21 +166,22 @@ def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> Cell
     Returns
     -------
     CellDerivatives
+        Gradients and Hessians, and the shapes of the cells.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    return _sum_derivatives(edges.start, edges.end, edges.cell, points, f.kind, f.height)
+    return _sum_derivatives(edges.starts, edges.ends, edges.cells, points, f.kind, f.height)
 
 
 @kernel
 def _sum_derivatives(
-    start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float
+    starts: Array, ends: Array, cells: IntArray, points: Array, kind: int, height: float
 ) -> CellDerivatives:
     """Return the gradients and Hessians of the costs, and the shapes of the cells.
 
     By the divergence theorem, the gradient of ∫ f(|q-p|) dq over a cell, with respect to p, is the sum of
-    -n ∫ f ds over its edges, with n the outward unit normal of an edge. The Hessian is the derivative of that
-    sum. It follows from the derivatives of ∫ f ds as p moves along the edge, and across it. The edges are
-    sorted by cell.
+    -n ∫ f ds over its edges, where n is the outward unit normal of an edge. The Hessian is the derivative of
+    this sum, and follows from the derivatives of ∫ f ds if p moves along the edge or perpendicular to it. The
+    edges are sorted by cell.
     """
     n = len(points)
     sums = CellDerivatives(
@@ -179,9 +190,9 @@ def _sum_derivatives(
         xx=np.zeros(n),
         xy=np.zeros(n),
         yy=np.zeros(n),
-        clearance=np.zeros(n),
-        half_perimeter=np.zeros(n),
-        area=np.zeros(n),
+        clearances=np.zeros(n),
+        half_perimeters=np.zeros(n),
+        areas=np.zeros(n),
     )
     end_edge = 0
     for i in range(n):
@@ -189,20 +200,22 @@ def _sum_derivatives(
         y = points[i, 1]
         first_edge = end_edge
         half_perimeter = 0.0
-        while end_edge < len(cell) and cell[end_edge] == i:
-            half_perimeter += 0.5 * _compute_relative_edge(start, end, end_edge, x, y).length
+        while end_edge < len(cells) and cells[end_edge] == i:
+            half_perimeter += 0.5 * _compute_relative_edge(starts, ends, end_edge, x, y).length
             end_edge += 1
         clearance = np.inf
         for k in range(first_edge, end_edge):
-            edge = _compute_relative_edge(start, end, k, x, y)
+            edge = _compute_relative_edge(starts, ends, k, x, y)
             integral = _integrate_edge(kind, height, edge, half_perimeter)
             _add_edge(sums, i, edge, integral)
-            sums.area[i] += 0.5 * edge.length * (edge.distance + x * edge.normal_x + y * edge.normal_y)
+            # The area of the triangle between the generator and the edge. The sum in parentheses is the
+            # distance of the generator from the edge.
+            sums.areas[i] += 0.5 * edge.length * (edge.distance + x * edge.normal_x + y * edge.normal_y)
             # If an edge is as short as a rounding error, its direction is meaningless.
             if edge.length > _MIN_RELATIVE_LENGTH * half_perimeter:
                 clearance = min(clearance, edge.distance)
-        sums.clearance[i] = clearance if first_edge < end_edge else 0.0
-        sums.half_perimeter[i] = half_perimeter
+        sums.clearances[i] = clearance if first_edge < end_edge else 0.0
+        sums.half_perimeters[i] = half_perimeter
     return sums
 
 
@@ -210,9 +223,9 @@ def _sum_derivatives(
 def _add_edge(sums: CellDerivatives, i: int, edge: _RelativeEdge, integral: _EdgeIntegral) -> None:
     """Add the contribution of an edge to the gradient and the Hessian of cell i.
 
-    With the integral `total`, the normal n and the tangent t = (-n_y, n_x), an edge adds -n total to the
-    gradient. When the point moves by δ, d changes by -n·δ, and s by -t·δ, so that the edge adds
-    n (across n + along t)ᵀ to the Hessian.
+    With the normal n, the edge adds -n total to the gradient. If the point moves by δ, d changes by -n·δ, and
+    s by -t·δ, where t = (-n_y, n_x) is the direction of the edge. The edge therefore adds n (across n + along
+    t)ᵀ to the Hessian.
     """
     nx = edge.normal_x
     ny = edge.normal_y
@@ -228,26 +241,25 @@ def _add_edge(sums: CellDerivatives, i: int, edge: _RelativeEdge, integral: _Edg
 
 
 @kernel
-def _compute_relative_edge(start: Array, end: Array, k: int, x: float, y: float) -> _RelativeEdge:
-    """Return edge k in the frame of a point (x, y): its outward normal, length, distance and start.
-
-    The distance is that of the point from the edge's line, negative beyond it. s1 is the coordinate of the
-    start along the edge, from the foot of the perpendicular through the point.
-    """
-    along_x = end[k, 0] - start[k, 0]
-    along_y = end[k, 1] - start[k, 1]
+def _compute_relative_edge(starts: Array, ends: Array, k: int, x: float, y: float) -> _RelativeEdge:
+    """Return edge k relative to the point (x, y)."""
+    along_x = ends[k, 0] - starts[k, 0]
+    along_y = ends[k, 1] - starts[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
     inverse = 1.0 / max(length, _MIN_LENGTH_M)
     normal_x = along_y * inverse
     normal_y = -along_x * inverse
-    distance = start[k, 0] * normal_x + start[k, 1] * normal_y - (x * normal_x + y * normal_y)
-    s1 = start[k, 1] * normal_x - start[k, 0] * normal_y - (y * normal_x - x * normal_y)
+    distance = starts[k, 0] * normal_x + starts[k, 1] * normal_y - (x * normal_x + y * normal_y)
+    s1 = starts[k, 1] * normal_x - starts[k, 0] * normal_y - (y * normal_x - x * normal_y)
     return _RelativeEdge(normal_x, normal_y, length, distance, start=s1)
 
 
 @kernel
 def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimeter: float) -> _EdgeIntegral:
-    """Return the integrals over an edge, for the performance function of the given kind."""
+    """Return the integrals along an edge for the function f of the given kind.
+
+    `height` and `half_perimeter`, that of the cell, are needed only for `Sensing`.
+    """
     if kind == SQUARED_DISTANCE:
         return _integrate_squared_distance(edge)
     if kind == DISTANCE:
@@ -257,7 +269,7 @@ def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimete
 
 @kernel
 def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
-    """Return the integrals over an edge for f = r², with r² = s² + d², s from s1 to s2 along the edge."""
+    """Return the integrals along an edge for f = r², where r² = s² + d², and s runs from s1 to s2."""
     d = edge.distance
     s1 = edge.start
     s2 = edge.start + edge.length
@@ -269,7 +281,7 @@ def _integrate_squared_distance(edge: _RelativeEdge) -> _EdgeIntegral:
 
 @kernel
 def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
-    """Return the integrals over an edge for f = r, with r² = s² + d², s from s1 to s2 along the edge."""
+    """Return the integrals along an edge for f = r, where r² = s² + d², and s runs from s1 to s2."""
     d = edge.distance
     s1 = edge.start
     s2 = edge.start + edge.length
@@ -282,11 +294,11 @@ def _integrate_distance(edge: _RelativeEdge) -> _EdgeIntegral:
 
 @kernel
 def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float) -> _EdgeIntegral:
-    """Return the integrals over an edge for f = 1/(r²+h²), or for f - 1/h².
+    """Return the integrals along an edge for f = 1/(r²+h²), or for f - 1/h² if the cell is small.
 
-    With r² = s² + d², s from s1 to s2 along the edge, and w² = d² + h², the integral of f over the edge is
-    (atan(s2/w) - atan(s1/w)) / w. A constant that is the same for all edges of a cell may be subtracted from
-    f: the sum over all edges around the cell remains the same.
+    Let r² = s² + d², where s runs from s1 to s2, and w² = d² + h². The integral of f along the edge is then
+    (atan(s2/w) - atan(s1/w)) / w. A constant may be subtracted from f, if it is the same for all edges of a
+    cell, because the sum of n ∫ ds over all edges is zero.
     """
     d = edge.distance
     s1 = edge.start
@@ -298,11 +310,13 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
     angle = np.arctan2(w * length, w * w + s1 * s2)
     total = angle / w
     if half_perimeter < height:
-        # From far above, f is nearly constant. Integrating f - 1/h² keeps the digits of its variation. With
-        # atan x = x - (x - atan x), the terms s/w² - s/h² are -s (d/w)² / h².
+        # In a cell that is small compared with the height, f is nearly constant. The integral of f - 1/h²
+        # does not lose the digits of the small variation. With atan x = x - (x - atan x), its leading terms
+        # are s/w² - s/h² = -s (d/w)² / h².
         remainder = _subtract_arctan(s2 / w) - _subtract_arctan(s1 / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
-    # The values of 1/f at both ends, and `along` as f(r₂) - f(r₁) without cancellation.
+    # The values of 1/f at both ends. From them, f(r2) - f(r1), which is `along`, follows without
+    # cancellation.
     r1 = np.sqrt(d * d + s1 * s1)
     r2 = np.sqrt(d * d + s2 * s2)
     inverse_f1 = r1 * r1 + squared_height
@@ -314,7 +328,7 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
 
 @kernel
 def _integrate_inverse(d: float, s1: float, s2: float) -> float:
-    """Return ∫ 1/r ds over an edge."""
+    """Return ∫ 1/r ds along an edge at the distance d, where r² = s² + d², and s runs from s1 to s2."""
     d = max(abs(d), _MIN_LENGTH_M)
     return float(np.arcsinh(s2 / d) - np.arcsinh(s1 / d))
 
@@ -325,7 +339,7 @@ def _subtract_arctan(x: float) -> float:
     square = x * x
     if square >= _MAX_SERIES_SQUARE:
         return float(x - np.arctan(x))
-    # The series is x³/3 - x⁵/5 + x⁷/7 ..., evaluated by Horner's method.
+    # The series x³/3 - x⁵/5 + x⁷/7 - ... is evaluated by Horner's method.
     series = 0.0
     for k in range(_SERIES_TERMS - 1, -1, -1):
         sign = 1.0 if k % 2 == 0 else -1.0
@@ -335,18 +349,18 @@ def _subtract_arctan(x: float) -> float:
 
 @kernel
 def _sum_edge_costs(
-    start: Array, end: Array, cell: IntArray, points: Array, kind: int, height: float, rule: Array
+    starts: Array, ends: Array, cells: IntArray, points: Array, kind: int, height: float, rule: Array
 ) -> Array:
-    """Return the cost of each cell: the sum of ∫ f over the triangles between its point and its edges.
+    """Return the cost of each cell: the sum of the integrals of f over the triangles between point and edges.
 
-    An edge is at the distance d from the point, and s runs along it from s1 to s2, so that r² = s² + d². With
-    F(r) the integral of f(ρ) ρ dρ from 0 to r, the integral over the triangle is d ∫ F(r)/r² ds. It is
-    negative if the point is on the outer side of the edge, where d is negative.
+    An edge is at the distance d from the point, and s runs along it from s1 to s2, so that r² = s² + d². Let
+    F(r) be the integral of f(ρ) ρ dρ from 0 to r. The integral over the triangle is then d ∫ F(r)/r² ds. It
+    is negative if the point is on the outer side of the edge, where d is negative.
     """
     sums = np.zeros(len(points))
-    for k in range(len(cell)):
-        i = cell[k]
-        edge = _compute_relative_edge(start, end, k, points[i, 0], points[i, 1])
+    for k in range(len(cells)):
+        i = cells[k]
+        edge = _compute_relative_edge(starts, ends, k, points[i, 0], points[i, 1])
         d = edge.distance
         s1 = edge.start
         s2 = s1 + edge.length
@@ -367,13 +381,12 @@ def _sum_edge_costs(
 
 @kernel
 def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, rule: Array) -> None:
-    """Add to sum i the integral of 1/(r²+h²) over the triangle of a point and an edge.
+    """Add to sum i the integral of 1/(r²+h²) over the triangle between a point and an edge.
 
-    With F(r) = ½ log(1 + r²/h²) the integral of r/(r²+h²) from 0 to r, this is the integral of d F(r)/r²
-    along the edge, with d the distance of its line from the point, r² = s² + d², and s the position along it.
-    It is computed by Gauss rules on panels of equal length in τ, where s = w sinh τ and w² = d² + h², which
-    is exact up to rounding. The closed form has dilogarithms, which cancel if the triangle is flat or the
-    height is large.
+    This is the integral of d F(r)/r² along the edge, where F(r) = ½ log(1 + r²/h²) is the integral of
+    ρ/(ρ²+h²) from 0 to r; for d, r and s, see `_sum_edge_costs`. With s = w sinh τ and w² = d² + h², it is
+    computed by Gauss rules on panels of equal length in τ, which is exact up to rounding. The closed form
+    consists of dilogarithms, which nearly cancel each other if the triangle is flat or the height is large.
     """
     d = edge.distance
     w = np.sqrt(d * d + height * height)

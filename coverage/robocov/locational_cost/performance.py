@@ -1,4 +1,4 @@
-"""The functions f of the distance that the locational cost (4) integrates."""
+"""The functions f of the distance, whose integral over a cell is the locational cost (4)."""
 
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
@@ -8,12 +8,12 @@ import numpy as np
 from robocov.errors import ParameterError, quote
 
 SQUARED_DISTANCE, DISTANCE, SENSING = range(3)
-"""Numbers by which kernels distinguish the functions."""
+"""Numbers by which kernels distinguish the functions f."""
 
 
 @dataclass(frozen=True)
 class SquaredDistance:
-    """f = r², equation (12), in m². Its optimum is the centroid, (13)."""
+    """The function f = r² of equation (12), in m². The best point of a cell is its centroid, (13)."""
 
     kind: ClassVar[int] = SQUARED_DISTANCE
     """Number of the function, for kernels."""
@@ -25,7 +25,7 @@ class SquaredDistance:
 
 @dataclass(frozen=True)
 class Distance:
-    """f = r, in m, as in the coverage cost (22) of a convex cell. Its optimum is the median."""
+    """The function f = r, in m, as in the coverage cost (22). The best point of a cell is its median."""
 
     kind: ClassVar[int] = DISTANCE
     sign: ClassVar[float] = 1.0
@@ -34,12 +34,12 @@ class Distance:
 
 @dataclass(frozen=True)
 class Sensing:
-    """f = 1/(r²+h²), equation (14), in 1/m²: how well a sensor at height h perceives a point.
+    """The function f = 1/(r²+h²) of equation (14), in 1/m²: how well a sensor at height h perceives a point.
 
     Parameters
     ----------
     height : float, m
-        h, above 0.
+        The height h of the sensor, above 0.
 
     Raises
     ------
@@ -48,8 +48,8 @@ class Sensing:
 
     Notes
     -----
-    Contrary to the remark after (14) in the paper, the optimum depends on the height: it is the centroid only
-    for h → ∞.
+    Contrary to the remark after (14) in the paper, the best point of a cell depends on the height: it is the
+    centroid only in the limit h → ∞.
     """
 
     kind: ClassVar[int] = SENSING

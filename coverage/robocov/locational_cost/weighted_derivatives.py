@@ -1,9 +1,9 @@
 """Gradient and Hessian of the locational cost for any density, by quadrature.
 
-A cell is divided into the triangles between the point p and the edges. In the coordinates
-q = p + u (e(t) - p), where e(t) runs along an edge, distance and direction from p are smooth, so that
-Gaussian quadrature converges quickly where φ is smooth. If φ jumps within a cell, the error is of the order
-of the distance between the nodes.
+A cell is divided into the triangles between the point p and the edges. A point of a triangle is q = p + u
+(e(t) - p), where e(t), with t from 0 to 1, runs along the edge, and u is 0 at p and 1 on the edge. In these
+coordinates, the distance and the direction from p are smooth functions, so that Gaussian quadrature converges
+quickly if φ is smooth. If φ jumps within a cell, the error is of the order of the distance between the nodes.
 """
 
 from typing import NamedTuple
@@ -16,17 +16,26 @@ from robocov.locational_cost.performance import Performance, Sensing
 from robocov.observation import Cells
 
 _NODES_ALONG = 16
-"""Nodes along an edge."""
+"""Number of nodes along an edge."""
 _NODES_OUTWARD = 12
-"""Nodes from the point to an edge."""
+"""Number of nodes from the point to an edge."""
 _MIN_SQUARED_DISTANCE = 1e-300
 """Smallest squared distance used as a divisor, which prevents division by zero, m²."""
 _MIN_RELATIVE_SIZE = 1e-3
-"""Size of a cell, relative to the height, below which the nodes are spread evenly: f hardly varies there."""
+"""Lower limit of the diameter of a cell in heights of the sensor. In smaller cells, f is nearly constant, so
+that the choice of the nodes does not matter."""
 
 
 class WeightedDerivatives(NamedTuple):
-    """Derivatives, with respect to the points, of the cost that is to be minimized, (n,) each."""
+    """Derivatives of the costs of n cells with respect to the points, if the costs are to be minimized.
+
+    Attributes
+    ----------
+    x, y : (n,) array
+        Components of the gradients.
+    xx, xy, yy : (n,) array
+        Entries of the Hessians.
+    """
 
     x: Array
     y: Array
@@ -35,95 +44,113 @@ class WeightedDerivatives(NamedTuple):
     yy: Array
 
 
-def compute_weighted_derivatives(
-    cells: Cells, density: Density, f: Performance, max_diameter: Array, points: Array, is_needed: BoolArray
-) -> WeightedDerivatives:
-    """Compute gradients and Hessians of weighted locational costs with respect to the points.
+class _Nodes(NamedTuple):
+    """The nodes of the quadrature in the triangles between e edges and the points of their cells."""
 
-    A cell is divided into the triangles between its point p and its edges. In a triangle, a node of the
-    quadrature is p + u (e(t) - p): t is its position along the edge e, and u, from 0 at p to 1 at the edge,
-    its position outward.
+    offsets: Array
+    """(e, 16, 12, 2) Offset of each node from the point, by node along the edge and by node outward, m."""
+    weights: Array
+    """(e, 16, 12) Weight of each node, m²."""
+
+
+def compute_weighted_derivatives(
+    cells: Cells, density: Density, f: Performance, max_diameters: Array, points: Array, is_needed: BoolArray
+) -> WeightedDerivatives:
+    """Compute the gradients and Hessians of weighted locational costs with respect to the points.
 
     Parameters
     ----------
     cells : Cells
         n cells.
     density : Density
+        The density φ.
     f : Performance
-        `Distance`, or `Sensing` with its sign reversed, so that the cost is to be minimized.
-    max_diameter : (n,) array, m
-        Upper bounds on the diameters of the cells.
+        The function f of the distance: `Distance` or `Sensing`. With `Sensing`, the derivatives are those of
+        minus the cost, which is to be minimized.
+    max_diameters : (n,) array, m
+        Upper bound on the diameter of each cell.
     points : (n, 2) array, m
-        Relative to the generators.
+        Point of each cell, relative to the generator.
     is_needed : (n,) bool array
-        Cells for which the derivatives are computed.
+        Whether the derivatives of each cell are computed.
 
     Returns
     -------
     WeightedDerivatives
-        Zero for the other cells.
+        Zero for cells whose derivatives are not needed.
     """
     edges = cells.edges
-    selected = np.flatnonzero(is_needed[edges.cell])
-    cell = edges.cell[selected]
-    t_nodes, t_weights = _build_gauss_rule(_NODES_ALONG)
-    u_nodes, u_weights = _build_outward_rule(f, max_diameter, cell)
-    start = edges.start[selected] - points[cell]
-    end = edges.end[selected] - points[cell]
-    # Offsets of the nodes from the point, by edge, node along it and node outward: (e, 16, 12, 2).
-    on_edge = start[:, None] + (end - start)[:, None] * t_nodes[:, None]
-    offset = on_edge[:, :, None, :] * u_nodes[:, None, :, None]
-    # The area element is twice the area of the triangle times u du dt; the weights of u include the factor u.
-    doubled_area = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
-    weight = doubled_area[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
-    positions = offset + (cells.generators + points)[cell][:, None, None]
-    weight = weight * density.evaluate(positions.reshape(-1, 2)).reshape(weight.shape)
-    dx = offset[..., 0]
-    dy = offset[..., 1]
-    # The cost to be minimized has f = r or f = -1/(r²+h²). Let c1 be the weight times f'(r)/r, where r² = dx²
-    # + dy², and c2 the weight times (f'(r)/r)'/r. Then the gradient of the integrand is -c1 (dx, dy), and its
-    # Hessian is c1 I + c2 (dx, dy)ᵀ (dx, dy).
+    selected = np.flatnonzero(is_needed[edges.cells])
+    edge_cells = edges.cells[selected]
+    starts = edges.starts[selected] - points[edge_cells]
+    ends = edges.ends[selected] - points[edge_cells]
+    u_nodes, u_weights = _build_outward_rule(f, max_diameters)
+    offsets, weights = _place_nodes(starts, ends, u_nodes[edge_cells], u_weights[edge_cells])
+    positions = offsets + (cells.generators + points)[edge_cells][:, None, None]
+    weights = weights * density.evaluate(positions.reshape(-1, 2)).reshape(weights.shape)
+    dx = offsets[..., 0]
+    dy = offsets[..., 1]
+    # The cost to be minimized has f = r or f = -1/(r²+h²), where r² = dx² + dy². With c1 = f'(r)/r and
+    # c2 = (f'(r)/r)'/r, the gradient of f with respect to the point is -c1 (dx, dy), and its Hessian is
+    # c1 I + c2 (dx, dy)ᵀ (dx, dy). Both are multiplied by the weight of the node.
     square = dx * dx + dy * dy
     if isinstance(f, Sensing):
         inverse = 1.0 / (square + f.height**2)
-        c1 = 2.0 * weight * inverse * inverse
-        c2 = -8.0 * weight * inverse * inverse * inverse
+        c1 = 2.0 * weights * inverse * inverse
+        c2 = -8.0 * weights * inverse * inverse * inverse
     else:
         inverse = 1.0 / np.sqrt(np.maximum(square, _MIN_SQUARED_DISTANCE))
-        c1 = weight * inverse
-        c2 = -weight * inverse * inverse * inverse
+        c1 = weights * inverse
+        c2 = -weights * inverse * inverse * inverse
     cell_count = len(points)
     return WeightedDerivatives(
-        x=_sum_by_cell(-c1 * dx, cell, cell_count),
-        y=_sum_by_cell(-c1 * dy, cell, cell_count),
-        xx=_sum_by_cell(c1 + c2 * dx * dx, cell, cell_count),
-        xy=_sum_by_cell(c2 * dx * dy, cell, cell_count),
-        yy=_sum_by_cell(c1 + c2 * dy * dy, cell, cell_count),
+        x=_sum_by_cell(-c1 * dx, edge_cells, cell_count),
+        y=_sum_by_cell(-c1 * dy, edge_cells, cell_count),
+        xx=_sum_by_cell(c1 + c2 * dx * dx, edge_cells, cell_count),
+        xy=_sum_by_cell(c2 * dx * dy, edge_cells, cell_count),
+        yy=_sum_by_cell(c1 + c2 * dy * dy, edge_cells, cell_count),
     )
 
 
-def _build_gauss_rule(count: int) -> tuple[Array, Array]:
-    """Return nodes and weights of the Gauss-Legendre rule on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+def _place_nodes(starts: Array, ends: Array, u_nodes: Array, u_weights: Array) -> _Nodes:
+    """Return the nodes in the triangles between edges and the points of their cells.
+
+    The edges lead from `starts` to `ends`, (e, 2) m relative to the points. A node is on the segment from
+    the point to the point of the edge at the fraction t, at the fraction u of this segment. The nodes and the
+    weights of u are (e, 12) each.
+    """
+    t_nodes, t_weights = _build_gauss_rule(_NODES_ALONG)
+    on_edges = starts[:, None] + (ends - starts)[:, None] * t_nodes[:, None]
+    offsets = on_edges[:, :, None, :] * u_nodes[:, None, :, None]
+    # The area element is twice the area of the triangle times u du dt. The weights of u include the factor u.
+    doubled_areas = starts[:, 0] * ends[:, 1] - ends[:, 0] * starts[:, 1]
+    weights = doubled_areas[:, None, None] * t_weights[:, None] * u_weights[:, None, :]
+    return _Nodes(offsets, weights)
+
+
+def _build_gauss_rule(node_count: int) -> tuple[Array, Array]:
+    """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(node_count)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
-def _build_outward_rule(f: Performance, max_diameter: Array, cell: IntArray) -> tuple[Array, Array]:
-    """Return nodes u from the point to each edge, and their weights, (e, 12) each.
+def _build_outward_rule(f: Performance, max_diameters: Array) -> tuple[Array, Array]:
+    """Return the nodes u from the point of each cell to its edges, and their weights, (n, 12) each.
 
     The weights include the factor u of the area element. For `Sensing`, the rule is a Gauss rule in x, where
-    u = sinh(a x) / sinh(a): the steeper f is near the point, the more nodes lie there.
+    u = sinh(a x) / sinh(a). The larger a cell is compared with the height of the sensor, the closer the nodes
+    are to the point, because f is then steep there.
     """
     plain_nodes, plain_weights = _build_gauss_rule(_NODES_OUTWARD)
-    nodes = np.tile(plain_nodes, (len(max_diameter), 1))
-    weights = np.tile(plain_weights, (len(max_diameter), 1))
+    nodes = np.tile(plain_nodes, (len(max_diameters), 1))
+    weights = np.tile(plain_weights, (len(max_diameters), 1))
     if isinstance(f, Sensing):
-        a = np.arcsinh(np.maximum(max_diameter / f.height, _MIN_RELATIVE_SIZE))[:, None]
+        a = np.arcsinh(np.maximum(max_diameters / f.height, _MIN_RELATIVE_SIZE))[:, None]
         weights = weights * a * np.cosh(a * nodes) / np.sinh(a)
         nodes = np.sinh(a * nodes) / np.sinh(a)
-    return nodes[cell], (nodes * weights)[cell]
+    return nodes, nodes * weights
 
 
-def _sum_by_cell(integrand: Array, cell: IntArray, cell_count: int) -> Array:
-    """Return the sums of an integrand over the nodes of each cell, (n,)."""
-    return np.asarray(np.bincount(cell, integrand.sum(axis=(1, 2)), cell_count))
+def _sum_by_cell(integrand: Array, edge_cells: IntArray, cell_count: int) -> Array:
+    """Return the sum of an integrand, (e, 16, 12), over the nodes of each cell, (n,)."""
+    return np.asarray(np.bincount(edge_cells, integrand.sum(axis=(1, 2)), cell_count))

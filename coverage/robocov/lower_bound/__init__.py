@@ -4,9 +4,9 @@
 of distances (`price_table`). For these prices, it then proves an upper bound on the profit of a robot
 (`profit_bounds`).
 
-Minimizing the cost (22) means finding the positions p_i of n robots that minimize the sum of w_c min_i d(c,
-p_i) over the sites c, where w_c is the weight of site c and d the geodesic distance. This is a p-median
-problem. For any prices u_c of the sites, the sum is at least
+Minimizing the cost (22) means finding the positions p_1, ..., p_n of the robots for which the sum over the
+sites c of w_c min_i d(c, p_i) is smallest, where w_c is the weight of site c and d the geodesic distance.
+This is a p-median problem. For any prices u_c of the sites, the sum is at least
 
     sum_c w_c u_c - n max_p profit(p),    profit(p) = sum_c w_c max(0, u_c - d(c, p)),
 

@@ -74,8 +74,8 @@ possible position is lost.
 """
 
 _ROUNDING_ALLOWANCE = 1e-10
-"""By how much the bound is lowered to allow for rounding errors, per robot and site of weight 1, as a
-fraction of the map's size. It is far larger than all rounding errors."""
+"""Reduction of the bound that allows for rounding errors, per robot and site of weight 1, as a fraction of
+the map's size. It is far larger than all rounding errors."""
 
 _PROGRESS_BEFORE_TABLE = 0.1
 """Fraction of the work before the table of distances is built."""

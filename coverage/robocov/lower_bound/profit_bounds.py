@@ -185,8 +185,7 @@ def _add_site(
     dx = center.x - site_x
     dy = center.y - site_y
     straight_length = np.sqrt(dx * dx + dy * dy)
-    # No point of the triangle is farther than the radius from the center. If even a point that is nearer to
-    # the site by the radius is too far away, the site pays nothing in the whole triangle.
+    # The distance of every point of the triangle from the site is at least `straight_length - center.radius`.
     if straight_length - center.radius >= price:
         return 0.0
     # A site pays nothing to a robot at a distance of its price or more, so larger bounds make no difference.
@@ -235,8 +234,8 @@ def _apply_tangent_bound(
     triangle is therefore never larger than the length of the path from any other point, here from a vertex.
 
     The path from the center has the given length. Its first segment leads from the center to the point at
-    offset (-dx, -dy), and has the length `first_length`. The tangent rises with slope 1 in the direction (dx,
-    dy), away from the end of this segment.
+    offset (-dx, -dy), and has the length `first_length`. The tangent rises with slope 1 in the
+    direction (dx, dy), away from the end of this segment.
     """
     # If the segment has no length, (dx, dy) is zero, and the divisor does not matter.
     divisor = max(first_length, _MIN_SEGMENT_LENGTH)

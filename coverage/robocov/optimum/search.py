@@ -79,7 +79,7 @@ class Optimum:
     See Also
     --------
     find_optimum : Find the best positions for a team.
-    LowerBound : Proves how far a placement can be from the optimum.
+    LowerBound : A bound on the gap between a placement and the optimum.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def find_optimum(
 
     See Also
     --------
-    compute_lower_bound : Prove how far a placement can be from the optimum.
+    compute_lower_bound : Bound the gap between a placement and the optimum.
     CoverageCost : Evaluate a placement.
 
     Notes
@@ -382,7 +382,7 @@ class _Search:
     def _find_sources(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> IntArray:
         """Return the sources of the table that one restart finds, (n,), in ascending order.
 
-        There are three stages, each of which starts from the result of the previous one. Since the table only
+        There are three stages. Each starts from the result of the previous one. Since the table only
         approximates the cost, a later stage may make the exact cost higher. The sources of the stage with the
         lowest exact cost are returned.
         """

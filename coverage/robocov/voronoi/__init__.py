@@ -2,9 +2,9 @@
 
 - `bounded_partition`: the cells of equation (1), with their masses and centroids (2)
 - `weighted_cells`: cells by travel time, of robots of different speeds
-- `disc_limited_cells`: the parts of cells within a distance of their generators
+- `disc_limited_cells`: the intersections of cells with discs around their generators
 - `sampled_cells`: cells as sets of sample points
-- `clipped_cells`, `clipping`: cells that are cut out of the region one after another
+- `clipped_cells`, `clipping`: cells from clipping the region along the bisectors, one cell after another
 - `triangulated_cells`, `delaunay`: cells from a Delaunay triangulation that is reused from step to step
 - `boundary_curves`, `arcs`: boundaries that consist of segments and circular arcs
 """

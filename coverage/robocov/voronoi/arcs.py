@@ -1,10 +1,12 @@
 """Boundaries that consist of segments and circular arcs: moments, chords and closed rings.
 
-A piece of a boundary is a row of an array, whose columns are named below. The half angle of an arc is from
--pi/2 to pi/2, positive if the arc turns left; a half angle of zero is a segment. An arc that is almost a
-segment keeps its full precision, however large its radius is. By Green's theorem, the moments of a cell are
-sums over its pieces: each adds those of the triangle between its chord and the origin, and those of the
-circular segment between its chord and its arc.
+A piece of a boundary is a segment or an arc of at most half a circle. It is a row of an array, whose columns
+are named below. The *half angle* is half of the angle that an arc spans about the center of its circle, from
+-pi/2 to pi/2. It is positive if the arc turns left, and zero for a segment. An arc that is almost a segment
+keeps its full precision, however large its radius is.
+
+By Green's theorem, the moments of a cell are sums over its pieces. Each piece adds the moments of the
+triangle between its chord and the origin, and those of the circular segment between its chord and its arc.
 """
 
 from math import comb
@@ -24,23 +26,25 @@ END_X = 2
 END_Y = 3
 """Column of a piece: y of its end, m."""
 HALF_ANGLE = 4
-"""Column of a piece: half of the angle that it spans about the center of its circle, rad."""
+"""Column of a piece: its half angle, rad."""
 CELL = 5
 """Column of a piece: the cell that it bounds."""
 OTHER_CELL = 6
 """Column of a piece: the cell on the other side, or `robocov.density.cell_edges.REGION`."""
 PIECE_COLUMNS = 7
+"""Number of columns of a piece."""
 
 _MAX_SERIES_SQUARED_SINE = 0.04
 """sin² of the half angle up to which the series is used, because the closed form loses precision there."""
 
 _SERIES_TERMS = 13
-"""Number of terms of the series, which leave less than a rounding error."""
+"""Number of terms of the series, with which the error is less than that of rounding."""
 _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(_SERIES_TERMS, 0, -1)])
-"""Coefficients of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
+"""Coefficients of the power series of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x in sin² x, the highest power
+first."""
 
 _MIN_DIVISOR = 1e-300
-"""Lower limit of sines and radii where they are divisors, which prevents division by zero."""
+"""Smallest sine or radius used as a divisor, which prevents division by zero."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
@@ -51,8 +55,9 @@ def compute_moments(pieces: Array, cell_count: int) -> Array:
     Parameters
     ----------
     pieces : (p, 6 or more) array
-        In any order; each relative to the generator of its cell.
+        The pieces of all cells in any order, each relative to the generator of its cell.
     cell_count : int
+        Number of cells n.
 
     Returns
     -------
@@ -84,8 +89,8 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         normal_x = end_y - start_y
         normal_y = start_x - end_x
         squared_length = normal_x * normal_x + normal_y * normal_y
-        # The moments of the circular segment. The first moment still lacks one factor of length, which comes
-        # from the multiplication by the normal below.
+        # The moments of the circular segment. The first moment lacks one factor of the length of the chord,
+        # which the normal contains.
         unit_area, unit_first_moment, unit_polar_moment = _compute_segment_moments(
             pieces[k, HALF_ANGLE], series
         )
@@ -97,7 +102,8 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
         moments[i, MOMENT_X] += middle_x * (cross / 3.0 + area) + first_moment * normal_x
         moments[i, MOMENT_Y] += middle_y * (cross / 3.0 + area) + first_moment * normal_y
         # The polar moment of the triangle with the corners 0, s and e is cross (s·s + s·e + e·e) / 12. That
-        # of the segment is shifted from the middle of the chord to the generator (parallel axis theorem).
+        # of the circular segment is about the middle of the chord. By the parallel axis theorem, it is
+        # converted to that about the generator.
         sum_of_products = start_x * sum_x + end_x * end_x + start_y * sum_y + end_y * end_y
         shift = first_moment * (middle_x * normal_x + middle_y * normal_y)
         squared_middle = middle_x * middle_x + middle_y * middle_y
@@ -111,12 +117,12 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
 def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, float, float]:
     """Return the area, first moment and polar moment of the circular segment on a chord of length 1.
 
-    The first moment is about the line of the chord, positive away from the center of the circle, and the
-    polar moment is about the middle of the chord. Let x be the half angle, s its sine and c its cosine. The
-    usual formulas, such as (x - s c) / (4 s²) for the area, subtract almost equal numbers if x is small. They
-    are therefore rewritten in terms of h = (x - s c - 2/3 s³) / s⁵, which tends to 1/5 as x tends to 0: the
-    area, for example, is s (2/3 + s² h) / 4. If x is small, h is evaluated by a power series in s², whose
-    coefficients are in `series`, that of the highest power first.
+    The first moment is about the line of the chord, and positive on the side away from the center of the
+    circle. The polar moment is about the middle of the chord. Let x be the half angle, s its sine and c its
+    cosine. The usual formulas, such as (x - s c) / (4 s²) for the area, subtract almost equal numbers if x is
+    small. They are therefore rewritten in terms of h = (x - s c - 2/3 s³) / s⁵, which tends to 1/5 as x tends
+    to 0: the area, for example, is s (2/3 + s² h) / 4. If x is small, h is evaluated by a power series in s²,
+    whose coefficients are in `series`, the highest power first.
     """
     s = np.sin(half_angle)
     c = np.cos(half_angle)
@@ -135,56 +141,52 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
 
 
 def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
-    """Split each piece into chords.
+    """Replace each piece by chords.
 
     Parameters
     ----------
     pieces : (p, 5 or more) array
-        For the columns, see the constants at the top of the module; only the first five are used.
+        The pieces. Of the columns at the top of this module, the first five are used.
     max_deviation : float, m
         Maximum distance of a chord from its arc.
 
     Returns
     -------
     list of (k, 2) arrays, m
-        The vertices of each piece, including both ends.
+        The ends of the chords of each piece in order, including both ends of the piece.
     """
     return [_split_piece(piece, max_deviation) for piece in pieces[:, :CELL].tolist()]
 
 
 def _split_piece(piece: list[float], max_deviation: float) -> Array:
-    """Return the vertices of the chords that replace one piece: a segment or a circular arc.
-
-    The half angle of the piece is half of the angle that the arc spans about the center of its circle; it is
-    positive if the arc turns left, and 0 for a segment.
-    """
+    """Return the ends of the chords that replace a piece, (k, 2) m. A segment is a single chord."""
     start_x, start_y, end_x, end_y, half_angle = piece
     dx = end_x - start_x
     dy = end_y - start_y
     chord_count = _count_chords(np.hypot(dx, dy), half_angle, max_deviation)
     if chord_count == 1:
         return np.array([[start_x, start_y], [end_x, end_y]])
-    angle = half_angle * np.linspace(-1.0, 1.0, chord_count + 1)
-    # Coordinates along the line between the ends, and to the right of it, as fractions of its length. On a
-    # circle of radius r, that length is 2 r sin(half_angle).
-    along = 0.5 + 0.5 * np.sin(angle) / np.sin(half_angle)
-    rightward = 0.5 * (np.cos(angle) - np.cos(half_angle)) / np.sin(half_angle)
+    angles = half_angle * np.linspace(-1.0, 1.0, chord_count + 1)
+    # Coordinates along the line between the ends of the arc, and to its right, as fractions of the distance
+    # of the ends. On a circle of radius r, this distance is 2 r sin(half_angle).
+    along = 0.5 + 0.5 * np.sin(angles) / np.sin(half_angle)
+    rightward = 0.5 * (np.cos(angles) - np.cos(half_angle)) / np.sin(half_angle)
     vertex_x = start_x + along * dx + rightward * dy
     vertex_y = start_y + along * dy - rightward * dx
     vertices = np.column_stack([vertex_x, vertex_y])
-    # The ends are exact, so that adjacent pieces meet.
+    # The first and the last vertex are exact, so that adjacent pieces meet.
     vertices[0] = start_x, start_y
     vertices[-1] = end_x, end_y
     return vertices
 
 
 def _count_chords(length: float, half_angle: float, max_deviation: float) -> int:
-    """Return the number of chords that replace an arc whose ends are `length` meters apart."""
+    """Return the number of chords that replace an arc whose ends are at the distance `length`."""
     radius = 0.5 * length / max(abs(np.sin(half_angle)), _MIN_DIVISOR)
-    # A chord of half angle x deviates from its arc by r (1 - cos x), which is at most r x² / 2.
+    # A chord of half angle x deviates from its arc of radius r by r (1 - cos x), which is at most r x² / 2.
     if radius * half_angle**2 < 2.0 * max_deviation:
         return 1
-    # The half angle of a chord is at most 1 rad, however small the arc is.
+    # With this limit of the ratio, the half angle of a chord is at most 1 rad, however small the radius is.
     ratio = min(max_deviation / max(radius, _MIN_DIVISOR), 0.5)
     max_half_angle = np.sqrt(2.0 * ratio)
     return int(np.ceil(abs(half_angle) / max(max_half_angle, _MIN_CHORD_HALF_ANGLE)))
@@ -196,17 +198,18 @@ def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
     Parameters
     ----------
     pieces : (p, 5 or more) array
-        In any order. Each ends where another one begins, up to rounding.
+        The pieces in any order. Each ends where another one starts, up to rounding.
     max_deviation : float, m
-        Maximum distance of the polygons from the arcs.
+        Maximum distance of a chord from its arc.
 
     Returns
     -------
     list of (k, 2) arrays, m
-        Polygons, the first vertex not repeated; outlines counter-clockwise, holes clockwise.
+        Vertices of each ring; the first vertex is not repeated. If the pieces run counter-clockwise around an
+        area, so do the outer rings, and the holes run clockwise.
     """
-    # Each ring starts with any remaining piece. The piece that starts nearest to the end of the ring
-    # continues it, unless the ring's own start is at least as near.
+    # Each ring starts with any of the remaining pieces. It is continued by the piece whose start is nearest
+    # to its end, and closed if its own start is at least as near.
     lines = split_into_chords(pieces, max_deviation)
     starts = pieces[:, :END_X]
     ends = pieces[:, END_X:HALF_ANGLE]

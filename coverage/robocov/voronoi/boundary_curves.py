@@ -1,18 +1,22 @@
 """Boundaries of the cells of robots of different speeds: pieces of lines and circles.
 
-Relative to the generator, every curve that may bound a cell is a |q|² + b q = c, and the cell lies where
-a |q|² + b q <= c. It is a line (a = 0), a circle around the cell (a > 0), or a circle around an area
-outside the cell (a < 0). With b² + 4 a c = 1 the curves behave like unit vectors: their product
-g = b b' + 2 (a c' + a' c) determines how they meet. They intersect in two points if |g| < 1.
+In coordinates relative to the generator, every curve that may bound a cell has an equation a |q|² + b q = c,
+and the cell lies on the side where a |q|² + b q <= c. The curve is a line (a = 0), a circle around the cell
+(a > 0), or a circle around an area outside the cell (a < 0). With the coefficients scaled so that
+b² + 4 a c = 1, the product g = b b' + 2 (a c' + a' c) of two curves is like the scalar product of unit
+vectors: it is the cosine of the angle at which the curves meet, and they intersect in two points if |g| < 1.
 
-With r n the point of a curve that is nearest to the generator, and its curvature k = 2 a, the parameter t of
+Let r n be the point of a curve that is nearest to the generator, where n is a unit vector, and let u be n
+turned left by 90°. With the curvature k = 2 a, the points of the curve are
 
-    q(t) = r n + (2 t u - 2 k t² n) / (1 + k² t²),      u = n turned left by 90°,
+    q(t) = r n + (2 t u - 2 k t² n) / (1 + k² t²).
 
-is half the tangent of half the angle on a circle, and half the distance on a line. The cell is to the left
-of the curve. The condition of every other curve on q(t) is a quadratic in t, so that both intersections come
-from one square root. Each intersection is computed once, and is the same point on both curves, so that they
-cannot disagree.
+On a line, the parameter t is half the distance from the nearest point. On a circle, k t is the tangent of
+half the angle from the nearest point, seen from the center. The cell is to the left of the curve.
+
+The condition that q(t) is on the cell's side of another curve is quadratic in t, so that both intersections
+follow from the same square root. Each intersection is computed only once, and used as the same point of both
+curves, so that the boundaries fit together.
 
 A curve is a row of an array, whose columns are named below.
 """
@@ -45,14 +49,23 @@ from robocov.voronoi.clipping import (
 )
 
 _NORMAL_X = 0
+"""Column of a curve: x of the unit vector n from the generator toward the nearest point."""
 _NORMAL_Y = 1
-_DISTANCE = 2  # r, m
-_COEFFICIENT = 3  # a, 1/m
-_START = 4  # the values of t between which the curve may bound the cell, m
+"""Column of a curve: y of this unit vector."""
+_DISTANCE = 2
+"""Column of a curve: distance r of the nearest point from the generator, m."""
+_COEFFICIENT = 3
+"""Column of a curve: coefficient a of its equation, 1/m."""
+_START = 4
+"""Column of a curve: start of the interval of t in which the curve may bound the cell, m."""
 _END = 5
+"""Column of a curve: end of this interval, m."""
 _CURVE_CELL = 6
+"""Column of a curve: the cell that it may bound."""
 _CURVE_OTHER_CELL = 7
+"""Column of a curve: the cell on the other side, or `REGION`."""
 _CURVE_COLUMNS = 8
+"""Number of columns of a curve."""
 
 PAIR_ROBOT = 0
 """Column of a pair: the robot."""
@@ -68,8 +81,9 @@ PAIR_OTHER_SPEED = 5
 """Column of a pair: speed of the neighbor, m/s."""
 
 _ENTER = 0
+"""Column of a crossing: value of t at which a curve enters the cell's side of another curve."""
 _LEAVE = 1
-"""Columns of a crossing: values of t at which a curve enters and leaves the cell's side of another one."""
+"""Column of a crossing: value of t at which a curve leaves the cell's side of another curve."""
 
 _SPARE_PIECES = 64
 """Initial space for pieces, in addition to one for each edge."""
@@ -77,24 +91,26 @@ _SPARE_PIECES = 64
 _MIN_SQUARED_SINE = 1e-29
 """Smallest sin² of the angle between two curves for which their intersections are computed.
 
-At smaller angles, rounding alone decides whether and where they meet. One curve is then treated as lying
-within the other, which moves no boundary by more than rounding does.
+At smaller angles, only rounding errors would decide whether and where the curves meet. They are then treated
+as if they did not intersect, which moves no boundary by more than a rounding error.
 """
 
 
 class _Equation(NamedTuple):
-    """The coefficients of the equation a |q|² + b q = c of a curve."""
+    """The coefficients of the equation a |q|² + b q = c of a curve, scaled so that b² + 4 a c = 1."""
 
     a: float
-    """1/m"""
+    """Half of the curvature, 1/m."""
     bx: float
+    """x of the vector b."""
     by: float
+    """y of the vector b."""
     c: float
-    """m"""
+    """Right side of the equation, m."""
 
 
 class _Intersection(NamedTuple):
-    """The crossings of two curves, from the point of view of the first one."""
+    """How two curves meet, in terms of the parameter t of the first one."""
 
     enter: float
     """Parameter t at which the first curve enters the cell's side of the second one, m; nan if the curves do
@@ -113,9 +129,10 @@ def trace_boundaries(
 ) -> Array:
     """Find the pieces of the boundaries of all cells.
 
-    Without its faster and slower neighbors, a cell would be a convex polygon. Its edges are given. The
-    circles of Apollonius between robots of different speeds cut areas off this polygon. The sections of each
-    edge and of each circle that are on the cell's side of all the others become one or several pieces.
+    If only the region and the neighbors of the same speed bounded it, a cell would be a convex polygon. The
+    edges of this polygon are given. The circles of Apollonius between robots of different speeds cut areas
+    off it. The sections of each edge and of each circle that are on the cell's side of all other curves are
+    divided into pieces.
 
     Parameters
     ----------
@@ -126,23 +143,23 @@ def trace_boundaries(
     pairs : (m, 6) array
         Pairs of a robot and a neighbor, sorted by robot. For the columns, see the constants `PAIR_...`.
     edges : (e, 6) array
-        Edges of each cell as bounded by the region and by robots of the same speed only, sorted by cell. For
-        the columns, see the constants `EDGE_...` of `robocov.voronoi.clipping`.
+        Edges of the polygons, sorted by cell. For the columns, see the constants `EDGE_...` of
+        `robocov.voronoi.clipping`.
     is_straight : (n,) bool array
-        Overwritten: whether a cell is bounded by these edges alone.
+        Result: whether each cell is bounded by these edges alone.
 
     Returns
     -------
     (p, 7) array
-        For the columns see `robocov.voronoi.arcs`.
+        The pieces, sorted by cell. For the columns, see `robocov.voronoi.arcs`.
     """
     pieces = np.empty((len(edges) + _SPARE_PIECES, PIECE_COLUMNS))
     piece_count = 0
     first_pair = 0
     first_edge = 0
     for i in range(len(points)):
-        end_pair = _find_end_of_group(pairs, PAIR_ROBOT, i, first_pair)
-        end_edge = _find_end_of_group(edges, EDGE_CELL, i, first_edge)
+        end_pair = _find_group_end(pairs, PAIR_ROBOT, i, first_pair)
+        end_edge = _find_group_end(edges, EDGE_CELL, i, first_edge)
         own_pairs = pairs[first_pair:end_pair]
         own_edges = edges[first_edge:end_edge]
         first_pair = end_pair
@@ -160,20 +177,32 @@ def trace_boundaries(
             piece_count = _add_edges(own_edges, pieces, piece_count)
         else:
             _write_lines(curves, own_pairs, own_edges, sides, points[i])
-            crossings = np.empty((curve_count, curve_count, 2))
-            gaps = np.empty((curve_count, 2))
-            _find_crossings(curves[:curve_count], line_count, crossings)
-            # Each other curve cuts at most one gap into a curve, which leaves at most `curve_count` sections.
-            # A section becomes at most two pieces.
-            max_new_pieces = 2 * curve_count + 2
-            for c in range(curve_count):
-                pieces = _reserve(pieces, piece_count, max_new_pieces)
-                piece_count = _add_boundary(curves[c], crossings[c], gaps, pieces, piece_count)
+            pieces, piece_count = _add_boundaries(curves[:curve_count], line_count, pieces, piece_count)
     return pieces[:piece_count]
 
 
 @kernel
-def _find_end_of_group(table: Array, column: int, value: int, first_row: int) -> int:
+def _add_boundaries(curves: Array, line_count: int, pieces: Array, piece_count: int) -> tuple[Array, int]:
+    """Add the pieces of the boundary of a cell to the array of pieces, from row `piece_count` on.
+
+    The first `line_count` curves are lines, and the others circles. Return the array, which is a larger copy
+    if there was too little space, and the new number of pieces.
+    """
+    curve_count = len(curves)
+    crossings = np.empty((curve_count, curve_count, 2))
+    gaps = np.empty((curve_count, 2))
+    _find_crossings(curves, line_count, crossings)
+    # Each other curve cuts at most one gap into a curve, which leaves at most `curve_count` sections. A
+    # section becomes at most two pieces.
+    max_new_pieces = 2 * curve_count + 2
+    for c in range(curve_count):
+        pieces = _reserve(pieces, piece_count, max_new_pieces)
+        piece_count = _add_boundary(curves[c], crossings[c], gaps, pieces, piece_count)
+    return pieces, piece_count
+
+
+@kernel
+def _find_group_end(table: Array, column: int, value: int, first_row: int) -> int:
     """Return the end of the rows, from `first_row` on, in which a column of a sorted table has a value."""
     row = first_row
     while row < len(table) and table[row, column] == value:
@@ -183,7 +212,7 @@ def _find_end_of_group(table: Array, column: int, value: int, first_row: int) ->
 
 @kernel
 def _reserve(pieces: Array, piece_count: int, new_pieces: int) -> Array:
-    """Return the array of pieces if it has space for more of them, and otherwise a larger copy."""
+    """Return the array of pieces if it has space for a number of new pieces, and otherwise a larger copy."""
     if piece_count + new_pieces <= len(pieces):
         return pieces
     larger = np.empty((2 * (piece_count + new_pieces), PIECE_COLUMNS))
@@ -193,10 +222,7 @@ def _reserve(pieces: Array, piece_count: int, new_pieces: int) -> Array:
 
 @kernel
 def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
-    """Append edges to the pieces, from row `piece_count` on; return the new number of pieces.
-
-    An edge is a piece whose half angle is 0.
-    """
+    """Append edges to the pieces, as pieces whose half angle is 0; return the new number of pieces."""
     for e in range(len(edges)):
         pieces[piece_count, START_X] = edges[e, EDGE_START_X]
         pieces[piece_count, START_Y] = edges[e, EDGE_START_Y]
@@ -211,7 +237,7 @@ def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
 
 @kernel
 def _is_cell_empty(pairs: Array) -> bool:
-    """Return whether a cell is empty because a faster robot is at the position of its robot."""
+    """Return whether the cell of a robot is empty because a faster robot is at the same position."""
     for k in range(len(pairs)):
         squared_distance = pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2
         if squared_distance == 0.0 and pairs[k, PAIR_OTHER_SPEED] > pairs[k, PAIR_OWN_SPEED]:
@@ -223,22 +249,22 @@ def _is_cell_empty(pairs: Array) -> bool:
 def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
     """Write the circles that may bound a cell to `curves`, after the rows of its lines.
 
-    Two robots of speeds v and w, at a distance d, reach the points of a circle at the same time. The point
-    nearest to the first robot is on the line between them, at the distance d v / (v + w) from it. Circles
-    that are entirely farther away than the points of the cell are left out. Return the number of lines and
-    circles.
+    Two robots of speeds v and w, at a distance d from each other, arrive at the points of a circle at the
+    same time. The point that is nearest to the first robot is on the line between them, at the distance d v /
+    (v + w). Circles that are farther away than all points of the cell are left out. Return the number of
+    lines and circles.
     """
-    reach = _compute_reach(pairs, edges)
+    max_distance = _bound_distance(pairs, edges)
     curve_count = len(edges)
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
         other_speed = pairs[k, PAIR_OTHER_SPEED]
         distance = np.sqrt(pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2)
-        nearest = distance * (own_speed / (own_speed + other_speed))
-        if own_speed != other_speed and distance > 0.0 and nearest < reach:
+        circle_distance = distance * (own_speed / (own_speed + other_speed))
+        if own_speed != other_speed and distance > 0.0 and circle_distance < max_distance:
             curves[curve_count, _NORMAL_X] = pairs[k, PAIR_DX] / distance
             curves[curve_count, _NORMAL_Y] = pairs[k, PAIR_DY] / distance
-            curves[curve_count, _DISTANCE] = nearest
+            curves[curve_count, _DISTANCE] = circle_distance
             # The coefficient a of the curve a |q|² + b q = c is (w² - v²) / (2 v w d).
             difference_of_squares = (other_speed - own_speed) * (own_speed + other_speed)
             curves[curve_count, _COEFFICIENT] = (
@@ -253,28 +279,29 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
 
 
 @kernel
-def _compute_reach(pairs: Array, edges: Array) -> float:
-    """Return an upper bound on the distance of a cell's points from its generator, m.
+def _bound_distance(pairs: Array, edges: Array) -> float:
+    """Return an upper bound on the distance of the points of a cell from its generator, m.
 
-    The edges bound a convex polygon that contains the cell. A circle around the robot, which is the border to
-    a faster one, may limit the cell further.
+    The edges bound a convex polygon that contains the cell. A circle of Apollonius around the robot, which is
+    the border to a faster robot, may limit the cell further.
     """
-    reach = 0.0
+    max_distance = 0.0
     for e in range(len(edges)):
-        reach = max(reach, np.sqrt(edges[e, EDGE_START_X] ** 2 + edges[e, EDGE_START_Y] ** 2))
+        max_distance = max(max_distance, np.sqrt(edges[e, EDGE_START_X] ** 2 + edges[e, EDGE_START_Y] ** 2))
     for k in range(len(pairs)):
         own_speed = pairs[k, PAIR_OWN_SPEED]
         other_speed = pairs[k, PAIR_OTHER_SPEED]
         if other_speed > own_speed:
             distance = np.sqrt(pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2)
-            # The farthest point of a circle around the cell is on the side away from the faster robot.
-            reach = min(reach, distance * own_speed / (other_speed - own_speed))
-    return reach
+            # The point of the circle that is farthest from the robot is on the side away from the faster
+            # robot.
+            max_distance = min(max_distance, distance * own_speed / (other_speed - own_speed))
+    return max_distance
 
 
 @kernel
 def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point: Array) -> None:
-    """Write the edges of a cell as straight curves that begin and end at their vertices.
+    """Write the edges of a cell to the first rows of `curves`, as lines that start and end at their vertices.
 
     The line of an edge is either the bisector to a neighbor, or a side of the region.
     """
@@ -286,7 +313,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
         normal_x = curves[e, _NORMAL_X]
         normal_y = curves[e, _NORMAL_Y]
         curves[e, _COEFFICIENT] = 0.0
-        # On a line, t is half the signed distance along it from the point nearest to the generator.
+        # On a line, t is half the signed distance from the point nearest to the generator.
         curves[e, _START] = 0.5 * (normal_x * edges[e, EDGE_START_Y] - normal_y * edges[e, EDGE_START_X])
         curves[e, _END] = 0.5 * (normal_x * edges[e, EDGE_END_Y] - normal_y * edges[e, EDGE_END_X])
         curves[e, _CURVE_CELL] = edges[e, EDGE_CELL]
@@ -295,9 +322,9 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
 
 @kernel
 def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
-    """Write the normal of the bisector to a neighbor, and its distance from the generator.
+    """Write the normal of the bisector to a neighbor, and its distance from the generator, to a curve.
 
-    They are not taken from the edge: it may be so short that rounding decides its direction.
+    They do not follow from the edge, because it may be so short that rounding decides its direction.
     """
     for k in range(len(pairs)):
         if pairs[k, PAIR_NEIGHBOR] == neighbor:
@@ -309,7 +336,10 @@ def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
 
 @kernel
 def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
-    """Find the side of the region on which an edge lies; write its normal and distance from the generator."""
+    """Write the normal of the side of the region on which an edge lies, and the edge's distance, to a curve.
+
+    The distance is that of the line of the edge from the generator.
+    """
     middle_x = 0.5 * (edge[EDGE_START_X] + edge[EDGE_END_X])
     middle_y = 0.5 * (edge[EDGE_START_Y] + edge[EDGE_END_Y])
     min_offset = np.inf
@@ -322,7 +352,7 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
             min_offset = offset
             curve[_NORMAL_X] = normal_x
             curve[_NORMAL_Y] = normal_y
-            # This is the distance of the edge, whose ends are rounded, and not that of the side.
+            # The distance of the edge, whose ends are rounded, differs slightly from that of the side.
             curve[_DISTANCE] = normal_x * middle_x + normal_y * middle_y
 
 
@@ -330,23 +360,23 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
     """Find where each curve enters and leaves the cell's side of each other curve.
 
-    Only the points of a curve that are on the cell's side of all other curves can bound the cell. Entry
-    [i, j] of `crossings`, (k, k, 2), receives two values of the parameter t of curve i: where it enters the
-    cell's side of curve j, and where it leaves it. They are nan if the curves do not intersect. A curve that
-    is nowhere on the cell's side of another one bounds nothing, and gets an empty interval of t.
+    Only the points of a curve that are on the cell's side of all other curves can bound the cell. Entry [i,
+    j] of `crossings`, (k, k, 2), receives the two values of the parameter t of curve i at which it enters and
+    leaves the cell's side of curve j; nan if the curves do not intersect. A curve that is nowhere on the
+    cell's side of another one does not bound the cell, and its interval of t becomes empty.
 
-    The first `line_count` curves are the edges of one convex polygon. They meet only at their end points, so
-    that two of them are not compared.
+    The first `line_count` curves are the edges of a convex polygon. They meet only at their ends, so that no
+    two of them need to be intersected.
     """
-    count = len(curves)
-    for first in range(count):
+    curve_count = len(curves)
+    for first in range(curve_count):
         crossings[first, first, _ENTER] = np.nan
         crossings[first, first, _LEAVE] = np.nan
-        for second in range(first + 1, count):
+        for second in range(first + 1, curve_count):
             enter = np.nan
             leave = np.nan
-            is_edge_pair = second < line_count
-            if not is_edge_pair:
+            are_both_edges = second < line_count
+            if not are_both_edges:
                 intersection = _intersect(curves[first], curves[second])
                 enter = intersection.enter
                 leave = intersection.leave
@@ -356,8 +386,8 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
                     _make_empty(curves, second)
             crossings[first, second, _ENTER] = enter
             crossings[first, second, _LEAVE] = leave
-            # The second curve crosses the first one at the same two points, in the opposite sense: both have
-            # the cell on their left, so that one enters where the other one leaves.
+            # The second curve crosses the first one at the same two points. Both curves have the cell on
+            # their left, so that one enters where the other one leaves.
             leave_x, leave_y = _evaluate(curves[first], leave)
             enter_x, enter_y = _evaluate(curves[first], enter)
             crossings[second, first, _ENTER] = _find_parameter(curves[second], leave_x, leave_y)
@@ -366,7 +396,7 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
 
 @kernel
 def _make_empty(curves: Array, curve: int) -> None:
-    """Make the interval of t empty in which a curve may bound the cell: it then ends at minus infinity."""
+    """Make the interval of t empty in which a curve may bound the cell: let it end at minus infinity."""
     curves[curve, _END] = -np.inf
 
 
@@ -374,9 +404,9 @@ def _make_empty(curves: Array, curve: int) -> None:
 def _intersect(first: Array, second: Array) -> _Intersection:
     """Find where a curve enters and leaves the cell's side of another one.
 
-    The second curve is a |q|² + b q = c, and the cell is where a |q|² + b q <= c. With the point q(t) of the
-    first curve inserted, this condition is quadratic in t, and its roots are the crossings. The curves meet
-    at an angle whose cosine is g = b b' + 2 (a c' + a' c), so that they intersect if 1 - g² > 0.
+    The cell is on the side of the second curve where a |q|² + b q <= c. For the point q(t) of the first
+    curve, this condition is quadratic in t, and its roots are the crossings. The curves meet at an angle
+    whose cosine is g = b b' + 2 (a c' + a' c), so that they intersect if sin² = 1 - g² > 0.
     """
     equation = _compute_equation(second)
     # The components of b along the normal of the first curve, and to the left of it.
@@ -385,9 +415,8 @@ def _intersect(first: Array, second: Array) -> _Intersection:
     b_outward = equation.bx * normal_x + equation.by * normal_y
     # Adding 0 turns a negative zero into a positive one.
     b_leftward = equation.by * normal_x - equation.bx * normal_y + 0.0
-    # On the first curve, at the distance r and with the curvature k, |q|² = r² + (2 - r k)² t² / (1 + k² t²).
-    # Multiplied by this divisor, the condition of the second curve is
-    # quadratic t² + 2 b_leftward t + constant <= 0.
+    # On the first curve, with the distance r and the curvature k, |q|² = (r² + (2 - r k)² t²) / (1 + k² t²).
+    # Multiplied by 1 + k² t², the condition is quadratic t² + 2 b_leftward t + constant <= 0.
     distance = first[_DISTANCE]
     curvature = 2.0 * first[_COEFFICIENT]
     factor = 2.0 - distance * curvature
@@ -397,9 +426,9 @@ def _intersect(first: Array, second: Array) -> _Intersection:
     constant = equation.a * distance * distance + distance * b_outward - equation.c
     cosine, squared_sine = _compute_angle(_compute_equation(first), equation)
     if squared_sine > _MIN_SQUARED_SINE:
-        # The two roots of the quadratic function are numerator / quadratic and constant / numerator, a form
-        # that avoids cancellation. The curve enters at (-b_leftward - sqrt) / quadratic, where the function
-        # falls, and leaves where it rises.
+        # The roots are (-b_leftward ± sqrt) / quadratic. The curve enters at the root with the minus sign,
+        # where the quadratic function falls, and leaves at the other. To avoid cancellation, only the root
+        # with the larger numerator is computed in this form, and the other one as constant / numerator.
         numerator = -b_leftward - np.copysign(np.sqrt(squared_sine), b_leftward)
         if b_leftward >= 0.0:
             enter = numerator / quadratic
@@ -408,8 +437,9 @@ def _intersect(first: Array, second: Array) -> _Intersection:
             enter = constant / numerator
             leave = numerator / quadratic
         return _Intersection(enter, leave, is_first_outside=False, is_second_outside=False)
-    # The curves do not intersect: the function has the same sign on the whole first curve. If g >= 1, one of
-    # the curves is on the cell's side of the other one; if g <= -1, both are, or neither is.
+    # The curves do not intersect, so that the quadratic function has the same sign on the whole first curve.
+    # If g >= 1, exactly one of the curves is on the cell's side of the other one; if g <= -1, both or neither
+    # are.
     is_first_outside = quadratic + constant > 0.0
     is_second_outside = is_first_outside if cosine < 0.0 else not is_first_outside
     return _Intersection(np.nan, np.nan, is_first_outside, is_second_outside)
@@ -417,10 +447,11 @@ def _intersect(first: Array, second: Array) -> _Intersection:
 
 @kernel
 def _compute_angle(first: _Equation, second: _Equation) -> tuple[float, float]:
-    """Return the cosine g = b b' + 2 (a c' + a' c) of the angle at which two curves meet, and its sin².
+    """Return the cosine g of the angle at which two curves meet, and its sin² = 1 - g².
 
-    sin² = 1 - g² is a sum of 2 x 2 determinants: at small angles, subtracting g² from 1 would leave only
-    rounding errors.
+    The cosine is g = b b' + 2 (a c' + a' c). At small angles, the subtraction of g² from 1 would leave only
+    rounding errors. Because b² + 4 a c = 1 for both curves, sin² is also a sum of products of the 2 x 2
+    determinants of their coefficients.
     """
     b_cross = first.bx * second.by - first.by * second.bx
     ac_cross = first.a * second.c - second.a * first.c
@@ -452,12 +483,13 @@ def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, pi
     """Add the sections of a curve on the cell's side of all other curves; return the new number of pieces.
 
     `crossings`, (k, 2), are the values of the parameter t at which the curve enters and leaves the cell's
-    side of each other curve. If it enters first, it is on that side between the two. If it leaves first, it
-    is on that side everywhere except between the two: there is a gap. The sections are the intersection of
-    the intervals without the gaps. `gaps`, (k, 2), is working memory with the columns of `crossings`.
+    side of each other curve. If it enters before it leaves, it is on that side only in between. If it leaves
+    before it enters, it is on that side everywhere except for the gap in between. The sections are the
+    intersection of all these intervals, without the gaps. `gaps`, (k, 2), is scratch space with the columns
+    of `crossings`.
     """
     # The crossings with curves that do not intersect this one are nan. Comparisons with nan are false, so
-    # these curves neither limit the interval nor add a gap.
+    # that these curves neither limit the interval nor add a gap.
     start = curve[_START]
     end = curve[_END]
     for k in range(len(crossings)):
@@ -472,8 +504,8 @@ def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, pi
         if leave < enter and leave < end and enter > start:
             _insert_gap(gaps, gap_count, enter, leave)
             gap_count += 1
-    # Add the section before each gap, and the one after the last gap. Sections between gaps that overlap are
-    # empty, and add nothing.
+    # Add the section before each gap, and the section after the last gap. If gaps overlap, the section
+    # between them is empty, and adds nothing.
     for gap in range(gap_count):
         piece_count = _add_pieces(curve, start, min(gaps[gap, _LEAVE], end), pieces, piece_count)
         start = max(start, gaps[gap, _ENTER])
@@ -482,7 +514,7 @@ def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, pi
 
 @kernel
 def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None:
-    """Insert a gap, from t = leave to t = enter, into the first `gap_count` rows, sorted by their start."""
+    """Insert the gap from t = leave to t = enter into the first `gap_count` rows, sorted by start."""
     # Move the gaps that start later by one row.
     row = gap_count
     while row > 0 and gaps[row - 1, _LEAVE] > leave:
@@ -495,17 +527,16 @@ def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None
 
 @kernel
 def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_count: int) -> int:
-    """Append the section of a curve from t = start to t = end to the pieces; return their new number.
+    """Append the section of a curve from t = start to t = end to the pieces; return the new number of pieces.
 
-    The point q(t) of a circle of curvature k is at the angle 2 atan(k t), seen from the center of the circle
-    and measured from the point nearest to the generator, where t = 0. The half angle of a piece is therefore
-    a difference of arctangents. A piece must not exceed half a circle, so that a section on both sides of
-    t = 0 is cut there.
+    The angle of the point q(t) of a circle of curvature k, measured at its center from the point nearest to
+    the generator, is 2 atan(k t). The half angle of a piece is therefore a difference of arctangents. A piece
+    must not be longer than half a circle, so that a section with t = 0 in its interior becomes two pieces.
     """
     curvature = 2.0 * curve[_COEFFICIENT]
     while start < end:
-        must_cut = start < 0.0 < end and curvature != 0.0
-        piece_end = 0.0 if must_cut else end
+        must_divide = start < 0.0 < end and curvature != 0.0
+        piece_end = 0.0 if must_divide else end
         half_angle = 0.0
         if curvature != 0.0:
             half_angle = np.arctan(curvature * piece_end) - np.arctan(curvature * start)
@@ -521,11 +552,10 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_cou
 
 @kernel
 def _evaluate(curve: Array, t: float) -> tuple[float, float]:
-    """Return the point q(t) of a curve, in meters.
+    """Return the point q(t) of a curve, in meters; for the formula, see the description of the module.
 
-    The equation of q(t) is in the description of the module: `outward` is the coordinate along the normal n
-    of the curve, `leftward` the one along n turned left. For large t, numerator and denominator of the
-    fraction are divided by t² to avoid overflow.
+    `outward` is the coordinate along the normal n of the curve, and `leftward` that along u, which is n
+    turned left. For large t, numerator and denominator of the fraction are divided by t² to avoid overflow.
     """
     curvature = 2.0 * curve[_COEFFICIENT]
     if abs(curvature * t) <= 1.0:
@@ -548,9 +578,9 @@ def _find_parameter(curve: Array, x: float, y: float) -> float:
 
     The point may lie off the curve because of rounding.
     """
-    # Substitute q(t): relative to r n, its components are outward = -2 k t² / (1 + k² t²) and
-    # leftward = 2 t / (1 + k² t²). Both quotients below then equal t. Where the divisor of the first one is
-    # small, the second one is accurate.
+    # Relative to r n, the components of q(t) are outward = -2 k t² / (1 + k² t²) and
+    # leftward = 2 t / (1 + k² t²). Therefore, t is leftward / (2 + k outward), and also
+    # -outward / (k leftward), which is accurate where the divisor of the first quotient is small.
     curvature = 2.0 * curve[_COEFFICIENT]
     outward = x * curve[_NORMAL_X] + y * curve[_NORMAL_Y] - curve[_DISTANCE]
     leftward = y * curve[_NORMAL_X] - x * curve[_NORMAL_Y]

@@ -21,11 +21,12 @@ from robocov.voronoi.delaunay import CORNER, ENTRIES_PER_TRIANGLE, NOT_TRIANGULA
 from robocov.voronoi.triangulated_cells import FAILED, compute_triangulated_cells
 
 _MIN_TRIANGULATED_ROBOTS = 16
-"""Team size from which a triangulation is faster than clipping each cell by all other robots."""
+"""Number of robots from which a triangulation is faster than clipping each cell along all bisectors."""
 
 _NO_EDGES = np.empty((0, EDGE_COLUMNS))
+"""Array of edges without space: edges are counted, but not written."""
 _NO_MESH = np.empty((2, 0), dtype=np.int32)
-"""Replaces the triangulation if cells are clipped."""
+"""Used in place of a triangulation if cells are clipped."""
 _NOT_FINITE = -1
 """Returned instead of a number of edges if the coordinates of a generator are not finite."""
 
@@ -34,20 +35,20 @@ _AnyCells = TypeVar("_AnyCells", bound=Cells)
 
 @dataclass(eq=False, kw_only=True)
 class VoronoiPartition(Cells):
-    """The cells V_i of equation (1) within a convex region.
+    """The Voronoi cells V_i of equation (1) within a convex region.
 
     Attributes
     ----------
     generators : (n, 2) array, m
-        The points to which the cells belong.
+        The point to which each cell belongs.
     mass : (n,) array, m²
-        M of equation (2): the area of each cell if the density is 1.
+        Mass M of each cell, equation (2). It is the area if the density is 1.
     centroid : (n, 2) array, m
-        C of equation (2). The centroid of an empty cell is its generator.
+        Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
     density : Density or None
-        φ of mass, centroid and moments; None means 1 everywhere.
+        Density φ with which masses, centroids and moments are computed; None means 1 everywhere.
     triangulation : (2, 8 n + 4) int32 array or None
-        Triangulation from which the partition of slightly moved generators can start.
+        Triangulation that can be passed to `partition` after the generators have moved.
 
     See Also
     --------
@@ -75,12 +76,12 @@ class VoronoiPartition(Cells):
 
     @cached_property
     def polygons(self) -> list[Array]:
-        """The cells, (k, 2) m each, counter-clockwise; (0, 2) if a cell is empty."""
+        """The vertices of each cell, (k, 2) m, counter-clockwise; of shape (0, 2) if the cell is empty."""
         return self.edges.build_polygons(self.generators)
 
     @property
     def outlines(self) -> tuple[list[Array], IntArray]:
-        """The polygons of the cells, and the index of the cell of each."""
+        """The polygons of the cells, and the index of the cell of each polygon."""
         return self.polygons, np.arange(len(self.generators))
 
 
@@ -97,33 +98,35 @@ def partition(
     Parameters
     ----------
     generators : (n, 2) array, m
-        They may lie on the region's boundary or outside. Generators at the same position do not cut
-        each other's cells.
+        Positions of the robots. They may lie on the boundary of the region or outside. Robots at the same
+        position have the same cell.
     region : Region
-        The cells divide it.
+        The region that the cells divide.
     neighbors : Neighbors or None
-        Communication graph. Cell i is clipped only along the bisectors to the neighbors of robot i, and
-        depends, to the last bit, on nothing else. By default each robot is a neighbor of all others.
+        Communication graph. Cell i is bounded only by the bisectors to the neighbors of robot i, and depends,
+        to the last bit, on nothing else. By default each robot is a neighbor of all others.
     triangulation : (2, 8 n + 4) int32 array or None
         `Cells.triangulation` of the previous partition. If the generators have moved only a little since
-        then, reusing it takes a fraction of the time. The cells are the same, to the last bit unless four
-        generators lie on a circle up to rounding.
+        then, the computation takes a fraction of the time. The cells are the same as without it. Only if four
+        generators lie on a circle, up to rounding, the last bits may differ.
     reported_positions : (m, 2) array or None, m
         Positions of the neighbors as known to each robot, in the order of ``neighbors.indices``. The cells of
-        two robots may then overlap or leave a gap, because each is based on what its own robot knows. By
-        default robots know the true positions.
+        two robots may then overlap or leave a gap, because each cell is based on what its own robot knows. By
+        default the robots know the true positions.
     density : Density or None
-        φ of mass, centroid and moments; the cells do not depend on it. By default 1 everywhere.
+        Density φ with which masses, centroids and moments are computed; the cells do not depend on it. By
+        default it is 1 everywhere.
 
     Returns
     -------
     VoronoiPartition
+        The cells with their masses and centroids.
 
     Raises
     ------
     InputError
-        If the generators are not finite numbers of shape (n, 2), or neighbors or reported positions do not
-        match them.
+        If the generators are not finite numbers of shape (n, 2), or the neighbors or the reported positions
+        do not match them.
 
     See Also
     --------
@@ -133,7 +136,7 @@ def partition(
     Notes
     -----
     Cell V_i of equation (1) contains the points of the region that are nearer to robot i than to any of its
-    neighbors. Its mass M and centroid C are those of equation (2)::
+    neighbors. Its mass M and centroid C are the integrals (2) over the cell::
 
         M = ∫ φ(q) dq        C = 1/M ∫ q φ(q) dq
 
@@ -152,7 +155,7 @@ def partition(
     check_neighbors(neighbors, reported_positions, len(points))
     neighbor_positions = NeighborPositions.from_graph(neighbors, reported_positions)
     mesh = _create_mesh(len(points), triangulation, is_complete=neighbors.is_complete)
-    cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=_NO_EDGES)
+    cells = CellArrays(masses=np.empty(len(points)), centroids=np.empty((len(points), 2)), edges=_NO_EDGES)
     edge_count = _compute_cells(points, region.sides, neighbor_positions, mesh, cells)
     if edge_count == _NOT_FINITE:
         robot = int(np.isfinite(points).all(axis=1).argmin())
@@ -163,8 +166,8 @@ def partition(
     mesh.setflags(write=False)
     voronoi_cells = VoronoiPartition(
         generators=points,
-        mass=cells.mass,
-        centroid=cells.centroid,
+        mass=cells.masses,
+        centroid=cells.centroids,
         triangulation=mesh if mesh.shape[1] > 0 else None,
         _compute_edges=partial(_compute_edges, points, region.sides, neighbor_positions, mesh, edge_count),
     )
@@ -172,15 +175,17 @@ def partition(
 
 
 def to_generators(values: object) -> Array:
-    """Convert generators to a new array.
+    """Convert the positions of generators to a new array.
 
     Parameters
     ----------
     values : (n, 2) array_like, m
+        The positions.
 
     Returns
     -------
     (n, 2) array, m
+        A contiguous copy.
 
     Raises
     ------
@@ -197,13 +202,16 @@ def to_generators(values: object) -> Array:
 
 
 def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robot_count: int) -> None:
-    """Check that neighbors and reported positions match the number of robots.
+    """Check that neighbors and reported positions match each other and the number of robots.
 
     Parameters
     ----------
     neighbors : Neighbors
+        Communication graph.
     reported_positions : (m, 2) array or None, m
+        Positions of the neighbors as known to each robot; see `partition`.
     robot_count : int
+        Number of robots.
 
     Raises
     ------
@@ -216,32 +224,32 @@ def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robo
         return
     if neighbors.indices is None:
         raise InputError("reported_positions: expected None without limited communication")
-    expected = (len(neighbors.indices), 2)
-    if np.shape(reported_positions) != expected:
-        got = np.shape(reported_positions)
-        raise InputError(f"reported_positions: expected shape {expected}, got {got}")
+    expected_shape = (len(neighbors.indices), 2)
+    shape = np.shape(reported_positions)
+    if shape != expected_shape:
+        raise InputError(f"reported_positions: expected shape {expected_shape}, got {shape}")
 
 
 def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
-    """Set the density of new cells, and update their masses and centroids.
+    """Set the density of new cells, and compute their masses and centroids for this density.
 
     Parameters
     ----------
     cells : Cells
-        Cells computed for a density of 1. They are changed in place, and their arrays become read-only.
+        Cells that were computed for density 1. They are changed in place, and their arrays become read-only.
     density : Density or None
-        None means 1 everywhere.
+        The density; None means 1 everywhere.
 
     Returns
     -------
     Cells
-        The same cells.
+        The same object as `cells`.
     """
     cells.density = density
     if density is not None and density.is_uniform:
         cells.mass = cells.mass * density.max_value
     elif density is not None:
-        cells.mass, cells.centroid = density.compute_mass_and_centroid(
+        cells.mass, cells.centroid = density.compute_masses_and_centroids(
             cells.edges, cells.generators, cells.mass, cells.centroid
         )
     for values in (cells.generators, cells.mass, cells.centroid):
@@ -250,7 +258,11 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
 
 
 def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) -> Mesh:
-    """Create the mesh from which the triangulation starts; it has no columns if cells are to be clipped."""
+    """Return the mesh from which the triangulation starts, without columns if the cells are to be clipped.
+
+    `is_complete` says whether all robots are neighbors of each other, and `previous` is the mesh of the
+    previous partition.
+    """
     if not is_complete or robot_count < _MIN_TRIANGULATED_ROBOTS:
         return _NO_MESH.copy()
     triangle_count = 2 * robot_count + 1
@@ -263,16 +275,16 @@ def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) 
 def _compute_edges(
     points: Array, sides: Array, neighbor_positions: NeighborPositions, mesh: Mesh, edge_count: int
 ) -> CellEdges:
-    """Compute the edges of all cells: the cells are computed again, this time with room for their edges."""
+    """Compute the cells again, with space for all `edge_count` edges, and return the edges."""
     edges = np.empty((edge_count, EDGE_COLUMNS))
-    cells = CellArrays(mass=np.empty(len(points)), centroid=np.empty((len(points), 2)), edges=edges)
+    cells = CellArrays(masses=np.empty(len(points)), centroids=np.empty((len(points), 2)), edges=edges)
     # Copies, because read-only arrays are a different type to the compiler.
     _compute_cells(points.copy(), sides, neighbor_positions, mesh.copy(), cells)
     return CellEdges(
-        start=edges[:, :EDGE_END_X].copy(),
-        end=edges[:, EDGE_END_X:EDGE_CELL].copy(),
-        cell=edges[:, EDGE_CELL].astype(np.intp),
-        other_cell=edges[:, EDGE_OTHER_CELL].astype(np.intp),
+        starts=edges[:, :EDGE_END_X].copy(),
+        ends=edges[:, EDGE_END_X:EDGE_CELL].copy(),
+        cells=edges[:, EDGE_CELL].astype(np.intp),
+        other_cells=edges[:, EDGE_OTHER_CELL].astype(np.intp),
     )
 
 
@@ -280,11 +292,12 @@ def _compute_edges(
 def _compute_cells(
     points: Array, sides: Array, neighbors: NeighborPositions, mesh: Mesh, cells: CellArrays
 ) -> int:
-    """Compute all cells; return the number of edges, or `_NOT_FINITE`.
+    """Compute all cells; return the number of their edges, or `_NOT_FINITE`.
 
     If the mesh has columns, all robots must be neighbors of each other, and the cells follow from their
-    Delaunay triangulation. Otherwise, or if the triangulation fails, each cell is clipped along the bisectors
-    to the robot's neighbors. After a failure, the first corner of the mesh is `NOT_TRIANGULATED`.
+    Delaunay triangulation. Otherwise, or if the triangulation fails, the region is clipped along the
+    bisectors to the neighbors of each robot. After a failure, the first corner of the mesh is
+    `NOT_TRIANGULATED`.
     """
     for i in range(len(points)):
         if not (abs(points[i, 0]) < np.inf and abs(points[i, 1]) < np.inf):

@@ -1,4 +1,4 @@
-"""Cells that are clipped along the bisectors to all neighbors, one robot at a time."""
+"""Cells from clipping the region along the bisectors to all neighbors, one robot at a time."""
 
 from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
@@ -17,7 +17,7 @@ from robocov.voronoi.clipping import (
 def compute_clipped_cells(
     points: Array, sides: Array, neighbors: NeighborPositions, cells: CellArrays
 ) -> int:
-    """Compute all cells, each clipped along the bisectors to the neighbors of its robot.
+    """Compute all cells. For each, the region is clipped along the bisectors to the neighbors of the robot.
 
     Parameters
     ----------
@@ -26,13 +26,14 @@ def compute_clipped_cells(
     sides : (k, 5) array
         The region, as `Region.sides`.
     neighbors : NeighborPositions
+        The neighbors of each robot.
     cells : CellArrays
-        Changed in place.
+        Overwritten by the cells.
 
     Returns
     -------
     int
-        Number of edges.
+        Number of edges of all cells.
     """
     workspace = create_workspace(len(points), len(sides))
     edge_count = 0
@@ -48,7 +49,10 @@ def compute_clipped_cells(
 
 @inlined_kernel
 def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: NeighborPositions, i: int) -> int:
-    """Add the listed neighbors of robot i at their positions as known to it; return their number."""
+    """Add the neighbors of robot i to the workspace; return their number.
+
+    If there are reports, the neighbors are at the positions that are known to the robot.
+    """
     neighbor_rows = workspace.neighbors
     reported_positions = neighbors.positions
     count = 0
@@ -66,7 +70,10 @@ def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: Neighb
 
 @inlined_kernel
 def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
-    """Add all robots as neighbors of robot i; return their number."""
+    """Add all other robots to the workspace as neighbors of robot i; return their number.
+
+    Robot i itself, and any robot at the same position, is left out by `add_neighbor`.
+    """
     neighbor_rows = workspace.neighbors
     count = 0
     for j in range(len(points)):

@@ -1,7 +1,7 @@
-"""Clipping of one cell: the region is cut along the bisectors between a robot and its neighbors.
+"""The cell of one robot: the region, clipped along the bisectors between the robot and its neighbors.
 
-All coordinates are relative to the generator of the cell, so that a tiny cell far from the origin keeps its
-full precision.
+All coordinates are relative to the generator of the cell, so that those of a tiny cell far from the origin
+keep their full precision.
 """
 
 from typing import NamedTuple
@@ -18,44 +18,50 @@ X = 0
 Y = 1
 """Column of a vertex: its offset from the generator in y, m."""
 OTHER_CELL = 2
-"""Column of a vertex: the cell on the other side of the edge that begins there, or `REGION`."""
+"""Column of a vertex: the cell on the other side of the edge that starts there, or `REGION`."""
 _EXCESS = 3
-"""Column of a vertex: its excess q · d - |d|²/2 over the current bisector, with d the offset of the
-neighbor, m²; positive beyond the bisector."""
+"""Column of a vertex: its excess q · d - |d|²/2 over the current bisector, where q is the vertex and d the
+offset of the neighbor, m². It is positive beyond the bisector."""
 _VERTEX_COLUMNS = 4
+"""Number of columns of a vertex."""
 
 DX = 0
 """Column of a neighbor: its offset from the generator in x, m."""
 DY = 1
 """Column of a neighbor: its offset from the generator in y, m."""
 SQUARED_DISTANCE = 2
-"""Column of a neighbor: its squared distance, m²."""
+"""Column of a neighbor: its squared distance from the generator, m²."""
 ROBOT = 3
-"""Column of a neighbor: its number."""
+"""Column of a neighbor: its index."""
 _NEIGHBOR_COLUMNS = 4
+"""Number of columns of a neighbor."""
 
 EDGE_START_X = 0
+"""Column of an edge: x of its start relative to the generator, m."""
 EDGE_START_Y = 1
+"""Column of an edge: y of its start, m."""
 EDGE_END_X = 2
+"""Column of an edge: x of its end, m."""
 EDGE_END_Y = 3
-"""Columns of an edge: its ends relative to the generator, m."""
+"""Column of an edge: y of its end, m."""
 EDGE_CELL = 4
-"""Column of an edge: the cell that it bounds, by the number of its robot."""
+"""Column of an edge: the cell that it bounds, as the index of its robot."""
 EDGE_OTHER_CELL = 5
 """Column of an edge: the cell on the other side, or `REGION`."""
 EDGE_COLUMNS = 6
+"""Number of columns of an edge."""
 
 _NO_VERTEX = -1
-"""Used in place of a vertex where there is none."""
+"""Used in place of a vertex if there is none."""
 _NOT_CUT = -1
 """Returned instead of a number of vertices if a bisector does not cut a polygon."""
 
 _SORTED_NEIGHBORS = 6
-"""Number of neighbors that cut a cell in order of distance. After them, few others can still cut it."""
+"""Number of neighbors that cut a cell in order of their distance. After them, few others can still cut it."""
 
 
 class Workspace(NamedTuple):
-    """Working memory for the computation of one cell after another."""
+    """Scratch space for the computation of one cell after another."""
 
     polygon: Array
     """(k, 4) Vertices of the cell; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
@@ -69,39 +75,46 @@ class CellPolygon(NamedTuple):
     """The vertices of a cell in the `polygon` of a `Workspace`."""
 
     vertex_count: int
+    """Number of vertices, in the first rows."""
     start: int
-    """Index of the first vertex."""
+    """Row of the vertex with which the edges of the cell start."""
 
 
 class _CutVertices(NamedTuple):
-    """Which vertices of a convex polygon a bisector cuts off: a consecutive range, which may pass index 0."""
+    """The consecutive vertices of a convex polygon that a bisector cuts off.
 
-    previous: int
-    """The vertex before the range, which remains."""
+    The last vertex of the polygon is followed by the first one, so that `last` may be smaller than `first`.
+    """
+
+    before: int
+    """The vertex before those that are cut off."""
     first: int
+    """The first vertex that is cut off."""
     last: int
-    following: int
-    """The vertex after the range, which remains; `_NO_VERTEX` if all vertices are cut off."""
+    """The last vertex that is cut off."""
+    after: int
+    """The vertex after those that are cut off; `_NO_VERTEX` if all vertices are cut off."""
 
 
 class CellArrays(NamedTuple):
-    """Results for n cells."""
+    """Results for n cells, for density 1."""
 
-    mass: Array
-    """(n,) m², the areas."""
-    centroid: Array
-    """(n, 2) m"""
+    masses: Array
+    """(n,) Area of each cell, m²."""
+    centroids: Array
+    """(n, 2) Centroid of each cell, m."""
     edges: Array
-    """(e, 6) The edges; for the columns, see the constants `EDGE_...`."""
+    """(e, 6) Edges of all cells; for the columns, see the constants `EDGE_...`."""
 
 
 @kernel
 def create_workspace(robot_count: int, side_count: int) -> Workspace:
-    """Allocate the working memory for the cells of a team in a region.
+    """Allocate the scratch space for the cells of a team in a region.
 
     Parameters
     ----------
     robot_count : int
+        Number of robots of the team.
     side_count : int
         Number of sides of the region.
 
@@ -109,7 +122,7 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
     -------
     Workspace
     """
-    # A cut adds at most one vertex. Two more are spare.
+    # Each cut adds at most one vertex. Two more are spare.
     max_vertices = side_count + robot_count + 2
     return Workspace(
         polygon=np.empty((max_vertices, _VERTEX_COLUMNS)),
@@ -120,14 +133,14 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
 
 @inlined_kernel
 def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int) -> int:
-    """Append a neighbor to the list of those that may bound a cell.
+    """Append a neighbor to the list of neighbors that may bound a cell.
 
-    A neighbor at the position of the generator is left out: the two do not cut each other's cells.
+    A neighbor at the position of the generator is left out, because there is no bisector between the two.
 
     Parameters
     ----------
     neighbors : (n, 4) array
-        Changed in place; see `Workspace`.
+        The list, which is changed in place; see `Workspace`.
     count : int
         Number of neighbors in the list so far.
     dx, dy : float, m
@@ -138,7 +151,7 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
     Returns
     -------
     int
-        New number of neighbors.
+        The new number of neighbors in the list.
     """
     write_neighbor(neighbors, count, dx, dy, robot)
     return count + 1 if neighbors[count, SQUARED_DISTANCE] > 0.0 else count
@@ -146,13 +159,14 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
 
 @inlined_kernel
 def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int) -> None:
-    """Write a neighbor to a row of the list of those that may bound a cell.
+    """Write a neighbor to a row of the list of neighbors that may bound a cell.
 
     Parameters
     ----------
     neighbors : (n, 4) array
-        Changed in place; see `Workspace`.
+        The list, which is changed in place; see `Workspace`.
     row : int
+        Row of the list.
     dx, dy : float, m
         Offset of the neighbor from the generator.
     robot : int
@@ -171,8 +185,9 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     Parameters
     ----------
     workspace : Workspace
-        Its first `neighbor_count` neighbors are those of the robot; they are reordered.
+        Its first neighbors are those of the robot. Their order changes.
     neighbor_count : int
+        Number of neighbors of the robot.
     points : (n, 2) array, m
         The generators.
     sides : (k, 5) array
@@ -183,11 +198,12 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
     Returns
     -------
     CellPolygon
+        The vertices of the cell, which are in the workspace.
     """
     polygon = workspace.polygon
     cut_polygon = workspace.cut_polygon
     neighbor_rows = workspace.neighbors
-    # At first the polygon is the region. The nearest neighbors cut it first, so that few of the others can
+    # At first, the polygon is the region. The nearest neighbors cut it first, so that few of the others can
     # still cut it.
     count = len(sides)
     for k in range(count):
@@ -206,7 +222,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
                 _copy_vertices(cut_polygon, polygon, count)
                 squared_range = _compute_squared_range(polygon, count)
         elif is_sorted:
-            # This is the nearest of the remaining neighbors, so none of them can cut the cell.
+            # This is the nearest of the remaining neighbors. If it is too far away, so are all others.
             break
     return CellPolygon(vertex_count=count, start=0)
 
@@ -223,8 +239,8 @@ def _copy_vertices(source: Array, target: Array, count: int) -> None:
 def _compute_squared_range(polygon: Array, count: int) -> float:
     """Return the square of the largest distance at which a neighbor can cut the polygon, m².
 
-    The bisector is half as far away as the neighbor. It therefore misses the polygon if the neighbor is more
-    than twice as far away as the farthest vertex.
+    The bisector is half as far away from the generator as the neighbor. It can cut the polygon only if the
+    neighbor is at most twice as far away as the farthest vertex.
     """
     squared_range = 0.0
     for k in range(count):
@@ -236,7 +252,7 @@ def _compute_squared_range(polygon: Array, count: int) -> float:
 
 @inlined_kernel
 def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
-    """Swap the nearest of the neighbors from `row` onwards into that row."""
+    """Exchange the neighbor in a row and the nearest of the neighbors from that row on."""
     nearest = row
     for k in range(row + 1, count):
         if neighbor_rows[k, SQUARED_DISTANCE] < neighbor_rows[nearest, SQUARED_DISTANCE]:
@@ -250,12 +266,11 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 @inlined_kernel
 def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Write the part of a convex polygon that is nearer to the generator than to a neighbor.
+    """Cut a convex polygon along the bisector between the generator and the neighbor in a row.
 
-    The part is written to `cut_polygon`: the vertices beyond the bisector between generator and neighbor are
-    replaced by the two points where the outline of the polygon crosses the bisector. Column `OTHER_CELL` of a
-    vertex is the cell on the other side of the edge that begins there, which is the neighbor's cell for the
-    new edge along the bisector.
+    The points that are nearer to the generator are written to `cut_polygon` as a polygon: the vertices beyond
+    the bisector are replaced by the two points where the outline crosses the bisector. A new edge along the
+    bisector connects these points, with the cell of the neighbor on the other side.
 
     Return the new number of vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the
     bisector.
@@ -264,52 +279,53 @@ def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: 
     if farthest == _NO_VERTEX:
         return _NOT_CUT
     cut = _find_cut_vertices(polygon, count, farthest)
-    if cut.following == _NO_VERTEX:
+    if cut.after == _NO_VERTEX:
         return 0
     # Copy the vertices that remain.
     new_count = 0
-    k = cut.following
+    k = cut.after
     while k != cut.first:
         for column in (X, Y, OTHER_CELL):
             cut_polygon[new_count, column] = polygon[k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
-    # The new edge begins where the outline leaves the generator's side of the bisector.
+    # The new edge starts where the outline leaves the generator's side of the bisector: at the vertex that
+    # was copied last, if it is on the bisector, and otherwise at a new vertex.
     robot = neighbor_rows[row, ROBOT]
-    if polygon[cut.previous, _EXCESS] == 0.0:
-        # That is at the vertex before, the last one that was copied.
+    if polygon[cut.before, _EXCESS] == 0.0:
         cut_polygon[new_count - 1, OTHER_CELL] = robot
     else:
-        _add_crossing(polygon, cut_polygon, new_count, cut.previous, cut.first, robot)
+        _add_crossing(polygon, cut_polygon, new_count, cut.before, cut.first, robot)
         new_count += 1
-    # The new edge ends where the outline returns. If that is at the following vertex, which was copied first,
-    # no vertex is added. Otherwise the rest of the edge borders on the same cell as before.
-    if polygon[cut.following, _EXCESS] < 0.0:
+    # The new edge ends where the outline returns: at the vertex that was copied first, if it is on the
+    # bisector, and otherwise at a new vertex, where the rest of an edge of the old outline starts.
+    if polygon[cut.after, _EXCESS] < 0.0:
         other_cell = polygon[cut.last, OTHER_CELL]
-        _add_crossing(polygon, cut_polygon, new_count, cut.following, cut.last, other_cell)
+        _add_crossing(polygon, cut_polygon, new_count, cut.after, cut.last, other_cell)
         new_count += 1
     return new_count
 
 
 @inlined_kernel
 def _find_cut_vertices(polygon: Array, count: int, farthest: int) -> _CutVertices:
-    """Return the range of vertices with a positive excess; `farthest` is one of them.
+    """Return the vertices with a positive excess; `farthest` is one of them.
 
-    They are consecutive, up to rounding, because the polygon is convex.
+    They are consecutive, because the polygon is convex. If rounding separates some others, these are not cut
+    off.
     """
     last = farthest
-    following = _get_next_vertex(last, count)
-    while following != farthest and polygon[following, _EXCESS] > 0.0:
-        last = following
-        following = _get_next_vertex(last, count)
+    next_vertex = _get_next_vertex(last, count)
+    while next_vertex != farthest and polygon[next_vertex, _EXCESS] > 0.0:
+        last = next_vertex
+        next_vertex = _get_next_vertex(last, count)
     first = farthest
     previous = _get_previous_vertex(first, count)
-    if following == farthest:
+    if next_vertex == farthest:
         return _CutVertices(previous, first, last, _NO_VERTEX)
     while polygon[previous, _EXCESS] > 0.0:
         first = previous
         previous = _get_previous_vertex(first, count)
-    return _CutVertices(previous, first, last, following)
+    return _CutVertices(previous, first, last, next_vertex)
 
 
 @inlined_kernel
@@ -326,11 +342,12 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 @inlined_kernel
 def _compute_excess(polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Compute the excess of each vertex of a polygon over a bisector; write it to the column `_EXCESS`.
+    """Write the excess of each vertex of a polygon over a bisector to the column `_EXCESS`.
 
     The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
-    is positive if q is nearer to the neighbor, zero on the bisector, and proportional to the distance from
-    it. Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX` if none is beyond it.
+    is proportional to the signed distance of the vertex from the bisector, and positive if the vertex is
+    nearer to the neighbor. Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX` if none is
+    beyond it.
     """
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
@@ -353,9 +370,9 @@ def _add_crossing(
     """Add a vertex to `cut_polygon` at the point where an edge of `polygon` crosses the current bisector.
 
     The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
-    the other side. The crossing is interpolated linearly from their excesses, which are proportional to
-    their signed distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`. `other_cell` is
-    the neighboring cell across the edge that starts at the new vertex.
+    the other side. The crossing is found by linear interpolation between their excesses, which are
+    proportional to their signed distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`.
+    `other_cell` is the cell on the other side of the edge that starts at the new vertex.
     """
     inner_excess = polygon[inner, _EXCESS]
     fraction = inner_excess / (inner_excess - polygon[outer, _EXCESS])
@@ -374,13 +391,15 @@ def write_cell(
     Parameters
     ----------
     workspace : Workspace
+        Scratch space that contains the vertices of the cell.
     polygon : CellPolygon
+        Which vertices these are.
     points : (n, 2) array, m
         The generators.
     i : int
         Index of the robot.
     cells : CellArrays
-        Changed in place. Edges that do not fit into its array are counted, but not written.
+        Arrays to which the results are written. Edges that do not fit are counted, but not written.
     edge_count : int
         Number of edges of the previous cells.
 
@@ -391,7 +410,7 @@ def write_cell(
     """
     vertices = workspace.polygon
     edges = cells.edges
-    # Twice the area, and six times the first moments: sums over the triangles between edges and generator.
+    # Twice the area and six times the first moments are sums over the triangles between edges and generator.
     doubled_area = 0.0
     moment_sum_x = 0.0
     moment_sum_y = 0.0
@@ -415,7 +434,7 @@ def write_cell(
             edges[edge, EDGE_OTHER_CELL] = vertices[k, OTHER_CELL]
         k = next_vertex
     factor = 1.0 / (3.0 * doubled_area) if doubled_area > 0.0 else 0.0
-    cells.mass[i] = max(0.5 * doubled_area, 0.0)
-    cells.centroid[i, 0] = points[i, 0] + moment_sum_x * factor
-    cells.centroid[i, 1] = points[i, 1] + moment_sum_y * factor
+    cells.masses[i] = max(0.5 * doubled_area, 0.0)
+    cells.centroids[i, 0] = points[i, 0] + moment_sum_x * factor
+    cells.centroids[i, 1] = points[i, 1] + moment_sum_y * factor
     return edge_count + polygon.vertex_count

@@ -1,17 +1,19 @@
 """The Delaunay triangulation of moving points, reused from step to step and repaired by flips.
 
 A mesh stores the sides of each triangle, counter-clockwise. They are called half-edges, because the edge
-between two triangles is stored twice, once for each of them: the two half-edges are *twins*, and run in
-opposite directions. Half-edge h begins at the point ``mesh[CORNER, h]``, and its twin is ``mesh[TWIN, h]``,
-or `NO_TWIN` on the outline of the mesh. The indices of the half-edges of a triangle are 4 k, 4 k + 1 and
-4 k + 2, and entry 4 k + 3 is unused, so that the lowest two bits of h are its position within the triangle.
+between two triangles is stored twice, once for each triangle. The two half-edges of an edge are *twins*, and
+run in opposite directions. Half-edge h starts at the point ``mesh[CORNER, h]``. Its twin is ``mesh[TWIN,
+h]``, or `NO_TWIN` on the outline of the mesh. The half-edges of triangle k have the indices 4 k, 4 k + 1 and
+4 k + 2. Entry 4 k + 3 is unused, so that the lowest two bits of h are the position of a half-edge within its
+triangle.
+
 Three distant points, the *sentinels*, form a triangle around the n points, and follow them in arrays of
 points. There are therefore 2 n + 1 triangles, and 8 n + 4 entries.
 
-An edge is Delaunay if the two angles opposite to it add up to at most half a turn, that is, if their
-cotangents add up to at least 0. Otherwise it is *flipped*: replaced by the other diagonal of the
-quadrilateral that its two triangles form. The cotangents also give the positions of the Voronoi vertices on
-the edge's bisector.
+An edge is Delaunay if the sum of the two angles opposite to it is at most half a turn, that is, if the sum of
+their cotangents is at least 0. Otherwise the edge is *flipped*: it is replaced by the other diagonal of the
+quadrilateral that its two triangles form. The Voronoi vertices on the bisector of an edge also follow from
+the cotangents.
 """
 
 from typing import TypeAlias
@@ -26,51 +28,53 @@ Mesh: TypeAlias = NDArray[np.int32]
 """Corners and twins of the half-edges of a triangulation of n points, (2, 8 n + 4)."""
 
 CORNER = 0
-"""Row of a mesh: the point at which each half-edge begins."""
+"""Row of a mesh: the point at which each half-edge starts."""
 TWIN = 1
-"""Row of a mesh: the half-edge of the neighboring triangle along the same edge, or `NO_TWIN`."""
+"""Row of a mesh: the twin of each half-edge, or `NO_TWIN`."""
 NO_TWIN = -1
 """Used in place of a twin on the outline of a mesh."""
 NOT_TRIANGULATED = -1
 """First corner of a mesh that does not contain a triangulation."""
 ENTRIES_PER_TRIANGLE = 4
-"""Number of entries of a mesh per triangle: three half-edges, and an unused one."""
+"""Number of entries of a mesh per triangle: three half-edges and an unused entry."""
 
 _POSITION_BITS = 3
 """Bit mask for the position of a half-edge within its triangle."""
 _FAILED = -1
 """Returned instead of a triangle or of a number of flips if rounding makes the triangulation fail."""
 _NO_HALF_EDGE = -1
-"""Returned instead of a half-edge if a point is on the right of none of a triangle."""
+"""Used in place of a half-edge if there is none."""
 
 _TOLERANCE = 1e-14
 """An edge is not flipped if the sum of its two cotangents is negative by at most this fraction of the sum of
-their magnitudes, because the sign may then be a rounding error."""
+their magnitudes, because the sign may then be due to rounding."""
 _MAX_FLIPS_PER_POINT = 16
-"""Average number of flips per point after which the attempt has failed: rounding may cause endless flips."""
+"""Maximum number of flips divided by the number of points. With more flips, the triangulation fails: they may
+be endless because of rounding."""
 _MIN_CROSS = 1e-300
 """Smallest cross product used as a divisor, which prevents division by zero, m²."""
 
 
 @kernel
 def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
-    """Make a mesh Delaunay: repair it if it is still a triangulation, and otherwise build it from scratch.
+    """Compute the Delaunay triangulation of points: repair a previous one, or else build it from scratch.
 
     Parameters
     ----------
     mesh : (2, 8 n + 4) int32 array
-        Changed in place. ``mesh[CORNER, 0]`` is `NOT_TRIANGULATED` if there is no triangulation yet.
+        On entry, a triangulation of these points at other positions, or a mesh in which ``mesh[CORNER, 0]``
+        is `NOT_TRIANGULATED`. Changed in place.
     points : (n + 3, 2) array, m
-        The last three are sentinels, whose triangle contains all others.
+        Positions of the points. The last three are sentinels, whose triangle contains all others.
     cotangents : (8 n + 4,) array
-        Overwritten by the cotangents of the angles opposite to each half-edge.
+        Result: the cotangent of the angle opposite to each half-edge.
     stack : (8 n + 4,) int array
-        Working memory.
+        Scratch space.
 
     Returns
     -------
     bool
-        Whether it succeeded.
+        False if rounding made the triangulation fail.
     """
     if mesh[CORNER, 0] != NOT_TRIANGULATED and _repair(mesh, points, cotangents, stack):
         return True
@@ -79,11 +83,12 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
 
 @inlined_kernel
 def is_half_edge(h: int) -> bool:
-    """Return whether an entry of a mesh is a half-edge: every fourth one is unused.
+    """Return whether an entry of a mesh is a half-edge: every fourth entry is unused.
 
     Parameters
     ----------
     h : int
+        Index of the entry.
 
     Returns
     -------
@@ -99,6 +104,7 @@ def get_next_half_edge(h: int) -> int:
     Parameters
     ----------
     h : int
+        The other half-edge.
 
     Returns
     -------
@@ -109,11 +115,12 @@ def get_next_half_edge(h: int) -> int:
 
 @inlined_kernel
 def get_first_half_edge(h: int) -> int:
-    """Return the first half-edge of the triangle that contains a half-edge.
+    """Return the first half-edge of the triangle of a half-edge.
 
     Parameters
     ----------
     h : int
+        The half-edge.
 
     Returns
     -------
@@ -129,6 +136,7 @@ def get_previous_half_edge(h: int) -> int:
     Parameters
     ----------
     h : int
+        The other half-edge.
 
     Returns
     -------
@@ -152,7 +160,7 @@ def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bo
             is_ccw &= are_new_ccw
             if flip_count == _FAILED:
                 return False
-    # Flips may have removed triangles that were clockwise before.
+    # Triangles that were clockwise may have been corrected or removed by later flips, so test all again.
     return is_ccw or _compute_all_cotangents(mesh, points, cotangents)
 
 
@@ -162,7 +170,7 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
 
     Each point splits the triangle that contains it into three. Edges that are then no longer Delaunay are
     flipped. The last three points are the sentinels, the corners of a triangle around all other points.
-    Triangles are represented by their first half-edges, and `stack` is working memory.
+    Triangles are represented by their first half-edges, and `stack` is scratch space.
     """
     n = len(points) - 3
     # Start with a single triangle, that of the sentinels.
@@ -192,9 +200,9 @@ def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> boo
 
 @kernel
 def _split_triangle(mesh: Mesh, first: int, second: int, third: int, i: int) -> None:
-    """Split triangle a b c at a point i inside it into the triangles a b i, b c i and c a i.
+    """Split the triangle a b c at a point i inside it into the triangles a b i, b c i and c a i.
 
-    `first` is the first half-edge of a b c, and of a b i, which replaces it. `second` and `third` are the
+    `first` is the first half-edge of a b c and of a b i, which replaces it. `second` and `third` are the
     first half-edges of the two new triangles, b c i and c a i.
     """
     a = mesh[CORNER, first]
@@ -202,7 +210,8 @@ def _split_triangle(mesh: Mesh, first: int, second: int, third: int, i: int) -> 
     c = mesh[CORNER, first + 2]
     _write_triangle(mesh, second, b, c, i)
     _write_triangle(mesh, third, c, a, i)
-    # Each side of a b c keeps its twin. Then the three edges that end at i become twins of each other.
+    # The three sides of a b c keep their twins. Then the half-edges of each of the three new edges, which end
+    # at i, are linked.
     _link(mesh, second, mesh[TWIN, first + 1])
     _link(mesh, third, mesh[TWIN, first + 2])
     mesh[CORNER, first + 2] = i
@@ -238,12 +247,12 @@ def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> boo
 
 @inlined_kernel
 def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, first_half_edge: int) -> bool:
-    """Compute the cotangents in a triangle; return whether it is counter-clockwise.
+    """Compute the cotangents in the triangle of a first half-edge; return whether it is counter-clockwise.
 
-    The triangle is given by its first half-edge. The cotangent of a half-edge is that of the angle opposite
-    to it, at the apex of the triangle. It is computed from there, so that its last bit does not depend on how
-    the triangle is stored. In a clockwise triangle the sign of the cross product is ignored, so that flips
-    can correct it.
+    The cotangent of a half-edge is that of the angle opposite to it, at the apex of the triangle. It is
+    computed from vectors that start at the apex, so that its last bit does not depend on which half-edge is
+    the first. In a clockwise triangle, the sign of the cross product is ignored, so that flips can correct
+    the triangle.
     """
     is_ccw = True
     for k in range(3):
@@ -262,10 +271,10 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, first_half
 
 @inlined_kernel
 def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
-    """Return whether the edge of a half-edge with a twin is not Delaunay, or its angles are undefined."""
+    """Return whether the edge of a half-edge with a twin is not Delaunay, or if its angles are undefined."""
     cotangent = cotangents[h]
     twin_cotangent = cotangents[mesh[TWIN, h]]
-    # This is also true if a cotangent is nan.
+    # Because of the `not`, this is also true if a cotangent is nan.
     return not cotangent + twin_cotangent >= -_TOLERANCE * (abs(cotangent) + abs(twin_cotangent))
 
 
@@ -273,14 +282,15 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
     """Walk from a triangle to the one that contains (x, y); return its first half-edge, or `_FAILED`.
 
-    Each step crosses an edge that has the point on its other side.
+    Each step crosses an edge that separates the triangle from the point.
     """
     triangle = start
-    # Because of rounding, the walk could go in circles.
+    # Because of rounding, the walk could otherwise be endless.
     max_steps = 3 * triangle_count + 3
     for _ in range(max_steps):
         h = _find_edge_to_cross(mesh, points, triangle, x, y)
-        if h == _NO_HALF_EDGE:
+        contains_point = h == _NO_HALF_EDGE
+        if contains_point:
             return triangle
         twin = mesh[TWIN, h]
         if twin == NO_TWIN:
@@ -318,9 +328,9 @@ def _flip_from(
            \ | /                \   /
              d                    d
 
-    Afterwards, the four sides of the quadrilateral may have to be flipped; the stack contains the edges that
-    are still to be tested. Return the number of flips so far, or `_FAILED`, and whether all new triangles are
-    counter-clockwise.
+    Afterwards, the four sides of the quadrilateral may have to be flipped. The stack contains the edges that
+    still have to be tested. Return the number of flips so far, or `_FAILED`, and whether all new triangles
+    are counter-clockwise.
     """
     stack[0] = first_half_edge
     stack_size = 1
@@ -331,10 +341,10 @@ def _flip_from(
         twin = mesh[TWIN, half_edge]
         if twin == NO_TWIN or not _must_flip(mesh, cotangents, half_edge):
             continue
-        # The new edge connects the two corners opposite to the old edge. Its half-edges are
-        # `before_half_edge` and `before_twin`, which precede those of the old edge in their triangles. The
-        # half-edges of the old edge move to two sides of the quadrilateral: `half_edge` to the place of
-        # `before_twin`, and `twin` to that of `before_half_edge`.
+        # The new edge connects the two corners opposite to the old edge. The half-edges that precede those of
+        # the old edge in their triangles, `before_half_edge` and `before_twin`, become its half-edges. The
+        # half-edges of the old edge take their place as sides of the quadrilateral: `half_edge` that of
+        # `before_twin`, and `twin` that of `before_half_edge`.
         before_half_edge = get_previous_half_edge(half_edge)
         before_twin = get_previous_half_edge(twin)
         mesh[CORNER, half_edge] = mesh[CORNER, before_twin]
@@ -347,7 +357,7 @@ def _flip_from(
         flip_count += 1
         if flip_count > _MAX_FLIPS_PER_POINT * len(points) or stack_size + 4 > len(stack):
             return _FAILED, False
-        # The outline of the quadrilateral: edges that the flip may have made non-Delaunay.
+        # The four sides of the quadrilateral may no longer be Delaunay.
         stack[stack_size] = half_edge
         stack[stack_size + 1] = get_next_half_edge(half_edge)
         stack[stack_size + 2] = twin

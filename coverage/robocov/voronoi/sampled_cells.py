@@ -8,27 +8,29 @@ from robocov.compiled import kernel
 
 @kernel
 def find_own_samples(
-    samples: Array, positions: Array, robot: IntArray, neighbor_positions: Array
+    samples: Array, positions: Array, robots: IntArray, neighbor_positions: Array
 ) -> BoolArray:
-    """Find the samples in the cell of each robot: no neighbor is nearer to them than the robot is.
+    """Find the samples in the cell of each robot: those to which no neighbor is nearer than the robot.
 
     Parameters
     ----------
     samples : (k, 2) array, m
+        Positions of the samples.
     positions : (n, 2) array, m
         Positions of the robots.
-    robot : (m,) int array
-        The robot in each pair of a robot and one of its neighbors.
+    robots : (m,) int array
+        Index of the robot in each pair of a robot and one of its neighbors.
     neighbor_positions : (m, 2) array, m
         Position of the neighbor in each pair, as known to the robot.
 
     Returns
     -------
     (n, k) bool array
+        Whether each sample is in the cell of each robot.
     """
     is_own = np.ones((len(positions), len(samples)), dtype=np.bool_)
-    for m in range(len(robot)):
-        i = robot[m]
+    for m in range(len(robots)):
+        i = robots[m]
         for k in range(len(samples)):
             if is_own[i, k]:
                 x = samples[k, 0]
@@ -41,27 +43,29 @@ def find_own_samples(
     return is_own
 
 
-def compute_sample_centroids(is_own: BoolArray, samples: Array, mass: Array, positions: Array) -> Array:
+def compute_sample_centroids(is_own: BoolArray, samples: Array, masses: Array, positions: Array) -> Array:
     """Compute the centroids of cells that consist of samples.
 
     Parameters
     ----------
     is_own : (n, k) bool array
-        Whether each sample belongs to each cell.
+        Whether each sample is in each cell.
     samples : (k, 2) array, m
-    mass : (k,) or (n, k) array
+        Positions of the samples.
+    masses : (k,) or (n, k) array
         Mass of each sample, the same for all robots or as known to each robot.
     positions : (n, 2) array, m
-        Positions of the robots, which replace the centroids of cells without mass.
+        Positions of the robots.
 
     Returns
     -------
     (n, 2) array, m
+        Centroid of each cell. If a cell has no mass, it is the position of the robot.
     """
-    weight = is_own * mass
-    total = weight.sum(axis=1)
-    moment_x = (weight * samples[:, 0]).sum(axis=1)
-    moment_y = (weight * samples[:, 1]).sum(axis=1)
-    is_filled = total > 0.0
-    centroid = np.column_stack([moment_x, moment_y]) / np.where(is_filled, total, 1.0)[:, None]
-    return np.where(is_filled[:, None], centroid, positions)
+    cell_masses = is_own * masses
+    total_masses = cell_masses.sum(axis=1)
+    moments_x = (cell_masses * samples[:, 0]).sum(axis=1)
+    moments_y = (cell_masses * samples[:, 1]).sum(axis=1)
+    has_mass = total_masses > 0.0
+    centroids = np.column_stack([moments_x, moments_y]) / np.where(has_mass, total_masses, 1.0)[:, None]
+    return np.where(has_mass[:, None], centroids, positions)

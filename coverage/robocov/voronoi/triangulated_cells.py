@@ -1,4 +1,4 @@
-"""Cells from a Delaunay triangulation, in which the neighbors of a robot are those that bound its cell."""
+"""Cells from a Delaunay triangulation, whose edges connect robots with a common border."""
 
 from typing import NamedTuple
 
@@ -34,23 +34,23 @@ FAILED = -1
 _MAX_OFFSET_SIZES = 2.0
 """Largest offset of a robot from the center of the region in x and y, as a multiple of the region's size.
 
-The sentinels are at least 9 sizes away from the center. Robots within these offsets lie in their triangle,
-and are nearer than any sentinel to every point of the region, so that no sentinel cuts a cell.
+The sentinels are at least 9 sizes away from the center. Robots within these offsets lie in the triangle of
+the sentinels, and are nearer than any sentinel to every point of the region, so that no sentinel cuts a cell.
 """
 _AREA_TOLERANCE = 1e-12
-"""Largest difference that rounding may cause between the total area of the cells and the area of the region,
-as a fraction of the region's area."""
+"""Largest difference between the total area of the cells and the area of the region that may be due to
+rounding, as a fraction of the area of the region."""
 
 
 class Triangulation(NamedTuple):
-    """A Delaunay triangulation of n robots."""
+    """A Delaunay triangulation of n robots and three sentinels."""
 
     mesh: Mesh
     """(2, 8 n + 4) Corners and twins of the half-edges."""
     cotangents: Array
-    """(8 n + 4,) Cotangents of the angles opposite to the half-edges."""
+    """(8 n + 4,) Cotangent of the angle opposite to each half-edge."""
     half_edges: IntArray
-    """(n + 3,) A half-edge that begins at each robot, and at each of the three sentinels."""
+    """(n + 3,) A half-edge that starts at each robot and each sentinel."""
 
 
 class _Fan(NamedTuple):
@@ -59,19 +59,20 @@ class _Fan(NamedTuple):
     neighbor_count: int
     """Number of neighbors, and of Voronoi vertices."""
     half_edge_to_lowest: int
-    """Half-edge to the neighbor with the lowest number."""
-    lowest_index: int
-    """Index of that neighbor among the neighbors."""
-    squared_reach: float
-    """Squared distance of the farthest Voronoi vertex, m²; infinite if the cell is not bounded by robots."""
+    """Half-edge that leads to the neighbor with the lowest index among the robots."""
+    lowest_position: int
+    """Position of this neighbor in the order of the triangles."""
+    max_squared_distance: float
+    """Squared distance of the farthest Voronoi vertex from the robot, m²; infinite if robots alone do not
+    bound the cell."""
 
 
 @kernel
 def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
     """Compute all cells from a Delaunay triangulation.
 
-    A cell that lacks the edge to a neighbor is too large. The cells are therefore correct if their areas add
-    up to the area of the region.
+    If a robot lacks a neighbor in the triangulation, its cell is too large. The cells are therefore correct
+    if the sum of their areas is the area of the region.
 
     Parameters
     ----------
@@ -82,14 +83,14 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     mesh : (2, 8 n + 4) int32 array
         Triangulation of a previous partition, if there is one; see `update_triangulation`. Changed in place.
     cells : CellArrays
-        Changed in place.
+        Overwritten by the cells.
 
     Returns
     -------
     int
-        Number of edges, or `FAILED`; the triangulation may fail if robots coincide.
+        Number of edges of all cells, or `FAILED`. The triangulation may fail if robots coincide.
     """
-    # Three sentinels, far away, are triangulated together with the robots.
+    # Three distant sentinels are triangulated together with the robots.
     half_edges = np.empty(len(points) + 3, np.intp)
     triangulation = Triangulation(mesh, np.empty(mesh.shape[1]), half_edges)
     if not _triangulate(triangulation, points, sides):
@@ -100,7 +101,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     for i in range(len(points)):
         polygon = _find_cell(workspace, triangulation, points, sides, i)
         edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
-        total_area += cells.mass[i]
+        total_area += cells.masses[i]
     region_area = _compute_region_area(sides)
     is_complete = abs(total_area - region_area) <= _AREA_TOLERANCE * region_area
     return edge_count if is_complete else FAILED
@@ -128,7 +129,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
     stack = np.empty(mesh.shape[1], np.intp)
     if not update_triangulation(mesh, vertices, triangulation.cotangents, stack):
         return False
-    # Store one half-edge that begins at each point; it does not matter which.
+    # Store a half-edge that starts at each point. It does not matter which one.
     for h in range(mesh.shape[1]):
         if is_half_edge(h):
             half_edges[mesh[CORNER, h]] = h
@@ -163,10 +164,10 @@ def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
 
 @kernel
 def _compute_region_area(sides: Array) -> float:
-    """Return the area of the region, m².
+    """Return the area of the region, m², by the shoelace formula.
 
-    The shoelace formula is applied to its vertices, which are the starts of its sides. Their coordinates are
-    taken relative to the center of the region, to reduce rounding errors.
+    The coordinates of the vertices, at which the sides start, are taken relative to the center of the region,
+    to reduce rounding errors.
     """
     x, y, _ = _compute_center_and_size(sides)
     area = 0.0
@@ -185,17 +186,17 @@ def _find_cell(
 ) -> CellPolygon:
     """Find the cell of robot i from the triangles around it.
 
-    The neighbors of the robot are the other corners of these triangles, and the vertices of its cell are
-    their circumcenters. If the cell may reach beyond the region, the region is clipped along the bisectors to
-    these neighbors instead.
+    The neighbors of the robot are the other corners of these triangles, and the vertices of its cell are the
+    circumcenters of the triangles. If the cell may extend beyond the region, the region is clipped along the
+    bisectors to these neighbors instead.
     """
     fan = _walk_around(workspace, triangulation, points, i, triangulation.half_edges[i])
     clearance = _compute_clearance(sides, points[i, 0], points[i, 1])
-    # In both cases below, the cell starts at the neighbor with the lowest number, so that its last bits do
-    # not depend on the order of the triangles.
-    is_within_region = clearance > 0.0 and fan.squared_reach < clearance * clearance
+    # In both cases below, the cell starts at the neighbor with the lowest index, so that its last bits do not
+    # depend on the triangle at which the walk starts.
+    is_within_region = clearance > 0.0 and fan.max_squared_distance < clearance * clearance
     if is_within_region:
-        return CellPolygon(vertex_count=fan.neighbor_count, start=fan.lowest_index)
+        return CellPolygon(vertex_count=fan.neighbor_count, start=fan.lowest_position)
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
 
@@ -214,21 +215,20 @@ def _compute_clearance(sides: Array, x: float, y: float) -> float:
 def _walk_around(
     workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
 ) -> _Fan:
-    """Write the neighbors and Voronoi vertices of robot i, counter-clockwise from its first half-edge.
+    """Write the neighbors and Voronoi vertices of robot i to the workspace, counter-clockwise.
 
-    The walk visits the half-edges that begin at the robot. Each leads to a neighbor j, and belongs to a
-    triangle, whose circumcenter is the Voronoi vertex. All coordinates are relative to the robot. Points from
-    number n on are sentinels, which are no neighbors.
+    The walk visits the half-edges that start at the robot, from `first_half_edge` on. Each leads to a
+    neighbor j, and belongs to a triangle, whose circumcenter is a Voronoi vertex. All coordinates are
+    relative to the robot. Points with an index of n or more are sentinels, which are no neighbors.
     """
     mesh = triangulation.mesh
     polygon = workspace.polygon
     n = len(points)
     count = 0
-    # Cells start at the neighbor with the lowest number, whichever triangle comes first.
     lowest_robot = n
     half_edge_to_lowest = first_half_edge
-    lowest_index = 0
-    squared_reach = 0.0
+    lowest_position = 0
+    max_squared_distance = 0.0
     h = first_half_edge
     while True:
         previous = get_previous_half_edge(h)
@@ -237,28 +237,29 @@ def _walk_around(
             if j < lowest_robot:
                 lowest_robot = j
                 half_edge_to_lowest = h
-                lowest_index = count
+                lowest_position = count
             dx = points[j, 0] - points[i, 0]
             dy = points[j, 1] - points[i, 1]
             x, y = _compute_voronoi_vertex(dx, dy, triangulation.cotangents[h])
-            squared_reach = max(squared_reach, x * x + y * y)
+            max_squared_distance = max(max_squared_distance, x * x + y * y)
             polygon[count, X] = x
             polygon[count, Y] = y
-            # The edge from this Voronoi vertex to the next borders on the third corner of the triangle.
+            # The edge from this Voronoi vertex to the next one borders on the cell of the triangle's third
+            # corner.
             polygon[count, OTHER_CELL] = mesh[CORNER, previous]
             write_neighbor(workspace.neighbors, count, dx, dy, j)
             count += 1
         else:
-            # Robot i is connected to a sentinel: its cell is not bounded by robots alone.
-            squared_reach = np.inf
+            # Robot i is connected to a sentinel, so that other robots alone do not bound its cell.
+            max_squared_distance = np.inf
         # Turn to the next triangle counter-clockwise.
         h = mesh[TWIN, previous]
         if h == first_half_edge:
             return _Fan(
                 neighbor_count=count,
                 half_edge_to_lowest=half_edge_to_lowest,
-                lowest_index=lowest_index,
-                squared_reach=squared_reach,
+                lowest_position=lowest_position,
+                max_squared_distance=max_squared_distance,
             )
 
 
@@ -266,8 +267,8 @@ def _walk_around(
 def _compute_voronoi_vertex(dx: float, dy: float, cotangent: float) -> tuple[float, float]:
     """Return the circumcenter of a triangle relative to one of its corners, m.
 
-    (dx, dy) leads from that corner to the next one, counter-clockwise, and `cotangent` is that of the angle
-    opposite to this edge. The circumcenter lies on the bisector of the edge. Its offset to the left is half
-    the length of the edge times the cotangent.
+    An edge of the triangle leads from this corner to the next one counter-clockwise, which is at the offset
+    (dx, dy). `cotangent` is that of the angle opposite to the edge. The circumcenter lies on the bisector of
+    the edge, to its left by half the length of the edge times the cotangent.
     """
     return 0.5 * (dx - cotangent * dy), 0.5 * (dy + cotangent * dx)

@@ -1,15 +1,16 @@
 """Cells by travel time: the multiplicatively weighted Voronoi partition of robots of different speeds.
 
-Cell i contains the points that robot i reaches before any other, |q - p_i| / v_i <= |q - p_j| / v_j, on a
-straight line. The border between robots of the same speed is their bisector; between robots of different
-speeds it is a circle of Apollonius around the slower one. Cells are bounded by segments and arcs, and may be
-neither convex nor connected: the cell of a slow robot is a hole in that of a fast one, or divides it. The
-centroid, at which the cost sum_i int |q - p_i|² / v_i² dq is smallest for given cells, may then lie in the
-cell of another robot.
+Cell i contains the points q that robot i reaches first on a straight line: |q - p_i| / v_i <= |q - p_j| / v_j
+for all other robots j. The border between robots of the same speed is their bisector. Between robots of
+different speeds, it is a circle of Apollonius around the slower robot. Cells are bounded by segments and
+arcs. They may be neither convex nor connected: the cell of a slow robot may be a hole in that of a fast
+robot, or divide it. The centroid, which minimizes the cost sum_i ∫ |q - p_i|² / v_i² dq for given cells, may
+then lie in the cell of another robot.
 
 Source: F. Aurenhammer and H. Edelsbrunner, *An optimal algorithm for constructing the weighted Voronoi
-diagram in the plane*, Pattern Recognition 17 (1984). Here the pieces of all boundaries are found
-independently and not linked, because Green's theorem needs no order.
+diagram in the plane*, Pattern Recognition 17 (1984). Unlike there, the pieces of all boundaries are found
+independently of each other and are not linked, because the integrals by Green's theorem do not depend on
+their order.
 """
 
 from dataclasses import dataclass
@@ -36,35 +37,36 @@ from robocov.voronoi.bounded_partition import (
 from robocov.voronoi.delaunay import Mesh
 
 _OUTLINE_DEVIATION = 2e-4
-"""Maximum deviation of drawn outlines from their arcs, relative to the region's diameter."""
+"""Maximum deviation of drawn outlines from their arcs, as a fraction of the region's diameter."""
 _EDGE_DEVIATION = 2e-5
-"""Maximum deviation of the polygons that replace cells in integrals, relative to the region's diameter."""
+"""Maximum deviation of the polygons that replace cells in integrals, as a fraction of the region's
+diameter."""
 _MIN_AREA = 1e-14
-"""Area of a cell, relative to that of the region, below which it is empty up to rounding."""
+"""Areas of cells below this fraction of the area of the region may be rounding errors."""
 
 
 @dataclass(eq=False, kw_only=True)
 class WeightedCells(Cells):
     """The cells of robots of different speeds within a convex region.
 
-    The centroid of a cell that is not convex may lie outside it. There is no triangulation.
+    A cell may be neither convex nor connected, and its centroid may lie outside the cell.
 
     Attributes
     ----------
     generators : (n, 2) array, m
-        The points to which the cells belong.
+        The position of the robot to which each cell belongs.
     mass : (n,) array, m²
-        M of equation (2): the area of each cell if the density is 1.
+        Mass M of each cell, equation (2). It is the area if the density is 1.
     centroid : (n, 2) array, m
-        C of equation (2). The centroid of an empty cell is its generator.
+        Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
     density : Density or None
-        φ of mass, centroid and moments; None means 1 everywhere.
+        Density φ with which masses, centroids and moments are computed; None means 1 everywhere.
     triangulation : None
-        There is none.
+        These cells have no triangulation.
     speeds : (n,) array, m/s
-        Speeds of the robots.
+        Speed of each robot.
     pieces : (p, 7) array
-        The pieces of the boundaries, by cell; for the columns see `robocov.voronoi.arcs`.
+        The pieces of the boundaries, sorted by cell; for the columns, see `robocov.voronoi.arcs`.
     region : Region
         The region that the cells divide.
 
@@ -85,33 +87,32 @@ class WeightedCells(Cells):
     """
 
     speeds: Array
-    """(n,) m/s"""
     pieces: Array
-    """(p, 7) The pieces of the boundaries, by cell; for the columns see `robocov.voronoi.arcs`."""
     region: Region
 
     @cached_property
     def edges(self) -> CellEdges:
-        """The boundaries as polygons that deviate from the arcs by at most 2e-5 of the region's diameter.
+        """The boundaries as edges, with chords in place of the arcs.
 
-        The edges of a cell are in no particular order. Those of holes run clockwise.
+        The chords deviate from the arcs by at most 2e-5 of the region's diameter. The edges of a cell are in
+        no particular order. The edges of holes run clockwise.
         """
         lines = split_into_chords(self.pieces, _EDGE_DEVIATION * self.region.diameter)
         chord_counts = [len(line) - 1 for line in lines]
         return CellEdges(
-            start=np.concatenate([np.empty((0, 2)), *(line[:-1] for line in lines)]),
-            end=np.concatenate([np.empty((0, 2)), *(line[1:] for line in lines)]),
-            cell=self.pieces[:, CELL].astype(np.intp).repeat(chord_counts),
-            other_cell=self.pieces[:, OTHER_CELL].astype(np.intp).repeat(chord_counts),
+            starts=np.concatenate([np.empty((0, 2)), *(line[:-1] for line in lines)]),
+            ends=np.concatenate([np.empty((0, 2)), *(line[1:] for line in lines)]),
+            cells=self.pieces[:, CELL].astype(np.intp).repeat(chord_counts),
+            other_cells=self.pieces[:, OTHER_CELL].astype(np.intp).repeat(chord_counts),
         )
 
     @cached_property
     def outlines(self) -> tuple[list[Array], IntArray]:
-        """The outlines of the cells as polygons, (k, 2) m each, and the cell that each outline belongs to.
+        """The outlines of the cells as polygons, (k, 2) m each, and the index of the cell of each outline.
 
-        Chords replace the arcs. Outlines run counter-clockwise around a component of a cell, clockwise around
-        a hole. The cells of fast robots come first. A hole in a cell contains only cells of slower robots,
-        which are painted later, so that a program that cannot draw holes may fill them.
+        Chords replace the arcs. An outline runs counter-clockwise around a component of a cell, or clockwise
+        around a hole. The cells of fast robots come first. A hole in a cell contains only cells of slower
+        robots, so that a program that cannot draw holes may fill them, and paint the later cells over them.
         """
         outlines = []
         cells = []
@@ -124,7 +125,7 @@ class WeightedCells(Cells):
 
     @cached_property
     def polar_moment(self) -> Array:
-        """Polar moments of the cells about their generators, (n,) m⁴; exact if the density is uniform."""
+        """Polar moment of each cell about its generator, (n,) m⁴; exact if the density is uniform."""
         if self.density is not None and not self.density.is_uniform:
             return super().polar_moment
         weight = 1.0 if self.density is None else self.density.max_value
@@ -141,32 +142,33 @@ def partition_by_travel_time(
     reported_positions: Array | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition | WeightedCells:
-    """Compute the cells of the points that each robot reaches first, on a straight line.
+    """Compute the cells of points that each robot reaches before all others on a straight line.
 
-    Each cell depends, to the last bit, only on the positions and speeds of its robot and of its neighbors.
+    Each cell depends, to the last bit, only on the positions and speeds of its robot and of the neighbors.
 
     Parameters
     ----------
     generators : (n, 2) array, m
-        Generators at the same position do not cut each other's cells if they are equally fast. Otherwise only
-        the fastest of them have a cell, and the cells of the others are empty.
+        Positions of the robots. Equally fast robots at the same position have the same cell. If a faster
+        robot is at the position of a robot, the cell of the slower one is empty.
     speeds : (n,) array, m/s
-        Positive. If all are equal, the cells are those of `partition`, bit for bit.
+        Speed of each robot, above 0. If all are equal, the cells are those of `partition`, bit for bit.
     region, neighbors, triangulation, reported_positions
         See `partition`.
     density : Density or None
-        φ is integrated over cells whose arcs are replaced by chords, which deviate from them by at most 2e-5
-        of the region's diameter. By default it is 1 everywhere, and moments are exact.
+        Density φ with which masses, centroids and moments are computed. It is integrated over cells in which
+        chords replace the arcs; the chords deviate from the arcs by at most 2e-5 of the region's diameter. By
+        default the density is 1 everywhere, and the integrals are exact.
 
     Returns
     -------
     VoronoiPartition or WeightedCells
-        A `VoronoiPartition` if all robots are equally fast.
+        The cells: a `VoronoiPartition` if all robots are equally fast, and otherwise `WeightedCells`.
 
     Raises
     ------
     InputError
-        See `partition`; also if the speeds are not n positive, finite numbers.
+        If the speeds are not n positive, finite numbers, and for the reasons given in `partition`.
 
     See Also
     --------
@@ -176,12 +178,12 @@ def partition_by_travel_time(
     Notes
     -----
     Cell i contains the points q with ``|q - p_i| / v_i <= |q - p_j| / v_j`` for all neighbors j. The border
-    between two cells is part of a circle of Apollonius. The paper has only cells of equal speeds (1), and
-    names heterogeneous teams as future work.
+    between the cells of two robots of different speeds is part of a circle of Apollonius. The paper considers
+    only robots of equal speeds (1), and names heterogeneous teams as future work.
 
     Examples
     --------
-    The cell of a robot is a disc if the other one is twice as fast. Its radius is 2/3 of their distance.
+    If the other robot is twice as fast, the cell of a robot is a disc, whose radius is 2/3 of their distance.
 
     >>> import numpy as np
     >>> import robocov as rc
@@ -211,46 +213,50 @@ def partition_by_travel_time(
 def _compute_weighted_cells(
     points: Array, speeds: Array, region: Region, neighbors: Neighbors, reported_positions: Array | None
 ) -> WeightedCells:
-    """Compute cells of robots whose speeds are not all equal, for a density of 1.
+    """Compute the cells of robots whose speeds are not all equal, for density 1.
 
     The borders between robots of the same speed are straight, and bound a polygon around each robot. The
     circles of Apollonius between robots of different speeds then cut areas off these polygons.
     """
-    robot, neighbor = neighbors.list_pairs()
-    neighbor_positions = points[neighbor] if reported_positions is None else np.asarray(reported_positions)
-    is_equal = speeds[robot] == speeds[neighbor]
-    equal_cells = partition(
+    robots, other_robots = neighbors.list_pairs()
+    if reported_positions is None:
+        neighbor_positions = points[other_robots]
+    else:
+        neighbor_positions = np.asarray(reported_positions)
+    is_equal = speeds[robots] == speeds[other_robots]
+    polygons = partition(
         points,
         region,
-        Neighbors.from_pairs(len(points), robot[is_equal], neighbor[is_equal]),
+        Neighbors.from_pairs(len(points), robots[is_equal], other_robots[is_equal]),
         reported_positions=None if reported_positions is None else neighbor_positions[is_equal],
     )
-    edges = equal_cells.edges
-    offsets = neighbor_positions - points[robot]
+    edges = polygons.edges
+    offsets = neighbor_positions - points[robots]
     is_straight = np.empty(len(points), dtype=bool)
-    # When the kernel runs as Python, NumPy would warn of infinite and undefined numbers.
+    # If the kernel runs as Python code, NumPy would warn of infinite and undefined numbers.
     with np.errstate(all="ignore"):
         pieces = trace_boundaries(
             points=points,
             sides=region.sides,
-            pairs=np.column_stack([robot, neighbor, offsets, speeds[robot], speeds[neighbor]]),
-            edges=np.column_stack([edges.start, edges.end, edges.cell, edges.other_cell]),
+            pairs=np.column_stack([robots, other_robots, offsets, speeds[robots], speeds[other_robots]]),
+            edges=np.column_stack([edges.starts, edges.ends, edges.cells, edges.other_cells]),
             is_straight=is_straight,
         )
     moments = compute_moments(pieces, cell_count=len(points))
     areas = moments[:, MASS]
     first_moments = moments[:, [MOMENT_X, MOMENT_Y]]
-    mass = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
+    masses = np.where(areas < _MIN_AREA * region.area, 0.0, areas)
     # The centroid of an empty cell is its generator.
-    centroid = points + first_moments / np.where(mass > 0.0, mass, np.inf)[:, None]
-    # A cell without arcs is the same as among equally fast robots, and so are the bits of mass and centroid.
-    mass = np.where(is_straight, equal_cells.mass, mass)
-    centroid = np.where(is_straight[:, None], equal_cells.centroid, centroid)
+    centroids = points + first_moments / np.where(masses > 0.0, masses, np.inf)[:, None]
+    # A cell without arcs is one of the polygons. Take the mass and centroid that were computed for the
+    # polygon, so that their last bits do not depend on the presence of other robots.
+    masses = np.where(is_straight, polygons.mass, masses)
+    centroids = np.where(is_straight[:, None], polygons.centroid, centroids)
     speeds.setflags(write=False)
     return WeightedCells(
         generators=points,
-        mass=mass,
-        centroid=centroid,
+        mass=masses,
+        centroid=centroids,
         speeds=speeds,
         pieces=pieces,
         region=region,
@@ -258,7 +264,7 @@ def _compute_weighted_cells(
 
 
 def _convert_speeds(values: object, robot_count: int) -> Array:
-    """Convert speeds to a new array of shape (n,); raise InputError if they are not positive numbers."""
+    """Convert speeds to a new array, (n,); raise InputError if they are not positive, finite numbers."""
     try:
         speeds = np.array(values, dtype=np.float64)
         is_valid = speeds.shape == (robot_count,) and bool(((speeds > 0.0) & (speeds < np.inf)).all())
@@ -270,5 +276,5 @@ def _convert_speeds(values: object, robot_count: int) -> Array:
 
 
 def _to_list(values: object) -> object:
-    """Convert an array to a list, which messages can quote; return anything else unchanged."""
+    """Convert an array to a list, so that messages can quote it; return anything else unchanged."""
     return values.tolist() if isinstance(values, np.ndarray) else values

@@ -326,7 +326,7 @@ def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: in
         own_cells = partition(known_positions, SQUARE)
         assert cells.mass[i] == pytest.approx(own_cells.mass[0], rel=1e-9, abs=1e-12)
         np.testing.assert_allclose(cells.centroid[i], own_cells.centroid[0], atol=1e-9)
-        other_cells = cells.edges.other_cell[cells.edges.cell == i]
+        other_cells = cells.edges.other_cells[cells.edges.cells == i]
         assert set(other_cells.tolist()) <= {-1, *other[robot == i].tolist()}
 
 

@@ -84,13 +84,13 @@ def test_polygons_with_chords_instead_of_arcs_have_nearly_the_same_moments() -> 
     radius = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 5.0, np.inf])
     area, offsets = compute_disc_limited_moments(cells.edges, radius)
     edges = build_disc_limited_polygons(cells.edges, radius)
-    cross = edges.start[:, 0] * edges.end[:, 1] - edges.start[:, 1] * edges.end[:, 0]
-    polygon_area = 0.5 * np.bincount(edges.cell, cross, minlength=7)
+    cross = edges.starts[:, 0] * edges.ends[:, 1] - edges.starts[:, 1] * edges.ends[:, 0]
+    polygon_area = 0.5 * np.bincount(edges.cells, cross, minlength=7)
     assert (polygon_area <= area * (1 + 1e-12)).all()
     np.testing.assert_allclose(polygon_area, area, rtol=5e-4)
     for axis in (0, 1):
-        moments = cross * (edges.start + edges.end)[:, axis] / 6.0
-        polygon_offset = np.bincount(edges.cell, moments, minlength=7) / polygon_area
+        moments = cross * (edges.starts + edges.ends)[:, axis] / 6.0
+        polygon_offset = np.bincount(edges.cells, moments, minlength=7) / polygon_area
         np.testing.assert_allclose(polygon_offset, offsets[:, axis], atol=1e-3)
 
 

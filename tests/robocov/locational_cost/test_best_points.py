@@ -49,12 +49,12 @@ def find_best_point(ring: np.ndarray, f: Performance) -> np.ndarray:
 
 def select_cell_edges(edges: CellEdges, index: int) -> CellEdges:
     """Return the edges of one cell as those of a partition with this cell only."""
-    is_of_cell = edges.cell == index
+    is_of_cell = edges.cells == index
     return CellEdges(
-        edges.start[is_of_cell],
-        edges.end[is_of_cell],
+        edges.starts[is_of_cell],
+        edges.ends[is_of_cell],
         np.zeros(is_of_cell.sum(), dtype=int),
-        edges.other_cell[is_of_cell],
+        edges.other_cells[is_of_cell],
     )
 
 
@@ -102,15 +102,15 @@ def test_best_points_lie_in_their_cells_and_have_no_gradient(
     offsets = points - cells.generators
     edges = cells.edges
     size = region.diameter
-    along = edges.end - edges.start
+    along = edges.ends - edges.starts
     length = np.hypot(*along.T)
     is_long = length > 1e-9 * size
-    lever = offsets[edges.cell] - edges.start
+    lever = offsets[edges.cells] - edges.starts
     cross = along[:, 1] * lever[:, 0] - along[:, 0] * lever[:, 1]
     distance_outside = cross[is_long] / length[is_long]
     assert distance_outside.max(initial=-1.0) <= 1e-9 * size
     # In cells that are not extremely thin the gradient is small against the cost per width.
-    width = cells.mass / np.maximum(np.bincount(edges.cell, length, len(points)), 1e-300)
+    width = cells.mass / np.maximum(np.bincount(edges.cells, length, len(points)), 1e-300)
     is_wide = width > 1e-5 * size
     scale = np.abs(compute_locational_costs(edges, offsets, f)) / np.maximum(width, 1e-300)
     residual = np.abs(compute_gradients(edges, offsets, f)).max(axis=1)

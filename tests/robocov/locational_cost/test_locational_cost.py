@@ -206,7 +206,7 @@ def test_squared_distances_obey_the_parallel_axis_theorem(seed: int, name: str, 
         compute_hessians(cells.edges, points, f), curvature, rtol=1e-9, atol=1e-12 * size**2
     )
     np.testing.assert_allclose(
-        compute_derivatives(cells.edges, points, f).area, cells.mass, rtol=1e-9, atol=1e-12 * size**2
+        compute_derivatives(cells.edges, points, f).areas, cells.mass, rtol=1e-9, atol=1e-12 * size**2
     )
 
 
@@ -274,7 +274,7 @@ def test_costs_far_from_the_origin_are_equally_accurate() -> None:
 def test_edges_as_short_as_rounding_errors_do_not_affect_the_clearance() -> None:
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0 + 2e-16, 1.0 - 2e-16], [0.0, 1.0]])
     derivatives = compute_derivatives(build_cell_edges(ring), np.full((1, 2), 0.4), Distance())
-    assert derivatives.clearance[0] == pytest.approx(0.4)
+    assert derivatives.clearances[0] == pytest.approx(0.4)
 
 
 def test_cells_without_area_cost_nothing() -> None:

@@ -94,7 +94,7 @@ def assert_same_cells(updated: VoronoiPartition, built: VoronoiPartition, region
     if list_triangles(updated.triangulation) == list_triangles(built.triangulation):
         assert updated.mass.tobytes() == built.mass.tobytes()
         assert updated.centroid.tobytes() == built.centroid.tobytes()
-        assert updated.edges.start.tobytes() == built.edges.start.tobytes()
+        assert updated.edges.starts.tobytes() == built.edges.starts.tobytes()
 
 
 def test_robots_on_the_boundary_and_outside_have_complete_polygons() -> None:

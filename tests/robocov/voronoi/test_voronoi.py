@@ -84,7 +84,7 @@ def test_three_cells_that_meet_on_the_boundary() -> None:
     cells = partition(np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 0.0]]), SQUARE)
     assert cells.mass == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
     assert cells.adjacency.tolist() == [[0, 1], [1, 2]]
-    assert sorted(cells.edges.other_cell[cells.edges.cell == 1].tolist()) == [REGION, REGION, REGION, 0, 2]
+    assert sorted(cells.edges.other_cells[cells.edges.cells == 1].tolist()) == [REGION, REGION, REGION, 0, 2]
     assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
 
 
