@@ -1,6 +1,6 @@
 """The command `robocov`: finds the subcommand, and turns errors into one line and an exit status.
 
-Only the module of the subcommand that is called is imported, so that help appears at once.
+Only the module of the called subcommand is imported, so that help appears at once.
 """
 
 import importlib
@@ -23,9 +23,13 @@ if TYPE_CHECKING:
     from robocov.errors import RobocovError
 
 OK = 0
+"""Exit status of a command that succeeded."""
 FAILED = 1
+"""Exit status of a command that failed for a reason other than its input."""
 BAD_INPUT = 2
+"""Exit status of a command whose input cannot be used."""
 INTERRUPTED = 130
+"""Exit status of a command that was interrupted."""
 TRACEBACK_VARIABLE = "ROBOCOV_TRACEBACK"
 """Environment variable; if it is set, errors are printed with their traceback."""
 _MAX_ERROR_CHARS = 1000
@@ -36,12 +40,14 @@ _EXAMPLES = (
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a controller of your own"),
 )
+"""Commands and explanations at the end of the help."""
 _FIRST_STEPS = """\
 robocov demo --tour                           a lesson in the window
 robocov run rooms --video --out first-run     one run, with figures and a video
 robocov edit mine.json                        draw a map
 robocov handbook                              tutorials, guides, reference
 robocov --help                                all commands"""
+"""Text that is printed in a terminal if no command is given."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -98,13 +104,13 @@ def _run_protected(name: str, rest: list[str], *, may_supervise: bool) -> int:
     streams = StandardStreams()
     try:
         status = _run_command(name, rest)
-        closed = streams.restore()
+        closed_streams = streams.restore()
     except BaseException as error:
-        closed = streams.restore()
-        status = FAILED if closed else _print_failure(error, name)
-    if closed:
-        culprit = f"controller {', '.join(controllers)}" if controllers else "the command"
-        status = _print_error(f"{culprit}: it closed the {' and the '.join(closed)}", FAILED)
+        closed_streams = streams.restore()
+        status = FAILED if closed_streams else _print_failure(error, name)
+    if closed_streams:
+        cause = f"controller {', '.join(controllers)}" if controllers else "the command"
+        status = _print_error(f"{cause}: it closed the {' and the '.join(closed_streams)}", FAILED)
     streams.close()
     if descriptor is not None:
         report_status(descriptor, status)
@@ -112,6 +118,7 @@ def _run_protected(name: str, rest: list[str], *, may_supervise: bool) -> int:
 
 
 def _import_command(name: str) -> ModuleType:
+    """Import the module of a subcommand."""
     return importlib.import_module(f"robocov_app.commands.{COMMANDS[name].module}")
 
 
@@ -138,7 +145,10 @@ def _run_command(name: str, rest: list[str]) -> int:
 
 
 def _print_failure(error: BaseException, name: str) -> int:
-    """Print why a subcommand failed, in one line if it is no fault of robocov, and return its exit status."""
+    """Print why a subcommand failed, and return its exit status.
+
+    The message is one line, unless the failure is a fault of robocov itself.
+    """
     from robocov.errors import ControllerEndedError, ParameterError, RobocovError
 
     if isinstance(error, ControllerEndedError):
@@ -156,7 +166,7 @@ def _print_failure(error: BaseException, name: str) -> int:
         echo("robocov: stopped", to_stderr=True)
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
-        # The reader of the pipe has ended. Without this, Python would complain when it ends.
+        # The reader of the pipe has ended. Without this, Python would print an error when it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     if isinstance(error, OSError):
@@ -171,9 +181,9 @@ def _print_failure(error: BaseException, name: str) -> int:
 
 
 def _find_users_fault(error: BaseException) -> "RobocovError | None":
-    """Return the explanation of an error that comes from a user's own code."""
+    """Return the explanation of an error that comes from a user's own code; None for any other error."""
     if "robocov.controllers" not in sys.modules:
-        # Without this package, which takes long to import, no code of users has run.
+        # No user's code has run if this package, which takes long to import, was not imported.
         return None
     from robocov.controllers.user_modules import explain_user_fault
 
@@ -188,6 +198,7 @@ def _is_users_interrupt(fault: "RobocovError | None") -> bool:
 
 
 def _print_os_error(error: OSError) -> int:
+    """Print the file and the reason of an error of the operating system, and return the exit status."""
     reason = error.strerror or error
     if error.filename is None:
         return _print_error(f"the answer cannot be written: {reason}")
@@ -195,12 +206,14 @@ def _print_os_error(error: OSError) -> int:
 
 
 def _get_exit_status(error: SystemExit) -> int:
+    """Return the exit status that a `SystemExit` requests."""
     if isinstance(error.code, int):
         return error.code
     return OK if error.code is None else BAD_INPUT
 
 
 def _print_internal_error(error: BaseException) -> int:
+    """Print the traceback of a fault of robocov, and return the exit status."""
     from robocov_app.terminal.output import echo
 
     echo("".join(traceback.format_exception(error)), end="", to_stderr=True)
@@ -210,9 +223,9 @@ def _print_internal_error(error: BaseException) -> int:
 
 @contextmanager
 def _end_at_once_on_interrupt() -> Iterator[None]:
-    """End the process at Ctrl-C while modules are imported, when there is nothing to lose.
+    """End the process at Ctrl-C while modules are imported, when there are no results to keep.
 
-    Python sometimes swallows a `KeyboardInterrupt` there.
+    During imports, Python sometimes ignores a `KeyboardInterrupt`.
     """
     is_main_thread = threading.current_thread() is threading.main_thread()
     if not is_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -231,11 +244,11 @@ def _end_at_once_on_interrupt() -> Iterator[None]:
 
 
 def _prepare_output() -> None:
-    """Make sure that any answer can be written; a terminal that cannot display a character shows a ?."""
+    """Make sure that any answer can be written. A character that cannot be encoded is replaced by a "?"."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
-            # The caller has closed it. The replacement stays open to the end.
+            # The caller has closed the stream. Its replacement stays open until the process ends.
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

@@ -47,20 +47,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_COST_SAMPLES = 120
-"""Maximum number of times at which the cost of a displayed run is computed."""
+"""Maximum number of time steps at which the cost of a displayed run is computed."""
 MAX_COST_RATE_HZ = 10.0
-"""Maximum number of these times per simulated second."""
+"""Maximum number of such time steps per simulated second."""
 MAX_COST_VERTICES = 2500
-"""Maximum number of vertices of a map whose cost is displayed: larger maps would make notebooks slow."""
+"""Maximum number of vertices of a map whose cost is displayed; larger maps would make notebooks slow."""
 FALLBACK_DURATION_S = 60.0
-"""Simulated time of the replay that stands in for the window."""
+"""Simulated time of the replay that is shown if a live window is not available."""
 
 _MAX_MAP_SIZE_PX = (640.0, 420.0)
 """Maximum width and height of a map in a notebook."""
 _MAX_REPLAY_MAP_SIZE_PX = (760.0, 520.0)
 """Maximum width and height of the map in a replay."""
 _MIN_REPLAY_WIDTH_PX = 520.0
-"""Minimum width of a replay: that of its controls next to each other."""
+"""Minimum width of a replay, at which its controls fit next to each other."""
 
 _MAP_CSS = """
 .robocov-map { margin: 0; padding: 12px; box-sizing: border-box; border-radius: 6px;
@@ -88,9 +88,11 @@ def plot_environment(
     Parameters
     ----------
     environment : Environment
+        The map.
     axes : matplotlib.axes.Axes or None
-        By default the axes of a new page.
+        Axes to draw on; by default those of a new page.
     theme : {"light", "dark"}
+        Color theme.
     size : (width, height) or None, px
         Size of the page.
 
@@ -125,15 +127,17 @@ def plot_record(
     Parameters
     ----------
     record : Record
+        The run.
     axes : matplotlib.axes.Axes or None
-        By default the axes of a new page.
+        Axes to draw on; by default those of a new page.
     theme : {"light", "dark"}
+        Color theme.
     colors : {"paper", "robots"}
         Colors of the paper, or a hue for each robot.
     size : (width, height) or None, px
         Size of the page.
     mean_distance, mean_time : float or None, m, s
-        Of the final positions, for the title of the page.
+        Costs of the final positions, for the title of the page.
 
     Returns
     -------
@@ -175,13 +179,15 @@ def plot_history(
     Parameters
     ----------
     history : CostHistory
+        The coverage cost over a run.
     axes : matplotlib.axes.Axes or None
-        By default the axes of a new page.
+        Axes to draw on; by default those of a new page.
     label : str
-        Label of the curve, at its end.
+        Label at the end of the curve.
     controller : str
-        Name of the controller, which decides the color of the curve.
+        Name of the controller, which determines the color of the curve.
     theme : {"light", "dark"}
+        Color theme.
     size : (width, height) or None, px
         Size of the page.
     title : str
@@ -215,14 +221,16 @@ def plot_result(
 ) -> Axes:
     """Plot the distance of every point to its nearest robot.
 
-    A lattice that is too coarse for an image is replaced by a finer one.
+    If the lattice is too coarse for an image, the cost is computed again on a finer lattice.
 
     Parameters
     ----------
     result : CoverageResult
+        The result, which must contain its map.
     axes : matplotlib.axes.Axes or None
-        By default the axes of a new page.
+        Axes to draw on; by default those of a new page.
     theme : {"light", "dark"}
+        Color theme.
     size : (width, height) or None, px
         Size of the page.
     radius : float or (n,) array or None, m
@@ -244,7 +252,7 @@ def plot_result(
     environment = result.environment
     sites = result.sites
     if environment is None or sites is None:
-        raise ParameterError("result: it does not know its map; expected one that a CoverageCost returned")
+        raise ParameterError("result: expected a result with its map, as a CoverageCost returns it, got none")
     robots = len(result.positions)
     team = Team.homogeneous(robots)
     if radius is not None:
@@ -275,10 +283,13 @@ def plot_comparison(
     Parameters
     ----------
     comparison : Comparison
+        The runs.
     axes : None
-        A comparison needs a page of its own.
+        A comparison is always drawn on a new page.
     theme : {"light", "dark"}
+        Color theme.
     colors : {"paper", "robots"}
+        Colors of the paper, or a hue for each robot.
     size : (width, height) or None, px
         Size of the page.
 
@@ -311,7 +322,7 @@ def render_environment_html(environment: Environment) -> str:
     frame = PictureFrame(environment, *_MAX_MAP_SIZE_PX)
     bar_length = round_down(width / 5)
     bar_ends = np.array([[low_x, low_y], [low_x + bar_length, low_y]])
-    # Percent of the width, so that the bar stays right when the page shrinks the map.
+    # The ends are in percent of the width, so that the bar keeps its scale if the page shrinks the map.
     left, right = frame.to_pixels(bar_ends)[:, 0] / (frame.width / 100)
     starts = ", ".join(environment.starts) or "uniform"
     facts = (
@@ -392,21 +403,21 @@ def show(
     Parameters
     ----------
     map : str, Path, Environment or Simulation
-        Name of a bundled map, a file, the map itself, or a simulation that the window continues, while the
-        simulation itself does not change.
+        Name of a bundled map, a file, the map itself, or a simulation. The window continues a copy of the
+        simulation.
     robots : int
-        Number of robots; not for a simulation.
+        Number of robots; ignored for a simulation.
     controllers : sequence of str
-        Names of the controllers; not for a simulation.
+        Names of the controllers; ignored for a simulation.
     seed : int
-        Seed of the starting positions; not for a simulation.
+        Seed of the starting positions; ignored for a simulation.
     height : int, px
         Height of the window.
 
     Returns
     -------
     LiveWindow or Record
-        The window; without ``robocov[web]`` the record of a run of one minute.
+        The window or, if ``robocov[web]`` is not installed, the record of a run of one minute.
     """
     has_web = find_spec("websockets") is not None
     if isinstance(map, Simulation):
@@ -416,7 +427,7 @@ def show(
     options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
     if not isinstance(map, Environment):
         return LiveWindow(["demo", str(map), *options], height)
-    # The window has read the file when it is open.
+    # The file can be removed afterwards, because the window has read it when this returns.
     with TemporaryDirectory() as folder:
         file = Path(folder) / "map.json"
         save_map(map, file)
@@ -468,4 +479,5 @@ def _get_axes(figure: Figure, axes: Axes | None) -> Axes:
 
 
 def _export_png(axes: Any) -> bytes:
+    """Return the PNG file of the figure that contains the axes."""
     return render_png(axes.figure)

@@ -1,7 +1,7 @@
-"""Runs to look into: teams that never move, and teams that end far above RAPF although they usually beat it.
+"""Suspicious runs: teams that never move, and teams whose final cost is far above that of RAPF.
 
-Both are usually caused by a fault of the controller: a plan that cannot be followed, or a phase that never
-ends.
+Both are usually caused by a fault of the controller, such as a plan that cannot be followed, or a phase that
+never ends. A high cost is suspicious only for controllers that usually are better than RAPF.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,16 +12,16 @@ import numpy as np
 from robocov_app.benchmark.ratings import get_run_key
 
 MIN_PATH_LENGTH_M = 0.1
-"""A team whose robots move less than this on average was at rest from the start."""
+"""Minimum mean path length of a team that did not stay at rest."""
 MAX_RAPF_RATIO = 1.2
-"""A team ends far above RAPF if the ratio of its final cost to that of RAPF in the same run exceeds this."""
+"""Maximum ratio of the final cost to that of RAPF in the same run for a run that is not suspicious."""
 
 _RunValues: TypeAlias = dict[tuple[str, tuple[str, int]], float]
 """A value for each run, by track and run."""
 
 
 class Anomaly(NamedTuple):
-    """A run to look into."""
+    """A suspicious run."""
 
     track: str
     map: str
@@ -30,9 +30,9 @@ class Anomaly(NamedTuple):
 
 
 def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[Anomaly]:
-    """Find the runs of a result in which the team never moved, or ended far above RAPF.
+    """Find the runs of a result in which the team never moved, or in which the final cost was far too high.
 
-    Runs far above RAPF are only reported on tracks on which the controller is better than RAPF in the median.
+    Costs far above that of RAPF are only reported on tracks on which the median cost is below that of RAPF.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
     Returns
     -------
     list of Anomaly
-        In the order of the rows.
+        The suspicious runs, in the order of the rows.
     """
     rapf_costs = _collect_costs(rapf["rows"])
     ratios = {
@@ -68,7 +68,7 @@ def find_anomalies(result: Mapping[str, Any], rapf: Mapping[str, Any]) -> list[A
 
 
 def _collect_costs(rows: Sequence[Mapping[str, Any]]) -> _RunValues:
-    """Return the final mean distances, m, of runs that did not fail, without those that are unknown or 0."""
+    """Return the final mean distance of each run, m, without failed runs and values that are unknown or 0."""
     return {
         (row["track"], get_run_key(row)): row["mean_distance_m"]
         for row in rows

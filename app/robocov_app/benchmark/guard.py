@@ -1,8 +1,9 @@
-"""Watching a user's controller for the use of channels that no robot has: files, connections, processes.
+"""Detection of a user's controller that uses channels that no robot has: files, connections or processes.
 
-The guard is a tripwire for mistakes and simple cheating, not a sandbox: only verify controllers that you
-would also run. It uses the audit events of Python. An action counts if it is caused by a function in one of
-the controller's own modules, except for actions of a compiler, and during the import of an installed package.
+The guard detects mistakes and simple cheating, but it is not a sandbox: only verify controllers that you
+would also run. It uses the audit events of Python. An action is forbidden if it is caused by a function in
+one of the controller's own modules. Actions of a compiler, and of other packages while they are imported, are
+allowed.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ _IMPORT_MODULE = "importlib._bootstrap"
 _DATA_FOLDER = str(Path(__file__).parent)
 """Folder of the suite's references and of the bundled results, which a controller must not read."""
 _MAX_VIOLATIONS = 20
+"""Maximum number of violations that are listed."""
 _FORBIDDEN_PREFIXES = (
     "ctypes.dlopen",
     "mmap.",
@@ -48,6 +50,7 @@ _FORBIDDEN_PREFIXES = (
 )
 """Beginnings of the names of audit events that a controller must not cause."""
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+"""Flags with which a file is opened for writing."""
 
 
 class Guard:
@@ -69,7 +72,7 @@ class Guard:
         self._modules = frozenset(modules)
 
     def install(self) -> None:
-        """Start watching this process, until it ends: audit hooks cannot be removed."""
+        """Start to guard this process, until it ends, because audit hooks cannot be removed."""
         # Importing the user's modules must not write bytecode files.
         sys.dont_write_bytecode = True
         sys.addaudithook(self._audit)
@@ -97,7 +100,7 @@ class Guard:
 
 
 def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
-    """Describe the action of an audit event; None if a controller may cause it."""
+    """Describe the action of an audit event; return None if the action is allowed."""
     if event == "open":
         return _describe_opening(*arguments[:3])
     if event.startswith(_FORBIDDEN_PREFIXES):
@@ -107,13 +110,13 @@ def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
 
 
 def _describe_opening(path: Any, mode: Any, flags: Any) -> str | None:
-    """Describe the opening of a file; None if a controller may open it."""
+    """Describe the opening of a file; return None if it is allowed."""
     if isinstance(path, int):
         return None
     name = os.path.realpath(os.fsdecode(path))
     writes = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
     if isinstance(mode, str):
-        writes = writes or any(letter in mode for letter in "wax+")
+        writes = writes or any(character in mode for character in "wax+")
     if writes:
         return f"writing {name}"
     if name.startswith(_DATA_FOLDER) and not name.endswith((".py", ".pyc")):

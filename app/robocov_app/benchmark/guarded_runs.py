@@ -32,7 +32,9 @@ class ObservedRun:
     Attributes
     ----------
     outcome : Outcome
+        Result of the run, with the files that are needed for its row.
     transcript : Transcript
+        Observations and decisions of all steps.
     violations : list of str
         Forbidden actions that the controller attempted.
     """
@@ -49,6 +51,7 @@ class ReplayAnswer:
     Attributes
     ----------
     decisions : Decisions
+        The controller's decision for each observation of the replay.
     violations : list of str
         Forbidden actions that the controller attempted.
     """
@@ -142,11 +145,12 @@ class GuardedProcesses:
         self._lock = threading.Lock()
 
     def ask(self, question: Task | Replay) -> Answer:
-        """Ask a new process, and wait for its answer; several threads may do so at the same time.
+        """Send a question to a new process, and wait for its answer. Several threads may call this at once.
 
         Parameters
         ----------
         question : Task or Replay
+            A run to repeat, or observations for which the controller decides again.
 
         Returns
         -------
@@ -178,7 +182,7 @@ class GuardedProcesses:
         return None if reply is None else reply.answer
 
     def kill(self) -> None:
-        """Kill all processes, and start no others from now on."""
+        """Kill all processes, and prevent the start of others."""
         with self._lock:
             self._is_stopped = True
             for process in self._processes:

@@ -9,15 +9,16 @@ been controlled by a separate process.
 The input of a process depends on the information that the controller declares:
 
 ==========  ===========================================================================================
-own         The state and measurements of one robot, the positions of the robots that it hears, and the
-            messages that it has received.
+own         The state and measurements of one robot, the positions of its neighbors, and the messages that
+            it has received.
 shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
-an empty scan. Only the oracle, whose robots decide together, receives the observations of all robots. This
-checks that it knows no more than the robots have measured and the map, but not the limits of communication.
+an empty scan. Only the oracle, whose robots decide together, receives the observations of all robots. Its
+check shows that the decisions follow from the observations and the map, but ignores the limits of
+communication.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from robocov.observation.region import Region
 from robocov_app.sweep.tasks import Task
 
 _MAX_ATTEMPTS = 1000
-"""Number of attempts after which a region counts as too thin for drawing random points in it."""
+"""Maximum number of attempts to draw random points in a region, which may be very thin."""
 
 
 @dataclass(eq=False)
@@ -47,11 +48,15 @@ class Transcript:
     Attributes
     ----------
     observations : list of Observations
+        Observations of all robots in each step.
     working : list of (n,) bool array or None
         Mask of the working robots in each step; None if all are working.
     forces : list of (n, 2) array, N
+        Forces that the controller commanded in each step.
     goals : list of (n, 2) array or None, m
+        Goals in each step; None if the controller has none.
     messages : list of sequence of sequence of Message
+        Messages that each robot sent in each step.
     """
 
     observations: list[Observations] = field(default_factory=list)
@@ -80,6 +85,7 @@ class Replay:
     robot : int or None
         Row of the robot that is checked; None for the whole team.
     observations : sequence of Observations
+        Observations of each step, without those that the process must not receive.
     environment : Environment or None
         The map, if the controller may know it.
     """
@@ -96,9 +102,8 @@ class Decisions:
 
     Attributes
     ----------
-    forces : list of (n, 2) array, N
-    goals : list of (n, 2) array or None, m
-    messages : list of sequence of sequence of Message
+    forces, goals, messages : list
+        As in `Transcript`, for the steps up to an error.
     problem : str
         Error of the controller that ended the replay; empty if there was none.
     """
@@ -115,38 +120,39 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
     Parameters
     ----------
     observations : Observations
+        Observations of all robots.
     robot : int
         Row of the robot.
     substitutes : (n, 2) array, m
-        Placeholders for the positions of robots that it does not hear.
+        Placeholders for positions that the robot does not know.
 
     Returns
     -------
     Observations
     """
-    count = len(observations.positions)
-    is_own = np.arange(count) == robot
-    is_heard = is_own.copy()
-    is_heard[observations.neighbors.list_neighbors(robot)] = True
-    has_true_position = is_own
+    robot_count = len(observations.positions)
+    is_own = np.arange(robot_count) == robot
+    is_neighbor = is_own.copy()
+    is_neighbor[observations.neighbors.list_neighbors(robot)] = True
+    is_known_position = is_own
     # If positions are reported by messages, a robot knows those in the messages, not the true ones.
     if observations.reported_positions is None or observations.neighbors.is_complete:
-        has_true_position = is_heard
+        is_known_position = is_neighbor
     hidden = replace(
         observations,
-        positions=_freeze(np.where(has_true_position[:, None], observations.positions, substitutes)),
+        positions=_freeze(np.where(is_known_position[:, None], observations.positions, substitutes)),
         velocities=_freeze(np.where(is_own[:, None], observations.velocities, 0.0)),
         obstacle_points=_freeze(np.where(is_own[:, None], observations.obstacle_points, np.nan)),
     )
     if observations.max_speeds is not None:
         own_speed = observations.max_speeds[robot]
-        hidden.max_speeds = _freeze(np.where(is_heard, observations.max_speeds, own_speed))
+        hidden.max_speeds = _freeze(np.where(is_neighbor, observations.max_speeds, own_speed))
     if observations.steering is not None:
         hidden.steering = _freeze(np.where(is_own[:, None], observations.steering, 0.0))
     if observations.scans is not None:
         hidden.scans = _hide_scans(observations.scans, is_own)
     if observations.messages:
-        hidden.messages = [observations.messages[k] if k == robot else () for k in range(count)]
+        hidden.messages = [observations.messages[k] if k == robot else () for k in range(robot_count)]
     if observations.send_limits is not None:
         hidden.send_limits = _freeze(np.where(is_own, observations.send_limits, 0))
     return _hide_links(hidden, robot)
@@ -161,7 +167,7 @@ def _hide_scans(scans: Scans, is_own: BoolArray) -> Scans:
 def _hide_links(observations: Observations, robot: int) -> Observations:
     """Return observations without the links and reports that a robot cannot know.
 
-    A robot that knows the current positions of those that it hears also knows which of them hear each other.
+    A robot that knows the current positions of its neighbors also knows which of them are neighbors.
     """
     neighbors = observations.neighbors
     if neighbors.indptr is None or neighbors.indices is None:
@@ -170,10 +176,10 @@ def _hide_links(observations: Observations, robot: int) -> Observations:
     first, second = neighbors.list_pairs()
     is_known_link = first == robot
     if observations.reported_positions is None:
-        is_heard = np.zeros(neighbors.robot_count, dtype=bool)
-        is_heard[neighbors.indices[start:stop]] = True
-        is_heard[robot] = True
-        is_known_link = is_heard[first] & is_heard[second]
+        is_neighbor = np.zeros(neighbors.robot_count, dtype=bool)
+        is_neighbor[neighbors.indices[start:stop]] = True
+        is_neighbor[robot] = True
+        is_known_link = is_neighbor[first] & is_neighbor[second]
     links = Neighbors.from_pairs(
         neighbors.robot_count, first[is_known_link], second[is_known_link], neighbors.ranges
     )
@@ -186,12 +192,13 @@ def _hide_links(observations: Observations, robot: int) -> Observations:
 
 
 def _freeze(array: Any) -> Any:
+    """Make an array read-only, and return it."""
     array.setflags(write=False)
     return array
 
 
 def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Array:
-    """Draw random positions in a region as placeholders for those of unknown robots, (count, 2) m."""
+    """Draw random positions in a region, (count, 2) m, as placeholders for the positions of robots."""
     low_x, low_y, high_x, high_y = region.bounds
     for _ in range(_MAX_ATTEMPTS):
         points = rng.uniform((low_x, low_y), (high_x, high_y), size=(16 * count, 2))
@@ -209,13 +216,15 @@ def build_replay(
     Parameters
     ----------
     task : Task
+        The run.
     transcript : Transcript
+        Observations and decisions of the run.
     information : Information
-        The information that the controller declares, which determines what its process receives.
+        The information that the controller declares. It determines the input of the process.
     robot : int or None
         Row of the robot; if None, the process receives the observations of all robots.
     rng : Generator
-        Draws placeholders for the positions of unknown robots.
+        Random numbers for the placeholders.
 
     Returns
     -------
@@ -237,16 +246,20 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
     Parameters
     ----------
     transcript : Transcript
+        Observations and decisions of the run.
     replay : Replay
+        The replay of the run.
     decisions : Decisions
+        Decisions in the replay.
 
     Returns
     -------
     str or None
         Description of the difference; None if there is none. Decisions of failed robots are ignored.
     """
-    count = len(transcript.forces[0])
-    checked = np.arange(count) if replay.robot is None else np.array([replay.robot])
+    checked = np.array([replay.robot])
+    if replay.robot is None:
+        checked = np.arange(len(transcript.forces[0]))
     for step, observations in enumerate(transcript.observations):
         working = transcript.working[step]
         robots = checked if working is None else checked[working[checked]]
@@ -266,7 +279,7 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
 
 
 def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -> BoolArray:
-    """Return for which robots the rows of two arrays are the same, bit for bit, (k,)."""
+    """Return a mask of the k robots whose rows are the same in two arrays, bit for bit."""
     if expected is None or actual is None:
         return np.full(len(robots), expected is actual)
     pairs = zip(expected[robots], actual[robots], strict=True)
@@ -276,7 +289,7 @@ def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -
 def _have_same_messages(
     expected: Sequence[Sequence[Message]], actual: Sequence[Sequence[Message]], robots: Any
 ) -> BoolArray:
-    """Return for which robots the sent messages are the same, (k,)."""
+    """Return a mask of the k robots whose sent messages are the same."""
     if not expected and not actual:
         return np.ones(len(robots), dtype=bool)
     is_same = []

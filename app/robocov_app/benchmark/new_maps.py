@@ -1,8 +1,9 @@
-"""New maps, which the verifier draws from the generators of the suite, and comparison of gaps on them.
+"""New maps, drawn from the generators of the suite, and a test of whether gaps are larger on new maps.
 
 A map with a new seed is statistically like any other map of its family. Unless a controller or its gains are
 fitted to the maps of the suite, its gap on a new map is equally likely to have any rank among its gaps on the
-maps of that family. If gaps on new maps are too often among the largest, the controller knows the suite.
+maps of that family. If gaps on new maps are too often among the largest, the controller is fitted to the
+suite.
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ TRACK = "ideal"
 MAX_NEW_MAPS = len(suite.FAMILIES) - 1
 """Maximum number of new maps: one of each family that has a generator."""
 MIN_P_VALUE = 0.001
-"""A controller counts as fitted to the suite if its ranks on new maps have a smaller p-value."""
+"""Minimum p-value of ranks on new maps at which a controller does not count as fitted to the suite."""
 _MAX_MAP_SEED = 2**31
+"""Upper limit of the seeds of new maps and starts."""
 _MAX_ATTEMPTS = 100
+"""Maximum number of seeds that are tried for a new map."""
 _RANK_SAMPLES = 100_000
+"""Number of random samples with which a p-value is estimated."""
 _RANK_SUM_TOLERANCE = 1e-9
 """Tolerance in comparisons of sums of ranks."""
 
@@ -42,9 +46,11 @@ class NewMap:
     name : str
         Family and seed, for messages.
     family : str
+        Name of the family in the suite.
     start_seed : int
         Seed of the starting positions.
     environment : Environment
+        The map.
     """
 
     name: str
@@ -64,7 +70,8 @@ class NewMapComparison:
     p_value : float
         Probability of ranks at least as extreme if the controller is not fitted to the suite.
     min_p_value : float
-        The smallest possible p-value; if a result has few runs, it is too large to show anything.
+        Smallest p-value that is possible with these runs. With few runs, it is too large to show a
+        difference.
     """
 
     new_gap: float
@@ -88,6 +95,7 @@ def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator)
     count : int
         Number of maps; fewer are drawn if there are fewer families.
     rng : Generator
+        Random numbers for the choice of families and seeds.
 
     Returns
     -------
@@ -175,5 +183,6 @@ def _compute_p_value(observed_sum: float, sizes: Sequence[int]) -> float:
     sums = np.zeros(_RANK_SAMPLES)
     for size in sizes:
         sums += rng.integers(1, size + 1, _RANK_SAMPLES) / size
-    hits = np.count_nonzero(sums <= observed_sum + _RANK_SUM_TOLERANCE)
-    return (1 + int(hits)) / (1 + _RANK_SAMPLES)
+    extreme_count = np.count_nonzero(sums <= observed_sum + _RANK_SUM_TOLERANCE)
+    # Counting the observed ranks as one more sample keeps the p-value above 0.
+    return (1 + int(extreme_count)) / (1 + _RANK_SAMPLES)

@@ -1,9 +1,8 @@
-"""The oracle: robots that know the map and walk straight to the best placement that was found for it.
+"""The oracle: robots that know the map, and take the shortest paths to the best placement found for the map.
 
-The benchmark passes this file to its runs like a controller of a user, because it obeys no rule of
-distributed control: the goals are assigned for all robots at once, and failures are known in advance. The
-placements are in the extra content of the map, under ``oracle``: a list of ``[start (s), [robots],
-[[x, y], ...]]``.
+The benchmark passes this file to its runs like a user's controller, because the oracle is not distributed:
+its goals are assigned for all robots at once, and failures are known in advance. The placements are in the
+extra content of the map, under ``oracle``: a list of ``[start (s), [robots], [[x, y], ...]]``.
 """
 
 from __future__ import annotations
@@ -30,13 +29,14 @@ from robocov.team import Team
 _LATTICE = 8
 """Cells along a side of the planner's lattice, which is coarse because no costs are computed on it."""
 _TIME_TOLERANCE_S = 1e-9
+"""Difference between two times that is attributed to rounding."""
 _UNREACHABLE_M = 1e6
 """Length that stands for a missing path when goals are assigned."""
 
 
 @dataclass(frozen=True, eq=False)
 class OracleMemory:
-    """Memory of the routes of n robots, which end at their goals."""
+    """Memory of n robots: the routes to their goals, and their progress along the routes."""
 
     team: Team
     routes: tuple[Array, ...]
@@ -53,12 +53,12 @@ class OracleMemory:
 
 @dataclass(frozen=True)
 class Oracle(BaseController):
-    """Walks to the best placement: a yardstick for the time and path length of robots that know the map.
+    """Moves to the best placement: a yardstick for the time and path length of robots that know the map.
 
     Once in each `period`, goals are assigned to robots such that the sum of the squared geodesic distances is
     minimal. The robots follow the shortest paths among walls that are enlarged by their radius and
-    `clearance`, and brake, give way and keep their distance as in `follow_routes`. Because of this care it is
-    no bound: a bolder robot may arrive earlier.
+    `clearance`, and brake, give way and keep their distance as in `follow_routes`. The time is not a lower
+    bound, because robots that brake later may arrive earlier.
     """
 
     name = "oracle"
@@ -88,7 +88,7 @@ class Oracle(BaseController):
         return OracleMemory(team, routes=unknown, legs=np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: OracleMemory) -> Decision:
-        """Compute the forces along the paths, which are planned again once in each period."""
+        """Compute the forces along the paths, which are planned once in each period."""
         assert self.environment is not None
         stages = self.environment.extra["oracle"]
         stage = _find_stage(stages, seen.time)
@@ -113,9 +113,9 @@ class Oracle(BaseController):
 
 
 def _find_stage(stages: list[Any], time: float) -> int:
-    """Return the index of the placement to use at a time, s: the last one that has started."""
-    started = [k for k, (start, _, _) in enumerate(stages) if start <= time + _TIME_TOLERANCE_S]
-    return max(started)
+    """Return the index of the placement to use at a time, s: the last placement that has started."""
+    started_stages = [k for k, (start, _, _) in enumerate(stages) if start <= time + _TIME_TOLERANCE_S]
+    return max(started_stages)
 
 
 def plan_routes(
@@ -128,10 +128,13 @@ def plan_routes(
     Parameters
     ----------
     planner : GeodesicPlanner
+        Computes shortest paths on the map.
     positions : (n, 2) array, m
+        Current positions of the robots.
     robots : list of int
         Rows of the k working robots; the others stay where they are.
     placement : (k, 2) array, m
+        Goals of the working robots, in any order.
 
     Returns
     -------
@@ -154,7 +157,9 @@ def assign_goals(planner: GeodesicPlanner, positions: Array, goals: Array) -> In
     Parameters
     ----------
     planner : GeodesicPlanner
+        Computes shortest paths on the map.
     positions, goals : (n, 2) arrays, m
+        Current positions of the robots, and the goals in any order.
 
     Returns
     -------
@@ -174,4 +179,5 @@ def find_waypoints(planner: GeodesicPlanner, position: Array, goal: Array) -> Ar
 
 @lru_cache(maxsize=4)
 def _get_planner(environment: Environment, clearance: float) -> GeodesicPlanner:
+    """Return the planner for a map; the latest planners are kept in memory."""
     return GeodesicPlanner(environment, clearance, _LATTICE, radius=0.0)

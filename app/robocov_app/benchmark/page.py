@@ -33,7 +33,9 @@ class Quantity(NamedTuple):
     """A quantity against which the gap is plotted."""
 
     title: str
+    """Name of the quantity in the title of a plot."""
     axis_label: str
+    """Label of the horizontal axis, with the unit."""
     compute: Callable[[Rating], float]
     """Returns the quantity for a rating."""
 
@@ -58,12 +60,13 @@ QUANTITIES: Mapping[str, Quantity] = {
 PLOT_SIZE_PX = (560, 350)
 """Size of a plot, which must have space for many labels."""
 YARDSTICKS = ("rapf", "atlas", "oracle")
-"""Controllers whose gaps over the same runs are shown next to those of incomplete entries."""
+"""Controllers with which incomplete entries are compared, over the runs of each entry."""
 _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
 _DPI = 72.0
 """Resolution of the plots, at which pixels equal points."""
 _CHARACTER_WIDTH_PX = 6.0
+"""Mean width of the characters of a label."""
 _LINE_HEIGHT_PX = 13.0
 _MARK_HALF_SIZE_PX = 6.0
 _LABEL_DISTANCE_PX = 8.0
@@ -101,8 +104,8 @@ class _Entries(NamedTuple):
 def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     """Build the page that compares results, with a section for each track.
 
-    Complete entries are ranked by their scores. Each entry is rated over its own runs, so that no entry
-    changes the figures of others.
+    Complete entries are ranked by their scores. Each entry is rated over its own runs, so that the rating of
+    an entry does not depend on other entries.
 
     Parameters
     ----------
@@ -153,7 +156,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
 
 
 def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> list[str]:
-    """Return the labels of those results that are of yardsticks with default gains."""
+    """Return the labels of the results of yardsticks with default gains."""
     yardsticks = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]
@@ -170,7 +173,8 @@ def _build_sort_key(rating: Rating) -> tuple[bool, float]:
 def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
     """Build the table of scores and gaps on all tracks.
 
-    Entries with all runs of all tracks on the page come first, ranked by mean score; others have no rank.
+    Entries that have all runs of all tracks on the page come first, ranked by mean score. The other entries
+    have no rank.
     """
     by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
@@ -235,7 +239,7 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
 
 
 def _summarize_track(name: str) -> str:
-    """Return sentences on the conditions of a track, and on the number of its runs and maps."""
+    """Return sentences about the conditions of a track, and the numbers of its runs and maps."""
     track = suite.TRACKS[name]
     run_count = len(ratings.list_run_keys(name))
     runs = f"{format_count(run_count, 'run')} on {format_count(len(track.maps), 'map')}"
@@ -246,7 +250,7 @@ def _summarize_track(name: str) -> str:
 def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
     """Build the table of entries that lack runs.
 
-    For comparison, each row also contains the gaps of the yardsticks over the runs that the entry has.
+    For comparison, each row also contains the median gaps of the yardsticks over the runs of the entry.
     """
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
     rows = []
@@ -293,13 +297,15 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
 
 @plain_style()
 def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
-    """Draw the gap of controllers against another quantity; less is better in both.
+    """Draw the gap of controllers against another quantity. Smaller values are better in both.
 
-    A line connects the competing controllers that no other competing one beats in both (the Pareto front).
+    A line, the Pareto front, connects the competing controllers for which no other competing controller is
+    better in both quantities.
 
     Parameters
     ----------
     points : sequence of ParetoPoint
+        The controllers.
     axis_label : str
         Label of the horizontal axis.
 
@@ -321,7 +327,7 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
 
 
 def _draw_pareto_point(axes: Axes, point: ParetoPoint) -> None:
-    """Draw the mark of a controller; only those of competing controllers are filled."""
+    """Draw the mark of a controller, which is filled if the controller competes."""
     color = to_plot_color(point.style.get_color(LIGHT))
     axes.plot(
         [point.x],
@@ -375,6 +381,7 @@ def place_labels(marks: Array, labels: Sequence[str]) -> Array:
     marks : (n, 2) array, px
         Centers of the marks.
     labels : sequence of str
+        Texts of the labels.
 
     Returns
     -------
@@ -410,7 +417,7 @@ def _list_label_offsets(half_width: float) -> Array:
 
 
 def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Find the points that no other point beats in both values.
+    """Find the points for which no other point is better in both values.
 
     Parameters
     ----------
@@ -439,12 +446,12 @@ def _describe_entries_without_messages(
 ) -> Iterator[str]:
     """Yield a note on the entries that were made before robots shared maps by messages, if there are any."""
     pairs = zip(results, labels, strict=True)
-    concerned = [label for result, label in pairs if not shares_maps_by_messages(result)]
-    if concerned:
+    old_entries = [label for result, label in pairs if not shares_maps_by_messages(result)]
+    if old_entries:
         yield (
-            f"{', '.join(concerned)}: made with an earlier version, in which robots read the current maps of "
-            "all robots in communication range, without messages. Loss, latency, message rate and bandwidth "
-            "had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each changed "
+            f"{', '.join(old_entries)}: made with an earlier version, in which robots read the current maps "
+            "of all robots in communication range, without messages. Loss, latency, message rate and "
+            "bandwidth had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each changed "
             "cell of a map, 28 for each reported position of another robot (number, position, time)."
         )
 
@@ -465,7 +472,7 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
 
 
 def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
-    """Build the table of runs to look into, in which the team never moved or ended far above RAPF."""
+    """Build the table of suspicious runs, with the number of runs for each reason."""
     rapf: Mapping[str, Any] = {"rows": []}
     for result in results:
         if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:

@@ -17,7 +17,7 @@ from robocov_app.benchmark.results import find_reference
 from robocov_app.sweep.study import Study, StudyMap
 
 ORACLE = "oracle"
-"""Name of the controller that knows the reference placements, see `robocov_app.benchmark.oracle`."""
+"""Name of the controller that knows the reference placements; see `robocov_app.benchmark.oracle`."""
 _ORACLE_FILE = "oracle.py"
 _ORACLE_NAME = f"{_ORACLE_FILE}:Oracle"
 
@@ -95,8 +95,9 @@ class RatedController:
         ----------
         track : str
         maps : sequence of StudyMap
-            Any maps.
+            The maps, which need not be part of the suite.
         seeds : sequence of int
+            Seeds of the starting positions.
 
         Returns
         -------
@@ -157,12 +158,12 @@ class RatedController:
 
 
 def _add_placements(environment: Environment, track_name: str, map_name: str) -> Environment:
-    """Return a map with the reference placements for the oracle: one for the start and each robot failure."""
+    """Return a map with reference placements for the oracle: one for the start, one after each failure."""
     track = suite.TRACKS[track_name]
     working = list(range(track.robots))
     stages = []
     time = 0.0
-    # The last pair is no failure; it only closes the last stage.
+    # The last pair is not a failure; it only ends the last stage.
     for failed_robot, failure_time in (*track.failures, (-1, np.inf)):
         positions = find_reference(map_name, len(working))["positions_m"]
         stages.append([time, working, positions])

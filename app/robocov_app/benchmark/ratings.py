@@ -1,7 +1,7 @@
-"""Ratings of controllers on each track, each over its own runs.
+"""Ratings of controllers on each track, each over the controller's own runs.
 
-The rating of an entry does not depend on other entries: adding an entry to a page changes neither the figures
-nor the scores of the others. Only complete entries are ranked.
+The rating of an entry does not depend on other entries. Adding an entry to a page does not change the numbers
+of the others. Only complete entries are ranked.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +16,7 @@ from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time
 
 NO_VALUE = "–"
+"""Text of a cell whose value is unknown."""
 MIN_INTERVAL_MAPS = 12
 """Minimum number of maps for an interval. A 95 % bootstrap interval contains the true value in 82 % of all
 cases with 5 maps, and in 92 % with 12."""
@@ -90,6 +91,7 @@ class Rating:
     label : str
         Label of the controller.
     track : str
+        Name of the track.
     rows : sequence of Mapping
         Rows of the runs that did not fail.
     failed : int
@@ -109,7 +111,7 @@ class Rating:
     failed: int
 
     def get_values(self, figure: str) -> Array:
-        """Return the known values of a figure, (m,)."""
+        """Return the values of a figure in the runs that have one, (m,)."""
         return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
 
     def compute_median(self, figure: str) -> float:
@@ -144,7 +146,7 @@ class Rating:
         return bootstrap(gaps, "median", maps)
 
     def select_runs(self, keys: Iterable[RunKey]) -> "Rating":
-        """Return the rating over the runs with the given keys; failed runs are left out."""
+        """Return the rating over the runs with the given keys, without failed runs."""
         selected = set(keys)
         rows = [row for row in self.rows if get_run_key(row) in selected]
         return replace(self, rows=rows, failed=0)
@@ -190,6 +192,7 @@ def compute_score(row: Mapping[str, Any]) -> float:
     Parameters
     ----------
     row : Mapping
+        Row of the run in a result.
 
     Returns
     -------
@@ -250,6 +253,7 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
     Parameters
     ----------
     results : iterable of Mapping
+        As returned by `robocov_app.benchmark.results.read_result`.
 
     Returns
     -------
@@ -262,16 +266,16 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
         if entry["set"]:
             gains = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
             label = f"{label} ({gains})"
-        twins = sum(other == label or other.startswith(f"{label} #") for other in labels)
-        labels.append(f"{label} #{twins + 1}" if twins else label)
+        equal_count = sum(other == label or other.startswith(f"{label} #") for other in labels)
+        labels.append(f"{label} #{equal_count + 1}" if equal_count else label)
     return labels
 
 
-def format_number(value: float | None, form: str = ".3g") -> str:
+def format_number(value: float | None, format_spec: str = ".3g") -> str:
     """Format a number; a dash stands for None and for values that are not finite."""
     if value is None or not np.isfinite(value):
         return NO_VALUE
-    return f"{value:{form}}"
+    return f"{value:{format_spec}}"
 
 
 def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
@@ -280,6 +284,7 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
     Parameters
     ----------
     rating : Rating
+        Rating of the controller on the track.
     information : str
         The information that the controller uses.
 
@@ -322,26 +327,26 @@ def format_run_count(count: int, total: int) -> str:
     return str(count) if count == total else f"{count} of {total}"
 
 
-def _format_runs(rating: Rating, gaps: int) -> str:
+def _format_runs(rating: Rating, gap_count: int) -> str:
     """Return the numbers of runs, failed runs and runs without a gap as text.
 
-    `gaps` is the number of runs with a gap.
+    `gap_count` is the number of runs with a gap.
     """
     text = format_run_count(rating.run_count, len(list_run_keys(rating.track)))
     if rating.failed:
         text += f", {rating.failed} failed"
-    if gaps < len(rating.rows):
-        text += f", {len(rating.rows) - gaps} without gap"
+    if gap_count < len(rating.rows):
+        text += f", {len(rating.rows) - gap_count} without gap"
     return text
 
 
-def _format_bound(rating: Rating, gaps: int) -> str:
+def _format_bound(rating: Rating, gap_count: int) -> str:
     """Return the median gap to the lower bounds in brackets; empty unless all bounds are known.
 
-    `gaps` is the number of runs with a gap.
+    `gap_count` is the number of runs with a gap.
     """
     gaps_to_bound = rating.get_values("gap_to_bound")
-    if not gaps or len(gaps_to_bound) != gaps:
+    if not gap_count or len(gaps_to_bound) != gap_count:
         return ""
     return f" (≤ {100.0 * float(np.median(gaps_to_bound)):.1f})"
 
@@ -364,6 +369,7 @@ def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[
     Parameters
     ----------
     ratings : sequence of Rating
+        Ratings of several controllers on one track.
 
     Returns
     -------
@@ -389,11 +395,13 @@ def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list
     Parameters
     ----------
     result : Mapping
+        As returned by `robocov_app.benchmark.results.read_result`.
 
     Returns
     -------
     head : tuple of str
     rows : list of tuple of str
+        One row for each track.
     """
     rows = []
     for track, ratings in build_ratings([result]).items():

@@ -1,4 +1,4 @@
-"""Maps of the benchmark that resemble real places: homes, offices, yards, plants, traffic.
+"""Random maps that resemble real places: homes, offices, yards, plants, and halls with traffic.
 
 Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every processor.
 """
@@ -30,14 +30,20 @@ FloorPlan: TypeAlias = tuple[Ring, list[Obstacle]]
 _SEED_ORDER = ("homes", "offices", "plants", "traffic", "yards")
 """Kinds in the order that determines their seeds; append new kinds, so that other seeds do not change."""
 _MAX_ATTEMPTS = 400
+"""Maximum number of plans that are drawn for a map."""
 _MIN_PASSAGE_M = 0.6
+"""Minimum width of the passages that connect the free space."""
 _INNER_WALL_M = 0.12
+"""Thickness of inner walls."""
 _HALF_WALL_M = _INNER_WALL_M / 2.0
 _START_RADIUS_M = 0.6
+"""Radius of the start disc."""
 _START_MARGIN_M = 0.01
 """Distance of the start disc from walls, so that the disc is still free when its center has been rounded."""
 _MIN_BLOCKED_FRACTION = 0.04
+"""Minimum area of the obstacles divided by the area of the map."""
 _MIN_WALL_PIECE_M = 0.15
+"""Minimum length of a wall next to a door; shorter walls are left out."""
 
 # Floor plans are frozen: a different number gives different maps. Sizes that vary are in the functions.
 _HOME_DOOR_MARGIN_M = 0.8
@@ -82,13 +88,14 @@ _AISLES_Y_M = (5.7, 9.6, 1.5)
 def build_floor_plan(kind: str, seed: int) -> Environment:
     """Build a random map of a kind.
 
-    Plans are drawn until the free space of one is connected, without narrow passages, and small enough.
+    Plans are drawn until one has enough obstacles, and a free space that is connected by wide passages.
 
     Parameters
     ----------
     kind : str
         Name of a kind in `FLOOR_PLANS`.
     seed : int
+        Seed of the random numbers.
 
     Returns
     -------
@@ -110,7 +117,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
         if start is None:
             continue
         document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": start}))
-        # Reading the plan as a map file checks it. A plan that is no valid map is replaced by another one.
+        # Reading the plan as a map file checks it. If it is not a valid map, another plan is drawn.
         with suppress(MapError):
             return from_json(document, plan.name)
     raise ParameterError(
@@ -125,6 +132,7 @@ def _is_connected(plan: Environment) -> bool:
 
 
 def _has_enough_obstacles(plan: Environment) -> bool:
+    """Return whether the obstacles block at least the minimum fraction of the map."""
     blocked_area = sum(obstacle.polygon.area for obstacle in plan.obstacles)
     return bool(blocked_area >= _MIN_BLOCKED_FRACTION * plan.area)
 
@@ -171,13 +179,14 @@ def _build_wall_with_door(
 
     Parameters
     ----------
-    offset : float
-        x of a vertical wall, y of a horizontal one.
-    start, end : float
+    offset : float, m
+        x of a vertical wall, or y of a horizontal wall.
+    start, end : float, m
         Ends of the wall along its direction.
-    door, width : float
-        Middle and width of the door.
+    door, width : float, m
+        Middle and width of the door, along the wall.
     is_vertical : bool
+        Whether the wall is parallel to the y axis, instead of the x axis.
     """
     walls: list[Obstacle] = []
     for low, high in ((start, door - width / 2.0), (door + width / 2.0, end)):
@@ -208,7 +217,7 @@ class _Flat:
         self._rng = rng
 
     def divide(self, left: float, bottom: float, right: float, top: float) -> None:
-        """Divide a rectangle, across its longer side, until all parts are rooms, and furnish these."""
+        """Divide a rectangle by walls across its longer side until only rooms remain, and furnish them."""
         is_wide = right - left > top - bottom
         if is_wide:
             split = self._add_wall(left, right, start=bottom, end=top, is_vertical=True)
@@ -235,11 +244,13 @@ class _Flat:
         start, end : float, m
             Ends of the wall along its direction.
         is_vertical : bool
+            Whether the wall is parallel to the y axis, instead of the x axis.
 
         Returns
         -------
         float or None, m
-            Position of the wall; None, and no wall is added, if the range is only wide enough for one room.
+            Position of the wall. If the range is only wide enough for one room, no wall is added, and the
+            result is None.
         """
         rng = self._rng
         min_width_of_two_rooms = rng.uniform(4.6, 6.4)
@@ -271,7 +282,7 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
     height = rng.uniform(10.0, 12.0)
     corridor_low = height * rng.uniform(0.48, 0.56)
     corridor_high = corridor_low + rng.uniform(1.4, 1.9)
-    # Keep the order of the parts: it determines which random numbers each part gets.
+    # The order determines which random numbers each group of obstacles gets, and must not change.
     obstacles = [
         *_build_offices(rng, width, corridor_high, height),
         *_build_open_space_wall(rng, width, corridor_low),
@@ -312,7 +323,7 @@ def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> 
 
 
 def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[Obstacle]:
-    """Generate two rows of desks in an open space of a width and depth."""
+    """Generate two rows of desks in an open space of the given width and depth."""
     columns_x = np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6))
     rows_y = (_LOWER_DESKS_Y_M, depth - _UPPER_DESKS_MARGIN_M)
     corners = itertools.product(columns_x, rows_y)
@@ -320,7 +331,7 @@ def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[O
 
 
 def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
-    """Return the shapes that are at least a gap apart; of two that are too near, the first is kept."""
+    """Return the shapes that are at least `gap` apart. Of two shapes that are closer, the first is kept."""
     spaced: list[Obstacle] = []
     for shape in shapes:
         if all(shape.polygon.distance(other.polygon) >= gap for other in spaced):
@@ -340,7 +351,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     hull = shapely.orient_polygons(shapely.convex_hull(shapely.MultiPoint(corners)))
     boundary = _round_points(np.asarray(hull.exterior.coords)[:-1])
 
-    # Large shapes first, because later ones are removed where they are too near.
+    # Large shapes come first, because of two shapes that are too close, the later one is removed.
     builders = [_build_house] * 5 + [_build_pond] + [_build_hedge] * 6 + [_build_tree] * 14
     shapes = [build(rng) for build in builders]
     land = shapely.Polygon(boundary)
@@ -350,6 +361,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
 
 
 def _draw_yard_point(rng: np.random.Generator) -> Array:
+    """Draw a point from the rectangle around the middle of a yard."""
     return np.array([rng.uniform(3.0, 17.0), rng.uniform(2.5, 13.5)])
 
 
@@ -369,13 +381,13 @@ def _build_pond(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_hedge(rng: np.random.Generator) -> Obstacle:
-    """Generate a hedge: a wall with a right angle between two equal parts."""
+    """Generate a hedge: a wall of two equal legs with a right angle between them."""
     start = _draw_yard_point(rng)
     angle = rng.uniform(0.0, np.pi)
     along = np.array((np.cos(angle), np.sin(angle)))
     across = np.array((-np.sin(angle), np.cos(angle)))
-    part_length = rng.uniform(1.4, 2.4)
-    corners = part_length * np.array([np.zeros(2), along, along + across])
+    leg_length = rng.uniform(1.4, 2.4)
+    corners = leg_length * np.array([np.zeros(2), along, along + across])
     return WallObstacle(_round_points(start + corners), _HEDGE_WIDTH_M)
 
 

@@ -20,7 +20,9 @@ from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
 
 RESTARTS = 24
+"""Number of searches for each reference placement, from different starting positions."""
 SEED = 0
+"""Seed of the searches."""
 BOUND_PRECISION = 0.002
 """Relative precision of the certified lower bounds."""
 _POSITION_DIGITS = 4
@@ -32,8 +34,12 @@ def list_references() -> Iterator[tuple[str, int, float]]:
 
     Yields
     ------
-    tuple of str, int and float
-        Map, number of robots, and time in s at which moving obstacles are taken: the end of the runs.
+    name : str
+        Name of the map.
+    robots : int
+        Number of robots.
+    time : float, s
+        Time that determines the positions of moving obstacles: the end of the runs.
     """
     times: dict[tuple[str, int], float] = {}
     for track in suite.TRACKS.values():
@@ -74,11 +80,12 @@ def compute_references(path: Path, *, workers: int, quiet: bool, stop: Interrupt
     quiet : bool
         Whether to show no progress.
     stop : Interruption
+        Ends the search early when it is requested.
 
     Returns
     -------
-    tuple of int
-        Number of references and bounds in the file, and number of those still missing.
+    known_count, missing_count : int
+        Number of references and bounds that the file contains, and number of those that it still lacks.
     """
     maps = _load_maps(path)
     slots = {

@@ -19,9 +19,11 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome
 
 RESULT_FILE = "result.json"
+"""Name of the file of a result."""
 ENTRIES = Path(__file__).parent / "entries"
 """Folder with the results of the built-in controllers, compressed with ``gzip -9 -n``."""
 RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
+"""Entries of a result that identify its format."""
 FIGURES = (
     "mean_distance_m",
     "mean_distance_over_run_m",
@@ -36,7 +38,7 @@ FIGURES = (
 )
 """Figures of a run that a row contains in addition to its effort and its gaps."""
 _RESULTS_VERSION_PATTERN = re.compile(r"\(results (\d+)\)")
-"""Version of the results in the version of robocov, see `robocov_app.sweep.worker.list_result_versions`."""
+"""Number of the results' version in that of robocov; see `robocov_app.sweep.worker.list_result_versions`."""
 _FIRST_VERSION_WITH_MESSAGES = 5
 """Version of the results from which on the built-in controllers share maps by messages."""
 Row: TypeAlias = dict[str, Any]
@@ -49,6 +51,7 @@ def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
     Parameters
     ----------
     map_name : str
+        Name of the map.
     robots : int
         Number of robots.
 
@@ -78,7 +81,9 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     Parameters
     ----------
     track : str
+        Name of the track.
     task : Task
+        The run.
     run : Entry or Outcome
         The figures of the run, or its error.
     effort : bytes
@@ -101,15 +106,15 @@ def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[
     Parameters
     ----------
     track, map_name : str
+        Track and map of the run.
     figures : Mapping
         Figures of the run.
 
     Returns
     -------
     dict
-        ``gap``: J / J_ref - 1, and ``gap_to_bound``: the same with the bound in place of J_ref. Both are
-        None if the team covered a different area from that of the reference. ``gap_to_bound`` is also None if
-        no bound is known.
+        ``gap`` is J / J_ref - 1, and ``gap_to_bound`` is J / J_bound - 1. Both are None if the team covered
+        a different area from that of the reference. ``gap_to_bound`` is also None if no bound is known.
     """
     reference = find_reference(map_name, suite.TRACKS[track].survivors)
     if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > AREA_TOLERANCE_M2:
@@ -152,7 +157,7 @@ def describe_method() -> list[str]:
 
 
 def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
-    """Return whether robots used nothing but messages to share maps, or shared none.
+    """Return whether robots shared maps only by messages, or did not share maps.
 
     Parameters
     ----------
@@ -162,8 +167,8 @@ def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
     Returns
     -------
     bool
-        False for entries of built-in controllers with the information "shared map" that were made before
-        these sent messages.
+        False for entries of built-in controllers with the information "shared map" that were made with a
+        version in which these controllers did not send messages.
     """
     entry = result["entry"]
     if entry["information"] != "shared map" or entry["source_sha256"]:
@@ -190,13 +195,13 @@ def read_result(path: Path) -> dict[str, Any]:
         If the file is missing or damaged, is not a result of the benchmark, or belongs to another suite.
     """
     path = path / RESULT_FILE if path.is_dir() else path
-    data = read_bytes(path)
+    content = read_bytes(path)
     if path.suffix == ".gz":
         try:
-            data = gzip.decompress(data)
+            content = gzip.decompress(content)
         except (OSError, EOFError, zlib.error) as error:
             raise InputError(f"{path}: cannot be unpacked: {error}") from None
-    result = parse_json(data, str(path))
+    result = parse_json(content, str(path))
     if not isinstance(result, dict) or {name: result.get(name) for name in RESULT_FORMAT} != RESULT_FORMAT:
         raise InputError(f"{path}: expected a result of robocov benchmark")
     if result.get("suite") != identify_suite():
@@ -248,12 +253,14 @@ _ROW_TYPES = {
 
 
 def _check_head(result: dict[str, Any], path: Path) -> None:
+    """Raise InputError unless everything but the rows of a result has the expected types."""
     _require_types(result, _HEAD_TYPES, path)
     _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
     _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
 
 
 def _check_row(row: Any, place: str) -> None:
+    """Raise InputError unless a row has the expected types, and belongs to a run of the suite."""
     has_failed = isinstance(row, dict) and "error" in row
     _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, place)
     if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
@@ -282,7 +289,7 @@ def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None
 
 
 def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
-    """Return the results of the built-in controllers, except for those that other results replace.
+    """Return the results of the built-in controllers, except for those that are replaced by other results.
 
     Parameters
     ----------

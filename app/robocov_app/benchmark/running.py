@@ -45,10 +45,13 @@ def run_benchmark(
     Parameters
     ----------
     controller : RatedController
+        The controller to rate.
     selection : Selection
+        The runs of the suite.
     out : Path
         Folder for the runs and the result, which is created if it does not exist.
     stop : Interruption
+        Ends the benchmark early when it is requested.
     workers : int, optional
         Maximum number of processes; by default one per processor.
     scheduler : str, optional
@@ -86,7 +89,7 @@ def run_benchmark(
 
 
 def _describe_result(entry: dict[str, Any], selection: Selection) -> dict[str, Any]:
-    """Return a result without rows, given the description of the controller."""
+    """Return a result without rows; `entry` is the description of the controller."""
     return {
         **RESULT_FORMAT,
         "suite": identify_suite(),

@@ -22,16 +22,20 @@ from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study import Study, StudyMap
 
 VERSION = "v1"
+"""Version of the suite."""
 SUITE_FILE = Path(__file__).parent / f"suite-{VERSION}.json"
+"""File with the hashes of the maps and the reference placements."""
 LATTICE = 128
 """Number of sites along a side of the lattice for all costs and reference placements."""
 ROBOT_RADIUS_M = 0.1
 TEAM_SIZE = 6
+"""Number of robots on most tracks."""
 _FIRST_SEED = 7001
 """Seed of the first map of each kind; the seeds of tuning maps start at 1."""
 MIN_NEW_SEED = 1_000_000
 """Minimum seed of maps that are not part of the suite."""
 _COST_RATE_HZ = 2.0
+"""Rate at which the cost is evaluated."""
 _BUNDLED = (
     "blocks-a",
     "blocks-b",
@@ -47,8 +51,11 @@ _BUNDLED = (
     "warehouse",
 )
 _LARGE_OBSTACLES = 24
+"""Number of obstacles of maps for large teams."""
 _LARGE_SIDE_M = 20.0
+"""Side of maps for large teams."""
 _LARGE_KINDS = ("polygons", "blocks", "rooms", "caves")
+"""Generators of maps for large teams."""
 
 
 def _list_names(kind: str, count: int, first_seed: int = _FIRST_SEED) -> tuple[str, ...]:
@@ -85,11 +92,13 @@ class Track:
     summary : str
         Short description of the difference.
     maps : tuple of str
+        Names of the maps.
     seeds : tuple of int
-        Seeds of the starts.
+        Seeds of the starting positions. Each seed gives one run on each map.
     robots : int
-    duration : float
-        Duration of a run, s.
+        Number of robots at the start.
+    duration : float, s
+        Simulated time of a run.
     changes : Mapping
         Options of the study that differ from those of the ideal track.
     failures : tuple of (int, float)
@@ -194,6 +203,7 @@ def load_suite_map(name: str) -> Environment:
     Parameters
     ----------
     name : str
+        Name of the map, as in `FAMILY_OF`.
 
     Returns
     -------
@@ -280,12 +290,15 @@ def build_study(
     Parameters
     ----------
     track_name : str
+        Name of the track.
     maps : sequence of StudyMap
+        The maps, which need not be part of the suite.
     controller : str
         Name of a controller, or ``FILE.py:CLASS``.
     gains : Mapping
         Gains that differ from the defaults, by controller.
     seeds : sequence of int
+        Seeds of the starting positions.
     folder : Path
         Folder to which a relative path of the controller's file refers.
 

@@ -41,12 +41,13 @@ from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
 
 MAX_SEED = 2**63 - 1
+"""Maximum seed."""
 RunKey: TypeAlias = tuple[str, str, int]
 """Track, map and seed of a run."""
 NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
-"""The probability of missing changed rows is reported for one row, and for this fraction of all rows."""
+"""Fraction of changed rows for which the probability of missing all of them is reported."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run and are not compared."""
 _DESCRIBED = ("label", "information", "gains")
@@ -54,8 +55,11 @@ _DESCRIBED = ("label", "information", "gains")
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 _SAMPLE_STREAM = 0
+"""Stream of random numbers for the choice of runs."""
 _ROBOT_STREAM = 1
+"""Stream of random numbers for the choice of robots, and for placeholders."""
 _MAP_STREAM = 2
+"""Stream of random numbers for new maps."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,7 @@ class Verification:
         Parameters
         ----------
         check : RunCheck
+            The check of the run.
         is_new : bool
             Whether the run was on a new map.
         is_joint : bool
@@ -155,12 +160,12 @@ class Verification:
         else:
             self.robots += check.robots
 
-    def compute_miss_probability(self, changed: int) -> float:
+    def compute_miss_probability(self, changed_count: int) -> float:
         """Compute the probability that none of the changed rows was among the repeated runs.
 
         Parameters
         ----------
-        changed : int
+        changed_count : int
             Number of changed rows.
 
         Examples
@@ -168,9 +173,9 @@ class Verification:
         >>> Verification(seed=0, rows=400, runs=4).compute_miss_probability(1)
         0.99
         """
-        if changed + self.runs > self.rows:
+        if changed_count + self.runs > self.rows:
             return 0.0
-        return math.comb(self.rows - changed, self.runs) / math.comb(self.rows, self.runs)
+        return math.comb(self.rows - changed_count, self.runs) / math.comb(self.rows, self.runs)
 
     def describe(self) -> list[str]:
         """Return sentences that describe the checks."""
@@ -187,11 +192,11 @@ class Verification:
 
     def _describe_missing(self) -> str:
         """Return a sentence with the probabilities of missing changed rows."""
-        many = max(1, round(CHANGED_FRACTION * self.rows))
+        changed_count = max(1, round(CHANGED_FRACTION * self.rows))
         one_missed = self.compute_miss_probability(1)
         text = f"A single changed row goes unnoticed with a probability of {one_missed:.1%}"
-        if many > 1:
-            text += f", {many} of them with {self.compute_miss_probability(many):.1%}"
+        if changed_count > 1:
+            text += f", {changed_count} of them with {self.compute_miss_probability(changed_count):.1%}"
         return f"{text}."
 
     def _describe_isolation(self) -> Iterator[str]:
@@ -244,9 +249,11 @@ def verify_result(
     controller : str, optional
         The controller as ``FILE.py:CLASS``, if it is in a file of the user.
     options : VerificationOptions, optional
+        Extent of the verification.
     quiet : bool
         Whether to show no progress.
     stop : Interruption
+        Ends the verification early when it is requested.
 
     Returns
     -------
@@ -284,15 +291,11 @@ def verify_result(
     )
     chosen_tasks = {key: tasks[key] for key in sampled} | new_tasks
     new_outcomes: dict[RunKey, Outcome | None] = {}
-    progress = SweepProgress(len(chosen_tasks))
-    with report_progress("verify", progress, quiet=quiet) as reporter:
-        for key, check in _check_runs(checker, chosen_tasks, options.workers, stop):
-            verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
-            verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
-            if key in new_tasks:
-                new_outcomes[key] = check.outcome
-            progress.done += 1
-            reporter.update(progress)
+    for key, check in _check_runs(checker, chosen_tasks, options.workers, quiet=quiet, stop=stop):
+        verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
+        verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
+        if key in new_tasks:
+            new_outcomes[key] = check.outcome
     if new_outcomes and not stop.requested:
         gaps = _compute_new_gaps(new_maps, new_outcomes, options.workers, stop)
         verification.comparison = compare_gaps(result["rows"], gaps)
@@ -429,9 +432,21 @@ class _RunChecker:
 
 
 def _check_runs(
+    checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, *, quiet: bool, stop: Interruption
+) -> Iterator[tuple[RunKey, RunCheck]]:
+    """Check runs in parallel, and report the progress; yield each check as soon as it is finished."""
+    progress = SweepProgress(len(tasks))
+    with report_progress("verify", progress, quiet=quiet) as reporter:
+        for key, check in _check_in_threads(checker, tasks, workers, stop):
+            yield key, check
+            progress.done += 1
+            reporter.update(progress)
+
+
+def _check_in_threads(
     checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, stop: Interruption
 ) -> Iterator[tuple[RunKey, RunCheck]]:
-    """Check runs in parallel; yield each check when it is finished, until the user interrupts."""
+    """Check runs in several threads until the user interrupts; yield each check as soon as it is finished."""
     if not tasks:
         return
     pool = ThreadPoolExecutor(min(workers, len(tasks)))
@@ -448,7 +463,7 @@ def _check_runs(
 
 
 def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
-    """List everything that is not as expected in a run: its figures, and the decisions of its robots."""
+    """List the differences found in a run: in its figures, and in the decisions of its robots."""
     differences = [f"{_format_key(key)}: {difference}" for difference in check.differences]
     if row is not None and check.outcome is not None:
         effort = check.outcome.files.get(EFFORT_FILE, b"{}")
@@ -462,10 +477,10 @@ def _compute_new_gaps(
     workers: int,
     stop: Interruption,
 ) -> list[tuple[str, float]]:
-    """Search for the best placements on new maps; return the family and the gap of each run.
+    """Search for the best placements on new maps, and return the family and the gap of each run.
 
-    A run that failed or left an area uncovered has an infinite gap. Maps whose search was interrupted are
-    left out.
+    The gap of a run that failed or left an area uncovered is infinite. Maps without a placement, because the
+    user interrupted the search, are left out.
     """
     robots = suite.TRACKS[TRACK].survivors
     queries = {
@@ -507,7 +522,7 @@ def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
 def _compare_without_running(
     result: Mapping[str, Any], rows: Mapping[RunKey, Row], tasks: Mapping[RunKey, Task]
 ) -> Iterator[str]:
-    """Yield the differences that are found without running anything: versions, selected runs and gaps."""
+    """Yield the differences that can be found without any run: in versions, selected runs and gaps."""
     versions = describe_version_differences(result["versions"])
     if versions:
         yield f"made with {versions}"

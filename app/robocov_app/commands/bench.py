@@ -49,14 +49,15 @@ PARTS = {
         "Learning environments on rooms, with the exact cost in the reward of each step", "learning"
     ),
     "sweep": Part("A sweep of short runs on three maps, processor time", "processes"),
-    "render": Part("Pictures of 1280 x 720", "render"),
+    "render": Part("Frames of 1280 x 720", "render"),
     "window": Part("The window of 1280 x 720 on rooms, in use", "window"),
-    "start": Part("Until a command begins", "processes", "list_start_cases"),
+    "start": Part("The start of commands", "processes", "list_start_cases"),
 }
 """The parts by name, in the order in which they are measured."""
 PartName = Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
 """Names of the parts, for the command line."""
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables that limit the number of threads of linear algebra."""
 _PACKAGES = ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")
 """Packages whose versions are printed."""
 
@@ -132,9 +133,9 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
 def _measure(
     cases: Sequence[Callable[[], Sequence[Row]]], rows: list[Row], *, quiet: bool
 ) -> KeyboardInterrupt | None:
-    """Append the results of the cases to `rows`; return the exception if the user interrupts them.
+    """Append the results of the cases to `rows`, and return the exception if the user interrupts them.
 
-    It is raised again after the results so far have been printed.
+    The caller raises the exception again after it has printed the results so far.
     """
     try:
         with show_progress("measuring", len(cases), quiet=quiet) as update:
@@ -158,6 +159,7 @@ def _describe_machine() -> dict[str, Any]:
 
 
 def _print_machine(machine: dict[str, Any]) -> None:
+    """Print the versions and the number of cores, below an explanation of the column "before"."""
     console = create_console()
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
     console.print("before: approximate ratio before any code was compiled (commit 8838167)")
@@ -186,7 +188,7 @@ def _print_tables(rows: Sequence[Row]) -> None:
 
 
 def _format_measurement(row: Row) -> list[str]:
-    """Return the table cells with the figures of a measurement."""
+    """Return the table cells with the numbers of a measurement."""
     return [
         format_duration(row.seconds),
         format_duration(row.yardstick_seconds),
@@ -211,6 +213,7 @@ def format_goals(row: Row) -> str:
     Parameters
     ----------
     row : Row
+        The measurement.
 
     Returns
     -------
@@ -233,7 +236,8 @@ def format_duration(seconds: float | None) -> str:
 
     Parameters
     ----------
-    seconds : float or None
+    seconds : float or None, s
+        The duration; None if it is unknown.
 
     Returns
     -------

@@ -251,11 +251,11 @@ def _write_page(options: Arguments) -> int:
         check_gaps(result, path)
     if not options.alone:
         results += load_bundled_results(results)
-    data = build_page(results, options.title).encode("utf-8", "replace")
+    content = build_page(results, options.title).encode("utf-8", "replace")
     with replace_file(target) as temporary:
-        temporary.write_bytes(data)
-    answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
-    print_answer(options, answer, f"written to {target} ({len(data) / 1e6:.2f} MB)")
+        temporary.write_bytes(content)
+    answer = {"path": str(target), "bytes": len(content), "entries": len(results)}
+    print_answer(options, answer, f"written to {target} ({len(content) / 1e6:.2f} MB)")
     return 0
 
 
@@ -269,9 +269,9 @@ def _compute_references(options: Arguments) -> int:
     if target.is_dir():
         raise InputError(f"--out: {target}: expected a file for the references, got a folder")
     with Interruption() as interruption:
-        count, left = compute_references(
+        known_count, missing_count = compute_references(
             target, workers=options.workers or count_processors(), quiet=options.json, stop=interruption
         )
-    answer = {"path": str(target), "references_and_bounds": count, "left": left}
-    print_answer(options, answer, f"{target}: {count} references and bounds, {left} left")
-    return INTERRUPTED if left else 0
+    answer = {"path": str(target), "references_and_bounds": known_count, "left": missing_count}
+    print_answer(options, answer, f"{target}: {known_count} references and bounds, {missing_count} left")
+    return INTERRUPTED if missing_count else 0

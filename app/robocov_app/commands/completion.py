@@ -37,7 +37,9 @@ complete -o bashdefault -o default -F _robocov robocov
 _ZSH_PROLOGUE = (
     "#compdef robocov\nautoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
 )
+"""Beginning of the script for zsh, which makes zsh understand completions of bash."""
 _CONTROLLER_OPTIONS = ("--controller", "--controllers")
+"""Options that take controllers."""
 _CONTROLLER_ARGUMENT = "names"
 """Name of the positional argument that takes controllers."""
 _MAP_ARGUMENTS = {"map", "files"}
@@ -69,7 +71,7 @@ class _Completions(NamedTuple):
     options : list of str
         Names of options, such as ``--robots``.
     words : list of str
-        Choices of positional arguments, and controllers if one takes them.
+        Choices of the positional arguments, which may include names of controllers.
     takes_maps : bool
         Whether a positional argument is a map.
     """
@@ -155,7 +157,7 @@ def _write_bash_script(completions: Mapping[str, _Completions]) -> str:
 
 
 def _write_cases(words_by_command: Mapping[str, list[str]]) -> str:
-    """Return the bash cases that set `names`, the words to offer, for each command that has some."""
+    """Return a bash case for each command that has words, which sets `names` to the words to offer."""
     cases = []
     for name, words in words_by_command.items():
         if words:

@@ -25,6 +25,7 @@ from robocov_app.terminal.output import create_console, print_answer
 _HINT = (
     "A controller of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
 )
+"""Last line of the list."""
 _INFORMATION_NOTES = {
     "own": "",
     "shared map": "   (shares maps by messages)",

@@ -22,7 +22,7 @@ from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.output import print_answer
 
 _MAX_COORDINATE_M = 1e300
-"""Limit of coordinates, which keeps computations with them finite."""
+"""Upper limit of absolute coordinates, with which all computations stay finite."""
 _MAX_RADIUS_M = 1e3
 """Maximum radius of a robot, as in a team."""
 
@@ -91,7 +91,7 @@ def command(options: Arguments) -> None:
 def _save_sites(
     path: Path, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
 ) -> None:
-    """Write distances and owners of the sites to an npz file; with speeds, those by travel time."""
+    """Write the distances and owners of the sites to an npz file; with speeds, owners are by travel time."""
     owning_result = timed_result or result
     arrays: dict[str, Any] = {
         "points": cost.points,
@@ -123,7 +123,7 @@ def _build_answer(
 def _describe_result(
     environment: Environment, cost: CoverageCost, result: CoverageResult, timed_result: CoverageResult | None
 ) -> list[str]:
-    """Return the costs as lines of text for people."""
+    """Return the costs as lines of text."""
     lines = [f"mean distance   {result.mean_distance:.4f} m"]
     if timed_result is not None:
         lines.append(f"mean time       {timed_result.mean_time:.4f} s")
@@ -137,7 +137,7 @@ def _describe_result(
 
 
 def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
-    """Build the speeds of the robots, (n,) m/s, from one value for all or one for each; None without any."""
+    """Return the speed of each robot, (n,) m/s, given one value for all or for each; None without values."""
     if not values:
         return None
     if len(values) not in (1, robots):
@@ -152,7 +152,7 @@ def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
 
 
 def _read_positions(path: Path) -> Array:
-    """Read positions, (n, 2) m, from a JSON file; raise InputError with the index of an invalid one."""
+    """Read positions, (n, 2) m, from a JSON file; raise InputError for the first invalid position."""
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:
@@ -169,6 +169,7 @@ def _read_positions(path: Path) -> Array:
 
 
 def _is_point(value: Any) -> bool:
+    """Return whether a value is a list of two numbers below the limit of coordinates."""
     if not isinstance(value, list) or len(value) != 2:
         return False
     return all(is_number(coordinate) and abs(coordinate) < _MAX_COORDINATE_M for coordinate in value)

@@ -213,9 +213,9 @@ def _build_launcher(options: Arguments) -> ViewerLauncher:
 
 
 def _load_session(file: Path, controllers: tuple[str, ...], *, at_once: bool) -> tuple[Session, str]:
-    """Load a session; return it and the name of its map.
+    """Load a session, and return it with the name of its map.
 
-    With `at_once`, it is recomputed completely; otherwise the window does this after it has opened.
+    With `at_once`, the whole session is recomputed now; otherwise, the window recomputes it after opening.
     """
     from robocov_app.viewer.session.files.session_file import load_session
     from robocov_app.viewer.session.session import Session
@@ -231,6 +231,7 @@ def build_session(options: Arguments) -> Session:
     Parameters
     ----------
     options : Arguments
+        Options of the command.
 
     Returns
     -------
@@ -274,7 +275,7 @@ def build_session(options: Arguments) -> Session:
 
 
 def _start_session(scenario: SessionScenario, *, can_change_start: bool) -> Session:
-    """Start a session; with `can_change_start`, robots start uniformly if the start has not enough space."""
+    """Start a session. With `can_change_start`, robots start uniformly if the start has too little space."""
     from robocov_app.viewer.session.session import Session
 
     try:
@@ -299,7 +300,7 @@ def _open_window(launcher: ViewerLauncher, options: Arguments) -> int:
 
 
 def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
-    """Start the lesson or the tour that the options ask for, if any."""
+    """Start the lesson or the tour that the options select, if any."""
     if options.lesson is not None:
         window.lesson.start(options.lesson)
     elif options.tour:

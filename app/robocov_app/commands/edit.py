@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _SCREENSHOT_FRAMES = 3
 """Number of frames until the layout of a window has settled."""
 _SCREENSHOT_FRAME_S = 0.2
+"""Duration of each of these frames."""
 
 
 @dataclass

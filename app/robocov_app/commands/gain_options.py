@@ -26,22 +26,22 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
     Raises
     ------
     ParameterError
-        If none of the controllers has a gain, or if a key names an unknown controller.
+        If no controller has one of the gains, or if a key names an unknown controller.
     """
-    known = {name: get_gains(load_controller_class(name)) for name in controllers}
+    known_gains = {name: get_gains(load_controller_class(name)) for name in controllers}
     selected: list[dict[str, Any]] = [{} for _ in controllers]
-    # Keys for a single controller (with a dot) come last, so that they overwrite those for all.
+    # Keys for a single controller (with a dot) come last, so that they overwrite keys for all controllers.
     for key, value in sorted(gains.items(), key=lambda item: "." in item[0]):
         owner, _, gain = key.rpartition(".")
         owner = _complete_name(owner, controllers)
-        if owner and owner not in known:
-            raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known)}")
+        if owner and owner not in known_gains:
+            raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known_gains)}")
         candidates = [owner] if owner else controllers
-        if not any(gain in known[name] for name in candidates):
-            all_gains = {gain for name in candidates for gain in known[name]}
+        if not any(gain in known_gains[name] for name in candidates):
+            all_gains = {gain for name in candidates for gain in known_gains[name]}
             raise ParameterError(f"--set {key}: {describe_unknown_name('gain', gain, all_gains)}")
         for name, values in zip(controllers, selected, strict=True):
-            if name in candidates and gain in known[name]:
+            if name in candidates and gain in known_gains[name]:
                 values[gain] = value
     return selected
 

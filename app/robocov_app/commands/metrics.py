@@ -31,7 +31,7 @@ _COLUMNS = {
     "to walls": ("wall_clearance_m", "{:z.3f} m"),
     "to robots": ("robot_clearance_m", "{:z.3f} m"),
 }
-"""Titles of the table's columns, with their keys and formats; areas are printed relative to the free area."""
+"""Titles of the table's columns, with their keys and formats. Areas are printed relative to the free area."""
 
 
 @dataclass
@@ -84,6 +84,7 @@ def command(options: Arguments) -> None:
 
 
 def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:
+    """Compute the metrics of a run, and show the progress."""
     from robocov.metrics.run_metrics import compute_run_metrics
     from robocov.record import select_nearest_steps
 

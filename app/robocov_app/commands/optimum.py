@@ -92,12 +92,15 @@ class Arguments(FigureOptions):
 
 @dataclass
 class _Problem:
-    """The map and the team for which the best positions are searched, and the runs that they come from."""
+    """The map and the team for which the best positions are searched."""
 
     environment: Environment
     robots: int
+    """Number of robots."""
     radius: float
+    """Radius of a robot, m."""
     saved_runs: list[SavedRun]
+    """Runs of this team on this map; empty if the map is given by its name."""
 
 
 def command(options: Arguments) -> None:

@@ -38,7 +38,9 @@ if TYPE_CHECKING:
 MAX_DEFAULT_RECORD_ROWS = 4e6
 """Maximum number of recorded steps times robots, about 320 MB, unless ``--record-hz`` is given."""
 _MIN_FIGURE_SIZE_PX = (320, 240)
+"""Minimum width and height of figures and videos."""
 _MAX_FIGURE_SIZE_PX = (7680, 4320)
+"""Maximum width and height of figures and videos."""
 
 
 @dataclass(kw_only=True)
@@ -365,7 +367,7 @@ class RunOptions(ScenarioOptions, JsonOption):
         return max(round(1.0 / (self.record_hz * self.dt)), 1)
 
     def describe_record(self) -> str:
-        """Return a remark on steps that are not recorded; empty if all steps are recorded."""
+        """Return a remark about steps that are not recorded; empty if all steps are recorded."""
         every = self.record_every
         if every == 1:
             return ""
@@ -404,8 +406,11 @@ class RunOptions(ScenarioOptions, JsonOption):
         Parameters
         ----------
         environment : Environment
+            The map.
         controller : str
+            Name of the controller, or ``file.py:Class``.
         gains : mapping
+            Gains that differ from their defaults.
 
         Returns
         -------

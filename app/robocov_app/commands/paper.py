@@ -82,9 +82,13 @@ class _Outcome:
     """Results of the selected parts of the study."""
 
     paper: PaperResults | None
+    """Results on the paper's claims; None if these were not tested."""
     beyond: BeyondResults | None
+    """Results beyond the paper; None if this part was not selected."""
     figure_runs: int
+    """Number of runs for the paper's figures."""
     claims: list[Claim]
+    """All claims with their verdicts."""
 
     @property
     def failed(self) -> int:

@@ -188,7 +188,8 @@ def _save_video(options: Arguments, saved_runs: Sequence[SavedRun]) -> int:
     for saved in saved_runs:
         history = saved.history or CostHistory(*np.empty((4, 0)))
         runs.append(Run(saved.record, history, {}))
-        # Failed robots are obstacles, at different positions in each run. Common distances ignore them.
+        # Failed robots are obstacles, at different positions in each run. Distances on a common map ignore
+        # them.
         environment = build_roster(saved.record).environment
         roster_runs.append(Run(replace(saved.record, environment=environment), history, {}))
     runs_on_one_map = None

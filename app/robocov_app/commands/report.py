@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from robocov_app.report.results.result import ReportedResult
 
 _SESSION_SUFFIX = ".robocov"
+"""Suffix of session files."""
 
 
 @dataclass
@@ -99,20 +100,20 @@ def _write_report(
     _check_damaged_runs(options, results)
     results = _add_references(options, results)
     page = build_report(results, title=options.title, theme=options.theme)
-    data = page.html.encode("utf-8", "replace")
+    content = page.html.encode("utf-8", "replace")
     # A report in the folder of a run is registered as a file of the run, so that it is replaced together
     # with the run.
     run_folder = None
     if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
         run_folder = options.folders[0]
-    _write_page(data, target, run_folder)
+    _write_page(content, target, run_folder)
     counts = []
     lines = []
     for (folder, _), result, shown in zip(sections, results, page.shown, strict=True):
         counts.append(_count_runs(result, _name_folder(folder, scratch), shown))
         lines.append(_describe_result(result, _name_folder(result.folder, scratch)))
-    answer = {"path": str(target), "bytes": len(data), "results": counts}
-    print_answer(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
+    answer = {"path": str(target), "bytes": len(content), "results": counts}
+    print_answer(options, answer, *lines, f"written to {target} ({len(content) / 1e6:.2f} MB)")
 
 
 def _read_runs(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
@@ -156,18 +157,18 @@ def _add_references(options: Arguments, results: Sequence[ReportedResult]) -> li
     return complete_results
 
 
-def _write_page(data: bytes, target: Path, run_folder: Path | None) -> None:
-    """Write the page; if `run_folder` is given, as one of the files of this run."""
+def _write_page(content: bytes, target: Path, run_folder: Path | None) -> None:
+    """Write the page. If `run_folder` is given, the page becomes one of the files of that run."""
     with ExitStack() as stack:
         if run_folder is not None:
             result = stack.enter_context(extend_result(run_folder))
             result.claim_file(REPORT_FILE)
             target = result.staging / REPORT_FILE
-        stack.enter_context(replace_file(target)).write_bytes(data)
+        stack.enter_context(replace_file(target)).write_bytes(content)
 
 
 def _name_folder(folder: Path, scratch: Path) -> str:
-    """Return the path of a folder, relative to the scratch folder if it is in there."""
+    """Return the path of a folder, relative to the scratch folder if it is inside."""
     if folder.is_relative_to(scratch):
         folder = folder.relative_to(scratch)
     return str(folder)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robocov_app.viewer.session.files.session_file import SavedSession
 
 _SESSION_SUFFIX = ".robocov"
+"""Suffix of session files."""
 
 
 @dataclass

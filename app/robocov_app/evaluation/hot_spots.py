@@ -8,10 +8,13 @@ from robocov.environment import Environment, UniformStart
 HOT_SPOTS = 2
 """Number of peaks on a map."""
 PEAK_WEIGHT = 20.0
-"""Weight of a peak, relative to the floor of 1."""
+"""Height of a peak above the floor, divided by the floor."""
 PEAK_SIGMA_M = 1.0
+"""Standard deviation of a peak."""
 _FLOOR = 1.0
+"""Density far from the peaks."""
 _CLEARANCE_M = 0.3
+"""Minimum distance of the center of a peak from obstacles."""
 
 
 def add_hot_spots(environment: Environment, seed: int) -> Environment:
@@ -20,6 +23,7 @@ def add_hot_spots(environment: Environment, seed: int) -> Environment:
     Parameters
     ----------
     environment : Environment
+        The map.
     seed : int
         Seed of the centers of the peaks, which are drawn uniformly in the free space.
 

@@ -1,7 +1,7 @@
 """Searches for the best placement on a map, in separate processes.
 
-A reference placement is the best result of many descents with the whole map known. If J_ref is its mean
-distance and J that of a controller, the gap of the controller is J / J_ref - 1.
+A reference placement is the best result of many descents on the known map. If J_ref is the mean distance of
+the reference placement, and J that of a controller, the gap of the controller is J / J_ref - 1.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.terminal.interruption import Interruption
 
 REFERENCE_FORMAT = "robocov-reference 1"
-"""Beginning of the hashed text. Change it whenever the search gives other results."""
+"""Beginning of the hashed text. It has to be changed whenever the search gives other results."""
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 
@@ -34,13 +34,15 @@ class ReferenceQuery:
     document : Mapping
         The map as JSON.
     robots : int
-    radius : float
-        Radius of a robot, m.
+        Number of robots.
+    radius : float, m
+        Radius of a robot.
     lattice : int
         Number of sites along a side of the lattice on which the cost is computed.
     restarts : int
         Number of descents; the best one is used.
     seed : int
+        Seed of the starting positions of the descents.
     """
 
     document: Mapping[str, Any]
@@ -64,12 +66,12 @@ class ReferencePlacement:
 
     Parameters
     ----------
-    mean_distance : float
-        Coverage cost of the placement, m.
-    positions : tuple of (x, y)
-        One position for each robot, m.
+    mean_distance : float, m
+        Mean distance to the nearest robot.
+    positions : tuple of (x, y), m
+        Position of each robot.
     agreement : float
-        Fraction of the descents whose cost is within 0.5 % of the best.
+        Fraction of the descents whose mean distance is within 0.5 % of the best.
     """
 
     mean_distance: float
@@ -114,7 +116,7 @@ def answer_queries(
     workers : int
         Maximum number of processes.
     stop : Interruption
-        When the user interrupts, running searches are ended, and their answers are lost.
+        If an interruption is requested, running searches are ended, and their answers are lost.
     service : str
         The service as ``package.module:Class``.
 

@@ -37,9 +37,10 @@ class Service(Protocol):
 
 
 class Codec:
-    """Converts questions before they are sent, and answers after they are received; by default not at all.
+    """Converts questions before they are sent, and answers after they are received.
 
-    Each process has its own codec. Questions and answers are converted in order, each kind in its own thread.
+    This base class leaves them unchanged. Each process has its own codec. Questions are converted in one
+    thread and answers in another, each in order.
     """
 
     def encode(self, question: Any) -> object:
@@ -103,9 +104,11 @@ def answer_questions(service: Service, questions: list[tuple[int, Any]], channel
     Parameters
     ----------
     service : Service
+        The service.
     questions : list of (int, object)
         Numbered questions, oldest first.
     channel : Channel
+        Channel of the service for newer questions and for progress.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Start, query and end processes of services, for callers that wait for each answer."""
+"""Functions that start, query and end the process of a service, for callers that wait for each answer."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subproces
     if sys.platform == "linux":
         import fcntl
 
-        # Not every user is allowed to create pipes of this size; smaller ones work, too.
+        # Not every user is allowed to create pipes of this size, but smaller pipes work as well.
         with suppress(OSError):
             fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE_BYTES)  # type: ignore[arg-type]
     return process
@@ -62,7 +62,9 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
     Parameters
     ----------
     process : subprocess.Popen
+        Process that `start_process` returned.
     question : object
+        The question, which must be picklable.
 
     Returns
     -------

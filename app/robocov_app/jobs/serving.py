@@ -70,7 +70,7 @@ class _PipeChannel(Channel):
 def serve(service: str) -> None:
     """Load a service, and answer questions until the standard input is closed.
 
-    It is closed when the program ends, even if it crashes.
+    The standard input is closed when the program ends, even if it crashes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Background workers for a window that must not block: only the newest question counts."""
+"""Background workers for a window that must not block. Only the newest question is answered."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _Answer = TypeVar("_Answer")
 
 
 class LatestWorker(Generic[_Answer]):
-    """A service in its own process, which is started when a question arrives and it is not running.
+    """A service in a separate process. A question starts the process if it is not running.
 
     Parameters
     ----------
@@ -95,6 +95,7 @@ class LatestWorker(Generic[_Answer]):
         Parameters
         ----------
         question : object
+            The question, in the form that the codec expects.
         """
         try:
             self._restart_if_needed()
@@ -232,6 +233,7 @@ class DirectWorker(Generic[_Answer]):
     Parameters
     ----------
     service : Service
+        The service.
     codec : Codec or None
         Converts questions and answers; see `Codec`.
 

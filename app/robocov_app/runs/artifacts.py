@@ -54,13 +54,16 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     Parameters
     ----------
     scenario : Scenario
+        The scenario.
     out : Path
-        The folder.
+        The folder, which is created.
     settings : OutputSettings
+        Settings of the evaluation and of the files.
 
     Returns
     -------
     run : Run
+        The run, which has fewer steps if it was interrupted.
     is_interrupted : bool
         Whether Ctrl-C ended the run early.
 
@@ -93,15 +96,17 @@ def execute_comparison(
     Parameters
     ----------
     scenarios : mapping of str to Scenario
-        By the names of their subfolders.
+        The scenarios, by the names of their subfolders.
     out : Path
-        The folder.
+        The folder, which is created.
     settings : OutputSettings
+        Settings of the evaluation and of the files.
 
     Returns
     -------
     runs : dict of str to Run
-        The runs, keyed like `scenarios`. If Ctrl-C ended the comparison early, only runs that were started.
+        The runs, by the names of their subfolders. If Ctrl-C ended the comparison early, only those that
+        were started.
     is_interrupted : bool
         Whether Ctrl-C ended the comparison early.
 
@@ -136,7 +141,7 @@ def _save_videos(
     settings: OutputSettings,
     interruption: Interruption,
 ) -> None:
-    """Save all other results, then the frames and videos if they were requested."""
+    """Save the results so far, and then the frames and videos if they were requested."""
     result.save_progress()
     if settings.video.has_output:
         from robocov_app.runs.video import save_videos
@@ -178,6 +183,7 @@ def start_comparison(folder: Path, subfolders: Sequence[str]) -> None:
     Parameters
     ----------
     folder : Path
+        Folder of the comparison.
     subfolders : sequence of str
         Names of the subfolders of the runs.
 
@@ -197,11 +203,13 @@ def save_comparison(
     Parameters
     ----------
     runs : mapping of str to Run
-        By the names of their subfolders.
+        The runs, by the names of their subfolders.
     cost : CoverageCost
         Cost of the map.
     folder : Path
+        Folder of the comparison.
     settings : OutputSettings
+        Settings of the files.
 
     Raises
     ------
@@ -230,10 +238,13 @@ def save_figures(
     Parameters
     ----------
     runs : sequence of Run
+        The runs to draw.
     cost : CoverageCost
         Cost of the map.
     folder : Path
+        Folder of the figures.
     settings : OutputSettings
+        Settings of the files.
     is_comparison : bool
         Whether the runs are drawn side by side, even if there is only one.
 
@@ -318,14 +329,14 @@ def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[Dista
     Parameters
     ----------
     runs : sequence of Run
-        Runs on one map, which may differ in failed robots, because these are obstacles.
+        Runs on one map. The maps of the records may differ by failed robots, which are obstacles.
     cost : CoverageCost
         Cost of the map of the first run.
 
     Returns
     -------
     list of DistanceSnapshot
-        Snapshots of the runs in which at least one robot works at the end.
+        A snapshot of each run in which at least one robot works at the end.
     """
     from robocov_app.figures.coverage import DistanceSnapshot
     from robocov_app.render.distance_map.pixel_distances import DistanceField

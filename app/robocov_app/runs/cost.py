@@ -1,4 +1,4 @@
-"""The coverage cost of a map, computed with a progress display, and a figure of it."""
+"""The coverage cost of a map, computed with a progress display, and figures of the distances to robots."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from robocov.team import Team
 from robocov_app.terminal.progress import show_late_progress
 
 AREA_TOLERANCE_M2 = 1e-6
-"""Maximum difference between the uncovered areas of placements that cover the same components."""
+"""Maximum difference between the uncovered areas of two placements that is attributed to rounding."""
 MIN_FIGURE_LATTICE = 256
 """Minimum lattice size of figures of distances, so that its cells are narrower than most walls."""
 MIN_VIDEO_LATTICE = 128
@@ -33,6 +33,7 @@ def build_cost(
     Parameters
     ----------
     environment : Environment
+        The map.
     lattice : int
         Number of sites along each side of the map.
     radius : float, m
@@ -58,6 +59,7 @@ def refine_cost_for_figures(
     Parameters
     ----------
     environment : Environment
+        The map.
     cost : CoverageCost
         Cost of this map. It is returned unchanged if it is fine enough, or if a finer cost would take too
         long because the map has many vertices.
@@ -93,10 +95,13 @@ def save_distance_figure(
     path : Path
         PNG, SVG or PDF file.
     cost : CoverageCost
+        Cost of the map.
     positions : (n, 2) array, m
+        Positions of the robots.
     mean : str
         Text about the mean distance, for the caption.
     title : str
+        Title of the figure.
     theme : str
         ``light`` or ``dark``.
     speeds : (n,) array or None, m/s

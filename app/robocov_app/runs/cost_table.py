@@ -11,12 +11,14 @@ def build_cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, .
     Parameters
     ----------
     history : CostHistory
+        The coverage cost over a run.
 
     Returns
     -------
     header : str
-        Names of the columns, with a column of mean times only if some robots are faster than others.
+        Names of the columns, with a column of mean times only if the robots differ in speed.
     rows : iterator of tuple of float
+        Values of the columns at each sampled time.
     """
     columns = {
         "time_s": history.time,

@@ -20,8 +20,9 @@ from robocov.files.writing import replace_file
 Frame: TypeAlias = NDArray[np.uint8]
 """An RGB image, (height, width, 3), from 0 to 255."""
 _PNG_COMPRESSION_LEVEL = 2
-"""A low level, which is several times as fast. Drawings with flat colors stay small even so."""
+"""A low level is several times as fast, and files of drawings with flat colors are small anyway."""
 _SECONDS_PER_KEYFRAME = 2
+"""Time between two keyframes of a streamed video."""
 
 
 def encode_png(frame: Frame) -> bytes:
@@ -30,10 +31,12 @@ def encode_png(frame: Frame) -> bytes:
     Parameters
     ----------
     frame : Frame
+        The image.
 
     Returns
     -------
     bytes
+        Content of the file.
     """
     from PIL import Image
 
@@ -54,7 +57,7 @@ def save_frames_and_video(
     folder : Path or None
         Folder for the files ``000000.png``, ``000001.png`` and so on.
     video : Path or None
-        MP4 file.
+        MP4 file of the video.
     fps : float
         Frames per second of the video.
 
@@ -89,6 +92,7 @@ def save_video(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> Non
     Parameters
     ----------
     path : Path
+        File of the video.
     frames : iterable of Frame
         At least one frame, all of the same size.
     fps : float
@@ -132,7 +136,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
     """Run the encoder, and yield the pipe for raw frames; raise OutputError if the encoder fails."""
     command = build_encoder_command(temporary, size, fps)
     with tempfile.TemporaryFile() as error_output:
-        # In a session of its own, the encoder does not receive Ctrl-C from the terminal, so that it can
+        # The encoder gets a session of its own, so that it does not receive Ctrl-C from the terminal and can
         # complete the video.
         process = subprocess.Popen(
             command,
@@ -163,7 +167,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
 
 
 def find_encoder() -> str:
-    """Find ffmpeg: the one installed by the extra "film", or else one on the PATH.
+    """Find the program ffmpeg, first that of the extra "film", then that on the PATH.
 
     Returns
     -------

@@ -24,6 +24,7 @@ from robocov_app.terminal.progress import make_counter, show_progress
 MAX_SAMPLES_AFTER_INTERRUPTION = 200
 """Maximum number of samples of the coverage cost of an interrupted run, so that it ends soon."""
 _STEPS_PER_PROGRESS_UPDATE = 10
+"""Number of simulation steps between two updates of the progress display."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +34,11 @@ class Run:
     Attributes
     ----------
     record : Record
+        The simulated run.
     history : CostHistory
+        The coverage cost over the run.
     summary : dict
-        See `robocov.metrics.summarize`.
+        Results of the run; see `robocov.metrics.summarize`.
     """
 
     record: Record
@@ -44,7 +47,7 @@ class Run:
 
     @property
     def final_time(self) -> float | None:
-        """Mean travel time of the first to arrive, at the end of the run, s; None if speeds are equal."""
+        """Mean time until the first robot arrives, at the end of the run, s; None if speeds are equal."""
         return None if self.history.mean_time is None else float(self.history.mean_time[-1])
 
 
@@ -62,10 +65,13 @@ def execute_scenario(
     Parameters
     ----------
     scenario : Scenario
+        The scenario.
     cost : CoverageCost
         Cost of the scenario's map.
     result : ResultFolder
+        Folder for the results.
     settings : OutputSettings
+        Settings of the evaluation and of the files.
     interruption : Interruption
         The run ends early if an interruption is requested.
     subfolder : str
@@ -110,6 +116,7 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     Parameters
     ----------
     record : Record
+        The run.
     cost : CoverageCost
         Cost of the record's map.
     interruption : Interruption
@@ -137,9 +144,11 @@ def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     Parameters
     ----------
     run : Run
+        The evaluated run.
     folder : Path
+        Folder of the files.
     lattice : int
-        Lattice on which the cost was computed.
+        Number of lattice sites along each side of the map with which the cost was computed.
 
     Raises
     ------

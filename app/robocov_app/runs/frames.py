@@ -20,7 +20,9 @@ from robocov_app.runs.encoding import Frame
 from robocov_app.runs.settings import VideoSettings
 
 _TIME_TOLERANCE_S = 5e-7
-"""Tolerance for the rounding errors of times, which are sums of steps."""
+"""Maximum rounding error of a time, which is a sum of control periods."""
+_FRAME_COUNT_TOLERANCE = 1e-9
+"""Maximum rounding error of a number of frames."""
 
 
 def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
@@ -43,8 +45,8 @@ def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float =
         Index of the recorded step in each frame.
     """
     duration = float(time[-1] - time[0])
-    count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
-    frame_times = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
+    moving_count = int(np.ceil(duration / speed * fps - _FRAME_COUNT_TOLERANCE)) + 1
+    frame_times = time[0] + np.arange(moving_count + round(hold * fps)) * (speed / fps)
     rows = np.searchsorted(time, frame_times + _TIME_TOLERANCE_S, side="right") - 1
     return np.asarray(np.clip(rows, 0, len(time) - 1), dtype=np.intp)
 
@@ -65,8 +67,11 @@ def draw_frames(
     Parameters
     ----------
     record : Record
+        The run.
     settings : VideoSettings
+        Settings of the video.
     size : (width, height), px
+        Size of the frames.
     layers : sequence of Layer or None
         Layers to draw. By default, the standard layers.
     scale : float or None
@@ -109,11 +114,15 @@ def build_painter(
     Parameters
     ----------
     record : Record
+        The run.
     settings : VideoSettings
+        Settings of the video.
     size : (width, height), px
+        Size of the frames.
     layers : sequence of Layer
+        Layers to draw.
     scale : float or None
-        Scale of texts and lines; by default one that suits the size.
+        Scale of text and lines; by default one that suits the size.
 
     Returns
     -------

@@ -31,11 +31,15 @@ PANE_GAP_PX = 2
 _MIN_PANE_WIDTH_PX = 360
 """Minimum width of a pane at scale 1, so that its caption fits."""
 _MIN_PANE_HEIGHT_PX = 40
+"""Minimum height of a pane."""
 _MIN_SCALE = 0.75
+"""Minimum scale of text and lines."""
 _HEADER_PADDING_PX = 6
+"""Space above and below the caption of a pane at scale 1."""
 _PANE_PADDING_PX = 4
-_ANY_SIZE_PX = (64, 64)
-"""Size of a painter that only lists the entries of the legend, which do not depend on its size."""
+"""Further space around the map in a pane at scale 1."""
+_LEGEND_PAINTER_SIZE_PX = (64, 64)
+"""Size of a painter that only lists the entries of the legend. The entries do not depend on it."""
 
 
 class PaneLayout(NamedTuple):
@@ -69,6 +73,7 @@ class PaneLayout(NamedTuple):
         panes : sequence of Frame
             The frame of each pane.
         theme : Theme
+            Color theme of the video.
 
         Returns
         -------
@@ -103,8 +108,9 @@ def build_pane_layout(
     Parameters
     ----------
     records : sequence of Record
-        One for each pane.
+        The record of each pane.
     settings : VideoSettings
+        Settings of the video.
     size : (width, height) or None, px
         Size of the video. By default, one that suits the map, up to `MAX_DEFAULT_SIZE_PX`.
     fields : DistanceFields or None
@@ -151,7 +157,7 @@ def _compute_aspect(record: Record) -> float:
 
 
 def _count_columns(panes: int, aspect: float, size: tuple[int, int]) -> int:
-    """Choose the number of panes in a row; `aspect` is the width of the map divided by its height."""
+    """Choose the number of panes in a row; `aspect` is the width of the widest map divided by its height."""
     width, height = size
     scale = choose_scale(size)
     caption_height = (_HEADER_PADDING_PX + ROW_HEIGHT_PX + _HEADER_PADDING_PX + STRIP_HEIGHT_PX) * scale
@@ -185,7 +191,9 @@ def _draw_legend(
     scenes: Sequence[Scene] | None,
 ) -> Frame:
     """Draw the common legend, with entries for everything that the panes show."""
-    painter = build_painter(records[0], settings, _ANY_SIZE_PX, build_pane_layers(settings.colors), scale)
+    painter = build_painter(
+        records[0], settings, _LEGEND_PAINTER_SIZE_PX, build_pane_layers(settings.colors), scale
+    )
     if scenes is None:
         scenes = _select_legend_scenes(records, fields, painter)
     entries = [painter.list_legend_entries(scene) for scene in scenes]
@@ -215,12 +223,13 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
     Parameters
     ----------
     frames : sequence of Frame
+        The frames, row by row.
     columns : int
         Number of frames in a row.
     gap : int, px
         Width of the lines between frames.
     line, background : Color
-        Color of these lines, and color of areas without a frame.
+        Color of the lines, and color of areas without a frame.
 
     Returns
     -------
@@ -236,7 +245,8 @@ def tile_frames(frames: Sequence[Frame], columns: int, gap: int, line: Color, ba
         x = column * (width + gap)
         y = row * (height + gap)
         page[y : y + height, x : x + width] = frame
-        # The lines to the left of the frame and above its row; at the edge of the page they are empty.
+        # Draw the lines to the left of the frame and above its row. At the edges of the page they have no
+        # pixels.
         page[y : y + height, max(x - gap, 0) : x] = line
         page[max(y - gap, 0) : y] = line
     return page

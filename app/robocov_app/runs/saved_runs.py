@@ -20,6 +20,7 @@ from robocov.metrics.results import read_history
 from robocov.record import Record
 
 _MAX_FOLDER_NAME_CHARS = 64
+"""Maximum length of a folder name, apart from a number at its end."""
 
 
 class ComparisonDocument(Document):
@@ -35,7 +36,9 @@ class SavedRun(NamedTuple):
     Attributes
     ----------
     folder : Path
+        Folder of the run.
     record : Record
+        The content of ``record.npz`` and ``run.json``.
     history : CostHistory or None
         The content of ``cost.csv``, if it exists.
     """
@@ -46,7 +49,7 @@ class SavedRun(NamedTuple):
 
 
 class Roster(NamedTuple):
-    """The numbers of the robots in a record; in the window, robots can fail, and others keep their numbers.
+    """The numbers of the robots in a record. When a robot fails in the window, the others keep their numbers.
 
     Attributes
     ----------
@@ -55,7 +58,7 @@ class Roster(NamedTuple):
     numbers : tuple of int
         Number of each robot in the record.
     failed : dict of int to (x, y), m
-        Positions of the failed robots, keyed by number.
+        Positions of the failed robots, by number.
     """
 
     environment: Environment
@@ -74,12 +77,12 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
     Returns
     -------
     list of SavedRun
-        The runs. If the program was killed during a comparison, only the runs saved before.
+        The runs. If the program was killed during a comparison, only the runs that had been saved.
 
     Raises
     ------
     InputError
-        If it is not the folder of a run or a comparison, or if a file in it is invalid.
+        If this is not the folder of a run or a comparison, or if a file in it is invalid.
     """
     is_file = path.name in (RUN_FILE, COMPARISON_FILE) and not path.is_dir()
     folder = path.parent if is_file else path
@@ -119,11 +122,12 @@ def build_roster(record: Record) -> Roster:
     Parameters
     ----------
     record : Record
+        The record of a run, which may be part of a session in the window.
 
     Returns
     -------
     Roster
-        If the record does not come from a session in the window, or is inconsistent with it, robots are
+        If the record does not come from a session, or its map does not match the session, robots are
         numbered from 1 and none has failed.
     """
     environment = record.environment
@@ -180,6 +184,7 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
 
 
 def _load_run(folder: Path) -> SavedRun:
+    """Load the record of a run, and its cost if that was saved."""
     history_path = folder / COST_FILE
     history = read_history(history_path) if history_path.exists() else None
     return SavedRun(folder, Record.load(folder), history)

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from robocov_app.look.theme import Theme
 
 DEFAULT_VIDEO_SIZE_PX = (1280, 720)
+"""Default width and height of the video of a single run."""
 MIN_LATTICE = 2
+"""Minimum lattice size."""
 MAX_LATTICE = 2048
 """Maximum lattice size that options and study files accept. The library accepts larger ones."""
 
@@ -90,6 +92,7 @@ class OutputSettings:
     hide_progress : bool
         Whether to hide progress, because a program reads the output.
     video : VideoSettings
+        Settings of frames and videos, and of the look of figures.
     """
 
     lattice: int = DEFAULT_LATTICE

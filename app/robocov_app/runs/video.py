@@ -51,9 +51,11 @@ def draw_comparison_frames(
     records : sequence of Record
         The record of each pane. A pane whose run is shorter stays at its last step.
     costs : sequence of CostHistory
-        The cost along each run.
+        The coverage cost over each run.
     layout : PaneLayout
+        Layout of the panes.
     settings : VideoSettings
+        Settings of the video.
     hold : float, s
         Duration for which the last step is shown.
     fields : DistanceFields or None
@@ -103,14 +105,16 @@ def save_videos(
     cost : CoverageCost or None
         Cost of the runs' map, if it has been computed already.
     folder : Path
+        Folder of the files.
     settings : VideoSettings
+        Settings of the video.
     interruption : Interruption
         Writing ends early if an interruption is requested.
     quiet : bool
         Whether to hide progress.
     runs_on_one_map : sequence of Run or None
-        The same runs on the map without failed robots, which are obstacles of the maps of `runs`. If given,
-        distances are computed on that map.
+        The same runs on the map without failed robots, which are obstacles in the maps of `runs`. If given,
+        distances are computed on the map without them.
 
     Raises
     ------
@@ -169,12 +173,13 @@ def write_frames_and_video(
     Parameters
     ----------
     frames : iterator of Frame
+        The frames.
     total : int
         Expected number of frames, for progress.
     path : Path
         File of the video.
     settings : VideoSettings
-        Which of the two are written.
+        Settings of the video, which determine which files are written.
     interruption : Interruption
         Writing ends early if an interruption is requested.
     quiet : bool

@@ -1,9 +1,9 @@
 """Benchmark of the exact coverage cost, compared with fast marching (scikit-fmm) and with a k-d tree.
 
-Second-order fast marching covers the same lattice and the same free sites, starting at the cells that contain
-a robot. It is not exact, and it does not tell which robot is nearest to a site. The robots move by up to a
-quarter of a cell between calls. The k-d tree computes straight-line distances, the least work that any
-coverage cost requires.
+Second-order fast marching computes distances on the same lattice and for the same free sites, starting at the
+cells that contain a robot. It is not exact, and it does not compute which robot is nearest to a site. The
+robots move by up to a quarter of a cell between calls. The k-d tree computes straight-line distances, the
+minimum work of any coverage cost.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,11 +23,15 @@ from robocov.mapfile import load_map
 from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interleaved
 
 VERTICES = (20, 200, 1000)
+"""Numbers of vertices of random obstacles."""
 LATTICES = (64, 128, 256, 512)
+"""Numbers of sites along a side of the map."""
 ROBOTS = (6, 50, 200)
+"""Numbers of robots."""
 QUICK_SIZES: tuple[tuple[int, int], ...] = ((128, 200), (256, 200))
 """Lattice and vertices of the quick benchmark."""
 QUICK_ROBOTS = (6, 50)
+"""Numbers of robots of the quick benchmark."""
 GOALS = {
     (128, 200, 50): 0.75,
     (256, 200, 50): 0.45,
@@ -41,19 +45,24 @@ GOALS = {
 BUILD_GOALS_S = {(128, 200): 0.15, (512, 1000): 8.0}
 """Maximum times to build the cost, by lattice and vertices."""
 YARDSTICK = "scikit-fmm, order 2"
+"""Name of the yardstick among random obstacles."""
 _OBSTACLE_CORNERS = 5
-_BLOCKED_SHARE = 0.23
-"""Share of the area that the random obstacles block, without overlaps."""
+"""Number of corners of a random obstacle."""
+_BLOCKED_FRACTION = 0.23
+"""Total area of the random obstacles divided by the area of the map, if no obstacles overlap."""
 _MEAN_OBSTACLE_AREA_RADII2 = 2.2
-"""Mean area of an obstacle, in squares of the radius inside which its corners are not."""
+"""Mean area of an obstacle, divided by the square of the minimum distance of its corners from its center."""
 _MIN_OBSTACLE_AREA_RADII2 = 0.3
-"""Area below which an obstacle is drawn again, because it is a sliver."""
+"""Minimum area of an obstacle, divided by the same square; slivers with a smaller area are drawn again."""
 _MIN_ROUNDS = 7
+"""Minimum number of rounds of a case."""
 _QUICK_DURATION_S = 0.3
+"""Minimum total time of the rounds of a case in the quick benchmark."""
 _FULL_DURATION_S = 1.0
-"""Minimum total time of the rounds of a case, s."""
+"""Minimum total time of the rounds of a case in the full benchmark."""
 
 TREE = "k-d tree of the robots"
+"""Name of the yardstick on bundled maps."""
 EARLIER_RATIOS = {
     ("rooms", 64, 6): 4.5,
     ("rooms", 128, 6): 2.8,
@@ -79,8 +88,11 @@ EARLIER_RATIOS = {
 SPEEDUPS = {64: 4.0, 128: 2.5, 256: 1.7}
 """Minimum speedups over the ratios in `EARLIER_RATIOS`, by lattice."""
 _CAMPUS_FACTOR = 2.0
+"""Factor of the minimum speedups on the map "campus"."""
 _LARGE_TEAM = 1000
+"""Number of robots for which another minimum speedup applies."""
 _LARGE_TEAM_SPEEDUP = 10.0
+"""Minimum speedup for the large team."""
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
@@ -105,7 +117,7 @@ def has_yardstick() -> bool:
 def build_random_map(vertices: int, seed: int = 0) -> Environment:
     """Build a unit square in which obstacles with five corners each block about a quarter of the area."""
     rng = np.random.default_rng(seed)
-    area_per_obstacle = _BLOCKED_SHARE / (vertices / _OBSTACLE_CORNERS)
+    area_per_obstacle = _BLOCKED_FRACTION / (vertices / _OBSTACLE_CORNERS)
     radius = np.sqrt(area_per_obstacle / _MEAN_OBSTACLE_AREA_RADII2)
     obstacles: list[PolygonObstacle] = []
     while len(obstacles) < vertices // _OBSTACLE_CORNERS:
@@ -123,7 +135,9 @@ class MovingRobots:
     Parameters
     ----------
     cost : CoverageCost
+        Cost of the map, whose sites are the starting positions.
     robots : int
+        Number of robots.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Benchmark of learning environments, compared with a plain gymnasium one: point masses in a square."""
+"""Benchmark of learning environments, compared with a plain gymnasium environment of point masses."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -14,15 +14,19 @@ from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
 
 ROBOTS = 6
+"""Number of robots in each environment."""
 LATTICE = 32
+"""Number of lattice sites along each side of the map."""
 ENVIRONMENTS = 64
 """Number of environments that are stepped together in the vector environment."""
 SIDE_M = 20.0
 """Side of the square in which the point masses move."""
 YARDSTICK = f"{ROBOTS} point masses, gymnasium"
+"""Name of the yardstick."""
 SINGLE_GOAL = 0.7
+"""Minimum number of steps per second of a single environment, divided by that of the yardstick."""
 VECTOR_GOAL = 4.0
-"""Minimum numbers of steps per second, relative to the yardstick."""
+"""Minimum number of steps per second of a vector environment, divided by that of the yardstick."""
 EARLIER_RATIO = 10.0
 """Earlier ratio; see `Row.earlier_ratio`."""
 _DT_S = 1.0 / 60.0
@@ -30,12 +34,15 @@ _MAX_FORCE_N = 4.0
 _VISCOSITY = 2.0
 _MAX_SPEED_M_S = 1.0
 _ACTION_SETS = 100
+"""Number of different actions, which are used in turn."""
 _QUICK_ROUNDS = 20
+"""Number of rounds of the quick benchmark."""
 _FULL_ROUNDS = 200
+"""Number of rounds of the full benchmark."""
 
 
 class PointMasses(gymnasium.Env[Any, Any]):
-    """Yardstick: robots without bodies, in numpy, rewarded in each step by straight-line distances."""
+    """Yardstick: point masses in numpy, with a reward that is computed from straight-line distances."""
 
     def __init__(self) -> None:
         self.action_space = Box(-_MAX_FORCE_N, _MAX_FORCE_N, (ROBOTS, 2), np.float32)
@@ -69,7 +76,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 
 
 def _measure_environments(quick: bool) -> Iterator[Row]:
-    """Measure a step of one environment, and of many together, compared with a step of point masses."""
+    """Measure a step of one environment, and of many environments together, compared with point masses."""
     options: dict[str, Any] = {"robots": ROBOTS, "lattice": LATTICE, "repeat": 1, "duration": 1e6}
     plain = PointMasses()
     single = CoverageEnv(**options)

@@ -26,16 +26,16 @@ class Row:
         Name of the measured work.
     parameters : Mapping
         Varied parameters, for example ``{"robots": 50}``.
-    seconds : float
-        Median time, s.
+    seconds : float, s
+        Median time.
     yardstick : str, optional
         Name of the yardstick.
-    yardstick_seconds : float, optional
-        Median time of the yardstick, s.
+    yardstick_seconds : float, optional, s
+        Median time of the yardstick.
     max_ratio : float, optional
-        Goal: maximum ratio of the time to the yardstick's.
-    max_seconds : float, optional
-        Goal: maximum time, s.
+        Goal: maximum ratio of the time to that of the yardstick.
+    max_seconds : float, optional, s
+        Goal: maximum time.
     note : str
         The time in another unit, for example "95 x real time".
     earlier_ratio : float, optional
@@ -55,7 +55,7 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ratio of the time to the yardstick's; None without a yardstick."""
+        """Ratio of the time to that of the yardstick; None without a yardstick."""
         if self.yardstick_seconds is None:
             return None
         return self.seconds / self.yardstick_seconds
@@ -111,7 +111,7 @@ def measure_interleaved(
     clock: Callable[[], float] = perf_counter,
     before_round: Call = lambda: None,
 ) -> dict[str, float]:
-    """Time several calls in turn, round after round, so that other programs slow all of them down equally.
+    """Measure the times of several calls in alternation, so that other programs slow them down equally.
 
     The first round is a warm-up and does not count.
 
@@ -121,12 +121,12 @@ def measure_interleaved(
         The calls by name.
     min_rounds : int
         Minimum number of rounds.
-    min_duration : float
-        Minimum total time of the rounds, s.
+    min_duration : float, s
+        Minimum total time of the rounds.
     clock : callable
-        Returns a time, s.
+        Returns the current time, s.
     before_round : callable
-        Called before each round. Its time does not count.
+        Called before each round; the time of this call does not count.
 
     Returns
     -------

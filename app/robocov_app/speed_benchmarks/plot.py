@@ -13,15 +13,16 @@ from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.speed_benchmarks.measure import Row
 
 NOTE = "medians of alternating calls on one thread; below 1 robocov is faster; a bar marks the goal"
+"""Text below the title."""
 HEADINGS = {
     "step": "Simulated step",
     "maps": "Exact coverage cost on maps",
     "cost": "Exact coverage cost among random obstacles",
     "learning": "Learning environments",
     "sweep": "Sweeps",
-    "render": "Pictures",
+    "render": "Frames",
     "window": "Window",
-    "start": "Start",
+    "start": "Start of commands",
 }
 """Heading of each part of the benchmark."""
 _WIDTH_PX = 1100
@@ -66,6 +67,7 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     path : Path
         Output file; see `robocov_app.figures.files.save_figure` for the formats.
     theme : Theme
+        Color theme.
     """
     with_ratio = [row for row in rows if row.ratio is not None]
     parts = [(part, list(group)) for part, group in groupby(with_ratio, key=lambda row: row.part)]

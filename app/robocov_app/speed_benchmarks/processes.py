@@ -16,16 +16,25 @@ from robocov_app.sweep.sweeping import sweep
 YARDSTICK = "import numpy"
 """Program of the yardstick, as for `python -c`."""
 MAPS = ("rooms", "museum", "campus")
+"""Maps of the sweep."""
 CONTROLLERS = ("rapf", "lloyd")
+"""Controllers of the sweep."""
 DURATION_S = 20.0
+"""Simulated time of a run."""
 WORKERS = 2
+"""Number of processes."""
 EARLIER_RATIO = 6.0
 """Earlier ratio of a run; see `Row.earlier_ratio`."""
 _SWEEP_SPEEDUP = 4.0
+"""Minimum speedup over the earlier ratio."""
 _QUICK_SEEDS = 1
+"""Number of seeds of the quick benchmark."""
 _FULL_SEEDS = 84
+"""Number of seeds of the full benchmark."""
 _QUICK_START_ROUNDS = 3
+"""Number of rounds of the quick benchmark of command start-up."""
 _FULL_START_ROUNDS = 15
+"""Number of rounds of the full benchmark of command start-up."""
 _YARDSTICK_REPEATS = 5
 """Number of interpreters that are started in each round."""
 
@@ -54,7 +63,7 @@ def list_start_cases(*, quick: bool = False) -> list[Case]:
 
 
 def _measure_sweep(seeds: int) -> Iterator[Row]:
-    """Measure a sweep over maps, controllers and seeds; report the CPU time for each run."""
+    """Measure a sweep over maps, controllers and seeds, and yield the CPU time per run."""
     maps = tuple(StudyMap(name, load_map(name)) for name in MAPS)
     study = Study(maps=maps, controllers=CONTROLLERS, seeds=range(seeds), robots=(6,), duration=DURATION_S)
     numbers = count()

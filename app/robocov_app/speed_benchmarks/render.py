@@ -1,4 +1,7 @@
-"""Benchmark of drawing, compared with filling and copying an empty frame, and of encoding, with drawing."""
+"""Benchmark of drawing and encoding frames.
+
+Drawing is compared with filling and copying an empty frame, and encoding is compared with drawing.
+"""
 
 import tempfile
 from collections.abc import Iterator
@@ -24,6 +27,7 @@ SIZE_PX = (1280, 720)
 FRAME_GOALS_S = {50: 4e-3}
 """Maximum time to draw a frame, by number of robots."""
 FRAME_YARDSTICK = "clear and flip"
+"""Name of the yardstick of drawing."""
 _FRAME_CASES = (("rooms", 6), ("rooms", 50), ("campus", 200))
 """Map and number of robots of each case."""
 _QUICK_FRAME_ROUNDS = 40
@@ -99,6 +103,7 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
 
 
 def _simulate(name: str, robots: int) -> Record:
+    """Simulate a short run on a bundled map."""
     environment = load_map(name)
     starts = environment.start("uniform").sample(robots, seed=0)
     return Simulation(environment, Rapf(), starts).run(_RUN_DURATION_S)

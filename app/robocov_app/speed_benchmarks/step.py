@@ -42,9 +42,11 @@ BATCH_RUNS = 64
 BATCH_GOAL = 5.0
 """Maximum ratio of one step of one run in the batch to a step of bare physics."""
 BATCH_ROBOTS = 6
+"""Number of robots of each run in the batch."""
 BARE_PHYSICS = "bare Space.step"
-"""Yardstick: the physics engine alone, with the same bodies in an empty space."""
+"""Name of a yardstick: the physics engine alone, with the same bodies in an empty space."""
 TRIANGULATION = "Qhull's Delaunay"
+"""Name of a yardstick: the triangulation of the robots' positions."""
 WARM_UP_STEPS = 120
 """Steps before the measurement: two seconds of simulation time, after which the team is moving."""
 _MIN_SPEED = 60.0
@@ -53,7 +55,7 @@ _REAL_TIME_ROBOTS = 6
 _QUICK_ROUNDS = 60
 _FULL_ROUNDS = 300
 _LARGE_TEAM = 500
-"""Number of robots above which fewer rounds are measured."""
+"""Maximum number of robots for which the usual number of rounds is measured."""
 _QUICK_LARGE_TEAM_ROUNDS = 30
 _FULL_LARGE_TEAM_ROUNDS = 100
 _ROBOT_RADIUS_M = 0.1
@@ -106,6 +108,7 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
 
 
 def _get_rounds(robots: int, quick: bool) -> int:
+    """Return the number of rounds for a team size; large teams have fewer rounds."""
     if robots > _LARGE_TEAM:
         return _QUICK_LARGE_TEAM_ROUNDS if quick else _FULL_LARGE_TEAM_ROUNDS
     return _QUICK_ROUNDS if quick else _FULL_ROUNDS

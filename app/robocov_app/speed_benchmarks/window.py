@@ -25,6 +25,7 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window.window import ViewerWindow
 
 TEAM_SIZES = (6, 50, 200, 1000)
+"""Numbers of robots."""
 DRAWING_GOALS_S = {50: 4e-3}
 """Maximum time to draw a frame, by number of robots."""
 FRAME_GOALS_S = {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
@@ -34,10 +35,11 @@ MAX_FRAME_S = 50e-3
 _QUICK_DURATION_S = 4.0
 _FULL_DURATION_S = 15.0
 _MIN_CROWD = 100
-"""Team size from which the robots are smaller, so that all of them fit on the map."""
+"""Minimum number of robots for which smaller robots are used, so that all of them fit on the map."""
 _CROWD_RADIUS_M = 0.05
+"""Radius of the smaller robots."""
 _MAX_FIRST_START = 10
-"""Largest team that fits into the first start of the map."""
+"""Maximum number of robots that fit into the first start of the map."""
 
 
 @dataclass
@@ -49,6 +51,7 @@ class _Measurements:
     drawing: list[float] = field(default_factory=list)
     """Time to draw each frame, s."""
     costs: int = 0
+    """Number of costs that were computed."""
 
 
 def list_cases(*, quick: bool = False) -> list[Case]:
@@ -76,7 +79,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
             pygame.display.flip()
 
         bare = measure_interleaved({"bare": clear_and_flip}, len(measured.frames))["bare"]
-    figures = (
+    results = (
         (
             "whole frame",
             median(measured.frames),
@@ -86,7 +89,7 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
         ("drawing", median(measured.drawing), DRAWING_GOALS_S.get(robots), ""),
         ("longest frame", max(measured.frames), MAX_FRAME_S, f"of {len(measured.frames)} frames"),
     )
-    for name, time, max_seconds, note in figures:
+    for name, time, max_seconds, note in results:
         yield Row(
             "window",
             name,

@@ -25,15 +25,17 @@ FOLDER_VARIABLE = "ROBOCOV_DRAFTS"
 SERVED_FOLDER = ".drafts"
 """Folder for drafts below the folder of a window that is shown in browsers."""
 _FILE_NAME = "draft.json"
+"""Name of the file of a draft in its folder."""
 _MIN_PAUSE_S = 0.25
 """Minimum time between two drafts."""
 _PAUSE_FACTOR = 10.0
-"""Pause after a draft, relative to the time it took to write: large drafts must not slow down the window."""
+"""Pause after a draft divided by the time to write it. Large drafts must not slow down the window."""
 _RETRY_S = 2.0
 """Time until a draft that could not be written is written again."""
 _MAX_FOLDER_ATTEMPTS = 3
+"""Maximum number of attempts to create a draft folder."""
 _MIN_ABANDONED_AGE_S = 60.0
-"""Minimum age of a folder without a draft to be removed; a younger one may belong to a starting program."""
+"""Minimum age at which a folder without a draft is removed; a newer one may belong to a starting program."""
 _open_savers: list["Autosaver"] = []
 _open_savers_lock = threading.Lock()
 _Work = TypeVar("_Work")
@@ -57,6 +59,7 @@ class Draft:
     Attributes
     ----------
     folder : Path
+        Draft folder of the document.
     path : Path or None
         File of the document; None if it never had one.
     when : datetime
@@ -116,7 +119,7 @@ class Autosaver:
         with _open_savers_lock:
             _open_savers.append(self)
         if resumed_folder is None:
-            # An empty draft shows other programs that the file is open, see `is_open_elsewhere`.
+            # An empty draft shows other programs that the file is open; see `is_open_elsewhere`.
             self.save_draft(None)
 
     def save_draft(self, content: _Content | None) -> None:
@@ -148,8 +151,8 @@ class Autosaver:
 
         Parameters
         ----------
-        timeout : float
-            Maximum time to wait, s.
+        timeout : float, s
+            Maximum time to wait.
 
         Returns
         -------
@@ -246,7 +249,7 @@ class Autosaver:
         return draft
 
     def _write(self, draft: _PendingDraft) -> None:
-        """Write a draft to the draft folder; if everything is saved, it only names the file that is open."""
+        """Write a draft to the draft folder. If all is saved, it contains only the path of the file."""
         assert self._folder is not None
         encoded_path = None
         if draft.path is not None:
@@ -269,8 +272,8 @@ def flush_all(timeout: float) -> None:
 
     Parameters
     ----------
-    timeout : float
-        Maximum time to wait for all of them together, s.
+    timeout : float, s
+        Maximum time to wait for all drafts together.
     """
     with _open_savers_lock:
         savers = list(_open_savers)

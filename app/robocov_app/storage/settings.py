@@ -34,6 +34,7 @@ def load_settings(kind: type[SettingsType], file: Path | None) -> tuple[Settings
     kind : type
         Pydantic model of the settings.
     file : Path or None
+        File of the settings; None if no settings are stored.
 
     Returns
     -------
@@ -77,8 +78,9 @@ def save_settings(settings: BaseModel, file: Path | None) -> str:
     Parameters
     ----------
     settings : BaseModel
+        The settings to save.
     file : Path or None
-        None to save nothing.
+        File of the settings; None to save nothing.
 
     Returns
     -------
@@ -107,7 +109,7 @@ def save_changed_settings(
     settings : BaseModel
         Settings as they were loaded.
     file : Path or None
-        None to save nothing.
+        File of the settings; None to save nothing.
     read : callable
         Takes the loaded settings, and returns the current settings of the window.
     """

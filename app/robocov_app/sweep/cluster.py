@@ -18,10 +18,11 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, perform
 
 CONNECTION_TIMEOUT_S = 10.0
+"""Maximum time to wait for an answer of the scheduler."""
 _MIN_CAPACITY = 4
 """Minimum number of submitted tasks, also for a cluster that has no workers yet."""
 _TASKS_PER_THREAD = 2
-"""Sending a task to a worker takes time, so each thread has another task waiting."""
+"""Number of submitted tasks per thread. Sending a task takes time, so a second one waits at each thread."""
 _THREAD_COUNT_INTERVAL_S = 2.0
 """Time between two queries of the number of threads; workers may come and go."""
 _LOCAL_ADDRESS = "inproc://"
@@ -57,7 +58,7 @@ class Cluster(Executor):
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
         self._threads = 0
         self._threads_counted_at = -math.inf
-        # Dask logs many lines when a scheduler ends. They are silenced, because it becomes a one-line error.
+        # Dask logs many lines when a scheduler ends. They are silenced: the user gets one error message.
         self._logger = logging.getLogger("distributed.client")
         self._previous_level = self._logger.level
         self._logger.setLevel(logging.CRITICAL)
@@ -87,7 +88,7 @@ class Cluster(Executor):
 
     @property
     def waiting_reason(self) -> str:
-        """Reason why no worker is running; empty if one is."""
+        """Reason why no worker is running; empty if a worker is running."""
         if self.threads:
             return ""
         return f"no workers are connected to {self._address}; waiting"
@@ -100,7 +101,7 @@ class Cluster(Executor):
         self._add_future(task, future)
 
     def _get_result(self, future: Future[Any]) -> Outcome | LostWorker:
-        """Return the outcome of a task, or the end of its worker; raise OutputError if Dask itself fails."""
+        """Return the outcome of a task, or how its worker ended; raise OutputError if Dask itself fails."""
         self._futures.remove(future)
         try:
             return super()._get_result(future)

@@ -34,7 +34,7 @@ def load_study_controller(name: str, folder: Path) -> tuple[type[Any], Controlle
     source = _read_source(name, folder)
     controller_class = load_controller_class(name, source=source)
     if source is not None:
-        # Only now: loading the class may have added the folders of its modules to sys.path.
+        # The modules can be found only now, because loading the class may add their folders to sys.path.
         source = source._replace(modules=find_own_modules(source.text))
     return controller_class, source
 

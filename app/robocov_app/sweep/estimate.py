@@ -61,6 +61,7 @@ def estimate_sweep(
     Parameters
     ----------
     study : Study
+        The sweep to estimate.
     folder : Path
         Folder of the sweep; it need not exist.
     workers : int

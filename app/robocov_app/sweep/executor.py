@@ -14,11 +14,11 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, build_failure
 
 _MAX_ENDS_PER_TASK = 2
-"""A task counts as failed once it has ended this many workers."""
+"""Number of workers that a task may end before it counts as failed."""
 _MAX_CONSECUTIVE_ENDS = 20
 """Maximum number of workers that may end in a row, without any finished task in between."""
 _MAX_CONSECUTIVE_ENDS_PER_TASK = 4
-"""The same maximum, per task that is executed at the same time; the larger of both applies."""
+"""Maximum number of such workers per task that is executed at the same time; the larger limit applies."""
 
 
 class LostWorker(NamedTuple):
@@ -27,7 +27,7 @@ class LostWorker(NamedTuple):
     cause: str
     """Description of the reason."""
     details: str
-    """End of the worker's output."""
+    """Last lines of the worker's output."""
     is_caused_by_task: bool
     """Whether it is certain that the task itself ended the worker."""
 
@@ -86,6 +86,7 @@ class Executor(ABC):
         Parameters
         ----------
         task : Task
+            The task to execute.
         """
         self._waiting.append(task)
         self._start_tasks()
@@ -101,7 +102,7 @@ class Executor(ABC):
         Returns
         -------
         (Task, Outcome) or None
-            None if no task finishes within this time, or if its worker has ended and it will be repeated.
+            None if no task finishes within this time, or if a worker has ended and its task will be repeated.
 
         Raises
         ------
@@ -113,7 +114,7 @@ class Executor(ABC):
         if result is None:
             return None
         task, outcome = result
-        # Whether another task may have ended the worker. A task in isolation has no others.
+        # If other tasks were running, one of them may have ended the worker.
         had_others = self._running > 1
         self._is_isolated = False
         self._running -= 1
@@ -168,6 +169,7 @@ class Executor(ABC):
         task : Task
             The task whose worker ended.
         lost : LostWorker
+            How the worker ended.
         had_others : bool
             Whether other tasks were running at the same time.
         """

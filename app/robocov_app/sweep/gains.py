@@ -50,11 +50,12 @@ def build_gains(
     Parameters
     ----------
     controller_class : type
+        Class of the controller.
     specification : mapping, sequence of mapping, or Gains
-        Either a mapping of gains to a value, a list of values or a `Range` (every combination is tried),
-        or a list of sets of gains. Gains that are not mentioned have their defaults.
+        Either a mapping from each gain to a value, a list of values or a `Range`, of which every combination
+        is tried, or a list of sets of gains. Gains that are not mentioned have their defaults.
     sampling : Sampling or None
-        How ranges are sampled.
+        Method and number of samples; required if there are ranges.
     path : tuple of str and int
         Path of the gains in the study, for messages.
 
@@ -112,7 +113,7 @@ def _combine_gains(
 def _draw_samples(
     ranges: Mapping[str, Range], sampling: Sampling | None, path: JsonPath
 ) -> list[tuple[float, ...]]:
-    """Draw joint samples of ranges, each a value per range; a single empty sample if there are no ranges."""
+    """Draw samples that contain a value for each range. Without ranges, there is a single empty sample."""
     if not ranges:
         return [()]
     if sampling is None:
@@ -125,7 +126,7 @@ def _draw_samples(
 
 
 def _complete_gains(controller_class: type[Any], values: Mapping[str, Value]) -> Mapping[str, Value]:
-    """Return a value for every gain, with defaults filled in, after the controller has checked them."""
+    """Return the values of all gains: the given ones, checked by the controller, and the other defaults."""
     return get_gain_values(instantiate_controller(controller_class, values))
 
 

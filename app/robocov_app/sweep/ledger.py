@@ -72,7 +72,7 @@ class Survey:
     damaged : list of str
         Names of damaged runs.
     outdated : Counter
-        Number of runs with other versions, by the description of the differences.
+        Number of runs that were made with other versions, by the description of the differences.
     without_checksums : int
         Number of reused runs without checksums.
     failed : int
@@ -101,7 +101,7 @@ class Survey:
         Parameters
         ----------
         keep_versions : bool
-            Whether runs of other versions are used.
+            Whether runs that were made with other versions are reused.
         """
         lines = []
         if self.damaged:
@@ -133,6 +133,7 @@ class Ledger:
     Parameters
     ----------
     folder : Path
+        Folder of the sweep.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -153,10 +154,11 @@ class Ledger:
         Parameters
         ----------
         tasks : iterable of Task
+            The runs of a study.
         retry_failed : bool
             Whether failed runs are repeated.
         keep_versions : bool
-            Whether runs of other versions are used.
+            Whether runs that were made with other versions are reused.
 
         Returns
         -------
@@ -227,7 +229,9 @@ class Ledger:
         Parameters
         ----------
         task : Task
+            The run, whose name is that of the folder.
         outcome : Outcome
+            Files and figures of the run.
 
         Raises
         ------
@@ -343,7 +347,7 @@ def has_all_rows(folder: Path) -> bool:
 
 
 def is_sweep(folder: Path) -> bool:
-    """Return whether a folder contains a sweep, even one with a damaged ``study.json``."""
+    """Return whether a folder contains a sweep, even if its ``study.json`` is damaged."""
     try:
         content = json.loads(_read_file(folder / STUDY_FILE))
     except OSError:

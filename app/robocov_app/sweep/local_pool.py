@@ -18,11 +18,11 @@ from robocov_app.sweep.worker import Outcome
 from robocov_app.terminal.supervision import describe_status
 
 _MAX_STARTS = 3
-"""Number of attempts to start a process."""
+"""Maximum number of attempts to start a process."""
 _MAX_OUTPUT_CHARS = 4000
 """Number of characters at the end of a process's error output that are kept."""
 _KILLED_STATUS = -getattr(signal, "SIGKILL", 9)
-"""Exit status of a process that was killed by a user, or by the system because memory ran out."""
+"""Exit status of a process that was killed, for example by the system because memory ran out."""
 
 
 class LocalPool(Executor):
@@ -49,7 +49,7 @@ class LocalPool(Executor):
 
     @property
     def capacity(self) -> int:
-        """One more than the number of processes, so that the next idle one finds a task immediately."""
+        """One more than the number of processes, so that a process that becomes idle has a task to start."""
         return len(self._workers) + 1
 
     def _start(self, task: Task) -> None:
@@ -78,7 +78,7 @@ class _WorkerProcess:
         self._start_lock = threading.Lock()
 
     def kill(self) -> None:
-        """Kill the process, and start no other one from now on."""
+        """Kill the process, and prevent the start of another one."""
         with self._start_lock:
             self._is_stopped = True
             if self._process is not None:

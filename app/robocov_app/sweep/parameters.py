@@ -29,13 +29,13 @@ TEAM_PARAMETERS = (
     "sensing_range",
     "communication_range",
 )
-"""Parameters of the robots that a study may vary and that every task contains."""
+"""Parameters of the robots that a study may vary. Every task contains a value for each."""
 KINEMATIC_DEFAULTS = {
     "kinematics": "point",
     "track_width": 0.0,
     "turning_rate": DEFAULT_TURNING_RATE_RAD_S,
 }
-"""Further parameters of the robots with their defaults; a task contains only those that differ."""
+"""Further parameters of the robots, with their defaults. A task contains only values that differ."""
 EVENT_TYPES = {"fail": Failure, "join": Join}
 """Conditions that are given as text, for example ``3@20 5@40`` for two events in the same run."""
 CONDITIONS = (*PARAMETERS, *EVENT_TYPES)
@@ -47,6 +47,7 @@ GROUPS = "groups"
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*TEXT_PARAMETERS, GROUPS), "")}
 """Units of the parameters."""
 _MAX_NUMBER = 1e300
+"""Maximum absolute value of a number; larger integers cannot be converted to floats."""
 _NO_LIMIT_VALUES: dict[str, tuple[object, ...]] = {
     "message_rate": (None, NO_LIMIT),
     "bandwidth": (None, NO_LIMIT),
@@ -76,6 +77,7 @@ def format_parameter(name: str, value: ParameterValue) -> str:
     name : str
         Name of a parameter of the team, or of a condition.
     value : float, str or None
+        Its value, as `parse_parameter` returns it.
 
     Returns
     -------
@@ -141,7 +143,9 @@ def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
     Parameters
     ----------
     name : str
+        Name of the parameter or the condition.
     value : object
+        The value as given in the study.
     path : tuple of str and int
         Path of the value in the study, for messages.
 
@@ -184,7 +188,8 @@ def _parse_events(name: str, value: object, path: JsonPath) -> str:
 
 def _parse_condition(name: str, value: object, path: JsonPath) -> ParameterValue:
     """Check a number against the range of its condition."""
-    # Conditions are checked together; with a long memory, all values of the others are valid.
+    # `Conditions` also checks values against each other: robots must not be forgotten before their next
+    # message is due. With this value of `forget_after`, any other valid value passes the check.
     values: dict[str, Any] = {"forget_after": 1e6, name: value}
     conditions = validate_at(path, lambda: Conditions(**values))
     parsed: float | None = getattr(conditions, name)

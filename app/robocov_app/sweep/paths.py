@@ -1,4 +1,4 @@
-"""Parsing values of a study; error messages begin with their path, as in ``gains.rapf.k_rep[1]: ...``."""
+"""Parsing the values of a study, with errors that begin with the path, as in ``gains.rapf.k_rep[1]: ...``."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ T = TypeVar("T")
 
 
 def validate_at(path: JsonPath, validate: Callable[[], T]) -> T:
-    """Validate a value; errors are reported with the path of the value.
+    """Validate a value, and report errors with the path of the value.
 
     Parameters
     ----------
     path : tuple of str and int
+        Path of the value in the study.
     validate : callable
         Returns the valid value, or raises ParameterError. The name before the first colon of its message is
         replaced by the path.
@@ -28,6 +29,7 @@ def validate_at(path: JsonPath, validate: Callable[[], T]) -> T:
     Raises
     ------
     ParameterError
+        If the value is invalid.
     """
     try:
         return validate()
@@ -44,8 +46,9 @@ def parse_values(given: Any, path: JsonPath, parse: Callable[[Any, JsonPath], T]
     given : object
         A value, or a list of at least one value.
     path : tuple of str and int
+        Path of the value or list in the study.
     parse : callable
-        Called with each value and its path.
+        Called with each value and its path; returns the parsed value.
 
     Returns
     -------

@@ -21,7 +21,7 @@ LINE_INTERVAL_S = 10.0
 _MIN_WHOLE_RATE_PER_S = 10.0
 """Rates from this one on are printed as whole numbers."""
 _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
-"""For each unit: its length in seconds and its name, and those of the next smaller unit."""
+"""Length in seconds and name of each unit, followed by those of the next smaller unit."""
 
 
 @dataclass

@@ -14,7 +14,9 @@ from robocov.errors import ParameterError, describe_unknown_name, require_number
 Scale: TypeAlias = Literal["linear", "log"]
 SamplingMethod: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 MAX_SAMPLES = 100_000
+"""Maximum number of samples."""
 MAX_SEED = 2**63 - 1
+"""Maximum seed."""
 _SAMPLE_DIGITS = 6
 """Number of significant digits of a sampled gain; further digits could differ between processors."""
 
@@ -69,6 +71,7 @@ class Sampling:
     Attributes
     ----------
     method : {"sobol", "latin-hypercube", "halton"}
+        Kind of sequence.
     samples : int
         Number of samples.
     seed : int
@@ -97,11 +100,12 @@ class Sampling:
         Parameters
         ----------
         dimensions : int
+            Number of coordinates of each point.
 
         Returns
         -------
         (samples, dimensions) array
-            Each coordinate from 0 to 1.
+            The points, with coordinates from 0 to 1.
         """
         from scipy.stats import qmc
 

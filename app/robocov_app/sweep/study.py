@@ -58,7 +58,9 @@ from robocov_app.sweep.study_size import DEFAULT_MAX_RUNS, MAX_MAX_RUNS, count_v
 ALL_STARTS = "*"
 """Selects all starts of each map."""
 MAX_ROBOTS = 10_000
+"""Maximum number of robots of a run."""
 _MAX_MAP_NAME_CHARS = 100
+"""Maximum length of the name of a map."""
 
 _MAX_NUMBERS = {"duration": 1e6, "dt": 1.0, "cost_hz": 1e4, "record_hz": 1e4}
 """Maximum values of a study's numbers, in s and Hz."""
@@ -75,6 +77,7 @@ class StudyMap:
     name : str
         Name of the map in the table.
     environment : Environment
+        The map.
     """
 
     name: str
@@ -83,13 +86,14 @@ class StudyMap:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Definition of a sweep: all combinations of the given values; `generate_tasks` yields their scenarios.
+    """Definition of a sweep: all combinations of the given values, for which `generate_tasks` yields tasks.
 
     For the same map and seed, all controllers start from the same positions.
 
     Attributes
     ----------
     maps : sequence of StudyMap
+        The maps.
     controllers : sequence of str
         Names of controllers, or ``file.py:Class``.
     gains : mapping of str to Gains
@@ -122,7 +126,7 @@ class Study:
     metrics : bool
         Whether the table also contains the metrics of `robocov.metrics.run_metrics`.
     sampling : Sampling or None
-        How ranges of gains are sampled.
+        Method and number of samples of the ranges of gains; None if no gain has a range.
     max_runs : int
         Maximum number of runs; larger studies are rejected.
     folder : Path

@@ -1,7 +1,7 @@
 """Study files in TOML, and one-line messages about their errors.
 
-The schema below says which values a key accepts. It is not a pydantic model, because a key may accept a
-value, a list of values or a table, and the message must describe the alternative that the user meant.
+The schema below defines which values a key accepts. It is not a pydantic model, because a key may accept a
+single value, a list of values or a table, and the message must describe the alternative that the user chose.
 """
 
 from __future__ import annotations
@@ -32,23 +32,27 @@ _Converter: TypeAlias = Callable[[Any], Any]
 
 
 class _ValueSchema(NamedTuple):
-    """Schema of a key: a single value, a list of items or a table. Alternatives that are None are invalid."""
+    """Schema of a key: a single value, a list or a table. An alternative that is None is not accepted."""
 
     expected: str
     """Description of the accepted values."""
     convert: _Converter | None = None
     """Conversion of a single value."""
     item: _ValueSchema | None = None
+    """Schema of the items of a list."""
     table: _TableSchema | None = None
+    """Schema of a table."""
 
 
 class _TableSchema(NamedTuple):
-    """Schema of a table; `required` lists the keys that it must contain."""
+    """Schema of a table."""
 
     expected: str
     """Description of the table."""
     keys: Mapping[str, _ValueSchema | _TableSchema]
+    """Schemas of the accepted keys."""
     required: tuple[str, ...] = ()
+    """Keys that the table must contain."""
 
 
 def _accept(*types: type, words: tuple[str, ...] = ()) -> _Converter:
@@ -129,26 +133,26 @@ _STUDY = _TableSchema(
 
 @dataclass
 class _SchemaReader:
-    """Converts the values of a document, and collects its mistakes.
+    """Converts the values of a document, and collects messages about its issues.
 
     Attributes
     ----------
-    unknown_keys : list of str
-        Messages about unknown keys. They come first, because a misspelled key is also a missing one.
-    other_mistakes : list of str
+    unknown_key_issues : list of str
+        Messages about unknown keys. They come first, because a misspelled key also causes a missing one.
+    other_issues : list of str
         All other messages.
     """
 
-    unknown_keys: list[str] = field(default_factory=list)
-    other_mistakes: list[str] = field(default_factory=list)
+    unknown_key_issues: list[str] = field(default_factory=list)
+    other_issues: list[str] = field(default_factory=list)
 
     @property
-    def mistakes(self) -> list[str]:
+    def issues(self) -> list[str]:
         """All messages, the most helpful ones first."""
-        return self.unknown_keys + self.other_mistakes
+        return self.unknown_key_issues + self.other_issues
 
     def read(self, value: Any, schema: _ValueSchema | _TableSchema, path: JsonPath) -> Any:
-        """Convert a value as its schema says; None, with a message in the lists, if it is invalid."""
+        """Convert a value according to its schema. If it is invalid, add a message and return None."""
         table = schema if isinstance(schema, _TableSchema) else schema.table
         if table is not None and isinstance(value, dict):
             return self._read_table(value, table, path)
@@ -160,7 +164,7 @@ class _SchemaReader:
                     return schema.convert(value)
                 except (ValueError, OverflowError):
                     pass
-        self.other_mistakes.append(f"{format_path(path)}: expected {schema.expected}, got {quote(value)}")
+        self.other_issues.append(f"{format_path(path)}: expected {schema.expected}, got {quote(value)}")
         return None
 
     def _read_table(self, table: dict[str, Any], schema: _TableSchema, path: JsonPath) -> dict[str, Any]:
@@ -171,11 +175,11 @@ class _SchemaReader:
         prefix = f"{format_path(path)}: " if path else ""
         for key in table:
             if key not in keys:
-                self.unknown_keys.append(prefix + describe_unknown_name("key", key, keys))
+                self.unknown_key_issues.append(prefix + describe_unknown_name("key", key, keys))
         for key in schema.required:
             if key not in table:
-                position = format_path((*path, key))
-                self.other_mistakes.append(f"{position}: missing, expected {keys[key].expected}")
+                key_path = format_path((*path, key))
+                self.other_issues.append(f"{key_path}: missing, expected {keys[key].expected}")
         return {key: self.read(table[key], keys[key], (*path, key)) for key in keys if key in table}
 
 
@@ -201,6 +205,7 @@ def read_study(path: Path | str) -> Study:
     Parameters
     ----------
     path : Path or str
+        Path of the file.
 
     Returns
     -------
@@ -223,6 +228,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     Parameters
     ----------
     document : dict
+        Content of the file, as `parse_toml` returns it.
     folder : Path
         Folder to which relative paths refer.
     where : str
@@ -239,11 +245,11 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     """
     reader = _SchemaReader()
     values = reader.read(document, _STUDY, ())
-    if reader.mistakes:
-        message = f"{where}: {reader.mistakes[0]}"
-        others = len(reader.mistakes) - 1
-        if others:
-            message += f" (and {others} more)"
+    if reader.issues:
+        message = f"{where}: {reader.issues[0]}"
+        other_count = len(reader.issues) - 1
+        if other_count:
+            message += f" (and {other_count} more)"
         raise InputError(message)
     try:
         return Study(**_convert_to_arguments(values, folder), folder=folder)
@@ -273,7 +279,7 @@ def _convert_to_arguments(values: dict[str, Any], folder: Path) -> dict[str, Any
 
 
 def _convert_ranges(gains: dict[str, Any]) -> dict[str, Any]:
-    """Convert gains of a controller that are tables to ranges, and leave the others unchanged."""
+    """Convert the tables among the gains of a controller to ranges, and keep other values unchanged."""
     converted = {}
     for name, value in gains.items():
         converted[name] = Range(**value) if isinstance(value, dict) else value
@@ -288,6 +294,7 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
     entries : list of str
         Names of bundled maps, and paths of map files relative to the folder; or `ALL_MAPS` alone.
     folder : Path
+        Folder of the study file.
     """
     bundled = list_bundled_maps()
     if entries == [ALL_MAPS]:

@@ -11,10 +11,11 @@ from robocov_app.sweep.gains import Gains
 from robocov_app.sweep.sampling import Range, Sampling
 
 DEFAULT_MAX_RUNS = 100_000
-"""Maximum number of runs, unless the study allows more; this many take some days on ten cores."""
+"""Maximum number of runs unless the study sets another one. So many runs take some days on ten cores."""
 MAX_MAX_RUNS = 10_000_000
-"""Upper limit for the maximum of a study, because the runs are listed in memory."""
+"""Upper limit of the maximum that a study may set, because the runs are listed in memory."""
 _MAX_LISTED_FACTORS = 5
+"""Maximum number of varied quantities that the message lists."""
 
 
 def require_few_runs(
@@ -35,6 +36,7 @@ def require_few_runs(
     controllers, gains, sampling
         As in `Study`.
     max_runs : int
+        Maximum number of runs.
     """
     sets_of_gains = sum(_count_gains(gains.get(name, {}), sampling) for name in controllers)
     runs = math.prod(max(count, 1) for count in counts.values()) * sets_of_gains

@@ -26,6 +26,7 @@ from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import format_json
 
 MAX_WORKERS = 1024
+"""Maximum number of processes on this machine."""
 _CHECK_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
 _MAX_ERRORS = 3
@@ -86,6 +87,7 @@ def sweep(
     Parameters
     ----------
     study : Study
+        Definition of the runs.
     folder : Path or str
         Folder of the sweep; it is created if necessary.
     workers : int, optional
@@ -95,7 +97,7 @@ def sweep(
     retry_failed : bool
         Whether failed runs are repeated.
     keep_versions : bool
-        Whether runs of other versions are used; by default they are repeated.
+        Whether runs that were made with other versions are reused; by default they are repeated.
     parquet : bool
         Whether the table is also written as ``results.parquet``, which needs ``robocov[parquet]``.
     quiet : bool
@@ -103,7 +105,7 @@ def sweep(
     title : str
         Title of the progress display.
     stop : Interruption, optional
-        Tells when to stop; by default Ctrl-C does.
+        Ends the sweep early when it is requested; by default by Ctrl-C.
 
     Returns
     -------
@@ -171,10 +173,10 @@ def _execute_remaining(
 ) -> RobocovError | None:
     """Execute the remaining tasks, and return the error that stopped them, if any.
 
-    It is not raised here, because the caller must still write the rows of the runs finished before it.
+    The error is not raised here, because the caller must first write the rows of the finished runs.
     """
     try:
-        # Reused runs have rows that can be written before any task is executed.
+        # The rows of reused runs can be written before any task is executed.
         outcomes.rows.write()
         for _ in execute_tasks(tasks, open_executor, progress, interruption, outcomes.store):
             reporter.update(progress)
@@ -226,12 +228,13 @@ def execute_tasks(
     Parameters
     ----------
     tasks : iterable of Task
+        The tasks to execute.
     open_executor : callable
         Returns the executor; only called if there is a task.
     progress : SweepProgress
-        Its numbers are updated.
+        Numbers of runs, which are updated.
     interruption : Interruption
-        Tells when to stop.
+        Ends the execution early when it is requested.
     store : callable
         Called with each task and its outcome, in the order in which the tasks finish.
 
@@ -328,7 +331,9 @@ class _OutcomeStore:
     Parameters
     ----------
     ledger : Ledger
+        Stores the outcomes.
     rows : _RowWriter
+        Writes the rows of the table.
     requires_same_versions : bool
         Whether outcomes are rejected if their versions differ from those of this process.
     """

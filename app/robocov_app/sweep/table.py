@@ -38,7 +38,9 @@ class Column(NamedTuple):
     kind: str
     """Name of the Parquet type."""
     unit: str
+    """Unit of the values; empty for numbers without unit and for text."""
     meaning: str
+    """Short description, which the report displays."""
 
 
 _RUN_COLUMNS = (
@@ -142,19 +144,21 @@ class Table:
     """Writes the rows of a sweep in the order in which they are added; a context manager.
 
     The files are written under temporary names. When the context ends without an exception, they replace
-    earlier ones, together with ``study.json``; an incomplete table only if it has at least as many rows. If
-    the earlier ``results.csv`` is incomplete or missing, the new one replaces it as soon as it is as long,
-    and then grows. It never ends in an incomplete row.
+    earlier files, together with ``study.json``. An incomplete table does not replace one with more rows.
+
+    If the earlier ``results.csv`` is incomplete or missing, the new file replaces it during the sweep, as
+    soon as it has as many rows, and then grows. It never ends in an incomplete row.
 
     Parameters
     ----------
     folder : Path
         Folder of the sweep.
     columns : sequence of Column
+        The columns, in order.
     study : bytes, optional
         Content of ``study.json``.
     parquet : bool
-        Whether to write a Parquet file as well. An existing one is replaced in any case.
+        Whether to write a Parquet file as well. An existing Parquet file is replaced in any case.
 
     Attributes
     ----------
@@ -177,7 +181,7 @@ class Table:
         self._folder = folder
         self._columns = columns
         self._study = study
-        self._has_parquet = parquet or (folder / SWEEP_PARQUET_FILE).exists()
+        self._writes_parquet = parquet or (folder / SWEEP_PARQUET_FILE).exists()
         self._error: OutputError | None = None
         self._size = 0  # bytes
         self._row_count = -1  # The header is no row.
@@ -185,18 +189,18 @@ class Table:
     def __enter__(self) -> Table:
         """Open the temporary CSV file and write its header; temporary files are removed at the end."""
         resolve_target(self._folder / SWEEP_TABLE_FILE)
-        if self._has_parquet:
+        if self._writes_parquet:
             resolve_target(self._folder / SWEEP_PARQUET_FILE)
             import_optional("pyarrow", "parquet", f"{self._folder / SWEEP_PARQUET_FILE}: ")
-        # A complete earlier table stays until the end; another one until the new table is as long.
+        # A complete earlier table stays until the end, an incomplete one until the new table is as long.
         self._earlier_row_count = count_rows(self._folder)
-        self._rows_until_shown = math.inf if has_all_rows(self._folder) else self._earlier_row_count
+        self._min_rows_to_publish = math.inf if has_all_rows(self._folder) else self._earlier_row_count
         with ExitStack() as stack:
             for name in (_TEMPORARY_CSV_FILE, _TEMPORARY_PARQUET_FILE):
                 stack.callback((self._folder / name).unlink, missing_ok=True)
             with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
                 self._csv = (self._folder / _TEMPORARY_CSV_FILE).open("wb", buffering=0)
-            # A lambda, because `self._csv` may be another file by then.
+            # A lambda, because `self._csv` may be another file when the callback is called.
             stack.callback(lambda: self._csv.close())
             self._write_line(format_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
@@ -215,11 +219,11 @@ class Table:
             self.is_replaced = True
 
     def _replace_files(self) -> None:
-        """Replace the files of an earlier sweep, in quick succession, so that they match each other."""
+        """Replace the files of an earlier sweep in quick succession, so that the files always match."""
         temporary_names = {}
-        main_file = SWEEP_PARQUET_FILE if self._has_parquet else SWEEP_TABLE_FILE
+        main_file = SWEEP_PARQUET_FILE if self._writes_parquet else SWEEP_TABLE_FILE
         with _report_write_errors(self._folder / main_file):
-            if self._has_parquet:
+            if self._writes_parquet:
                 temporary_names[SWEEP_PARQUET_FILE] = _TEMPORARY_PARQUET_FILE
                 csv_file = SWEEP_TABLE_FILE if self.is_replaced else _TEMPORARY_CSV_FILE
                 self._write_parquet(self._folder / csv_file)
@@ -263,7 +267,7 @@ class Table:
             raise
 
     def _write_line(self, line: str) -> None:
-        """Append a complete line, or nothing, to the CSV file; rename the file once it is long enough."""
+        """Append a complete line, or nothing, to the CSV file; publish the file once it is long enough."""
         remaining = memoryview(line.encode())
         new_size = self._size + len(remaining)
         with _report_write_errors(self._folder / SWEEP_TABLE_FILE):
@@ -276,16 +280,16 @@ class Table:
                 raise
             self._size = new_size
             self._row_count += 1
-            if self._row_count >= self._rows_until_shown:
-                self._show()
+            if self._row_count >= self._min_rows_to_publish:
+                self._publish()
 
-    def _show(self) -> None:
-        """Give the growing CSV file its final name."""
+    def _publish(self) -> None:
+        """Give the growing CSV file its final name, and open it again to append further rows."""
         # Some systems cannot rename open files.
         self._csv.close()
         (self._folder / _TEMPORARY_CSV_FILE).replace(self._folder / SWEEP_TABLE_FILE)
         self._csv = (self._folder / SWEEP_TABLE_FILE).open("ab", buffering=0)
-        self._rows_until_shown = math.inf
+        self._min_rows_to_publish = math.inf
         self.is_replaced = True
 
     def _write_parquet(self, csv_path: Path) -> None:

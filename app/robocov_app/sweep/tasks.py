@@ -20,9 +20,9 @@ from robocov_app.sweep.parameters import ParameterValue, build_conditions, build
 from robocov_app.sweep.study import Study
 
 MAX_CACHED_MAPS = 4
-"""Number of maps that a process keeps in memory; a few are enough, since tasks are sorted by map."""
+"""Maximum number of maps that a process keeps in memory; a few are enough, as tasks are sorted by map."""
 _HASH_FORMAT = "robocov-task 1"
-"""Beginning of the hashed text. Versions of robocov are not hashed; outcomes contain them."""
+"""Beginning of the hashed text. The version of robocov is not hashed, but it is part of an outcome."""
 _MAX_NAME_CHARS = 24
 """Maximum length of each part of the name of a folder, apart from the hash."""
 _NAME_HASH_CHARS = 10
@@ -39,6 +39,7 @@ class Task:
     document : str
         The map as JSON.
     controller : str
+        Name of the controller, or ``file.py:Class``.
     source : ControllerSource or None
         Source text of the controller, if it is in a file of the user.
     gains : mapping of str to float, str or None
@@ -147,10 +148,13 @@ class _TaskController(NamedTuple):
     Attributes
     ----------
     name : str
+        Name of the controller, or ``file.py:Class``.
     source : ControllerSource or None
+        Source text of the controller, if it is in a file of the user.
     gains : dict of str to float, str or None
+        A value for each gain.
     hashed_inputs : dict
-        The part of the inputs of its tasks that depends on the controller, for their hashes.
+        The inputs of a task that depend on the controller, in the form in which they are hashed.
     """
 
     name: str
@@ -165,11 +169,12 @@ def generate_tasks(study: Study) -> Iterator[Task]:
     Parameters
     ----------
     study : Study
+        Definition of the runs.
 
     Yields
     ------
     Task
-        Tasks in the order of the table: maps vary slowest, controllers and their gains fastest.
+        The tasks in the order of the table: maps vary slowest, controllers and their gains fastest.
     """
     settings: dict[str, Any] = {
         "duration": study.duration,
@@ -179,7 +184,7 @@ def generate_tasks(study: Study) -> Iterator[Task]:
         "record_hz": study.record_hz,
     }
     if study.metrics:
-        # Without metrics the entry is omitted, so that tasks from before it existed keep their hashes.
+        # Without metrics the entry is omitted, so that tasks keep the hashes of versions without this option.
         settings["metrics"] = True
     controllers = _list_controllers(study)
     for study_map in study.maps:

@@ -1,4 +1,4 @@
-"""Execution of one task: from the inputs of a run to its files and its row in the table."""
+"""Execution of one task: simulation and evaluation of a run, and its files and figures for the table."""
 
 from __future__ import annotations
 
@@ -47,12 +47,13 @@ FIGURES = {
 MEAN_TIME = "mean_time_s"
 """Additional figure of runs in which robots differ in speed."""
 EFFORT_FILE = "effort.json"
-"""File with the effort of a run with metrics; not part of the table, since computing times vary."""
+"""File with the computing time and the sent bytes of a run with metrics. They are not in the table, because
+the table must not depend on the machine."""
 Watch: TypeAlias = Callable[[Snapshot], object]
 """Receives the observations and decisions of a run, step by step."""
 _execution_lock = threading.Lock()
 _RESULTS_VERSION = 5
-"""To be increased whenever the same inputs give other results. 5: robots share maps by
+"""Number to be increased whenever the same inputs give other results. Since version 5, robots share maps by
 messages, and the cost counts no paths through gaps that are narrower than a robot."""
 
 
@@ -88,11 +89,12 @@ class Outcome:
 
 
 def perform(task: Task, watch: Watch | None = None) -> Outcome:
-    """Execute a task; errors of the run are not raised, but part of the outcome.
+    """Execute a task. Errors of the run are not raised, but are part of the outcome.
 
     Parameters
     ----------
     task : Task
+        The run to execute.
     watch : callable or None
         Called with the snapshot of each step.
 
@@ -189,7 +191,7 @@ def build_failure(message: str, details: str) -> Outcome:
 
 
 def simulate(task: Task) -> Record:
-    """Simulate the run of a task, and return all of its steps.
+    """Simulate the run of a task, and return the record of all steps.
 
     Raises
     ------
@@ -224,12 +226,13 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
 class CommunicationMeter:
     """Counts the bytes that robots send, whether they are received or not.
 
-    Each robot sends its position at the message rate of the conditions, by default in each control step. The
-    messages of the controller are counted by the simulation.
+    Each robot sends its position at the message rate of the conditions, by default in each control step.
+    Controller messages are counted by the simulation.
 
     Parameters
     ----------
     simulation : Simulation
+        The run whose messages are counted.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -250,7 +253,7 @@ class CommunicationMeter:
 
 
 def prepare_cost(task: Task) -> CoverageCost:
-    """Return the coverage cost for the map of a task; those for the latest maps are kept in memory."""
+    """Return the coverage cost for the map of a task. The costs of the latest maps are kept in memory."""
     team = build_swept_team(task.robots, task.team)
     return _build_cost(task.document, task.map, task.lattice, team.min_radius)
 

@@ -1,4 +1,4 @@
-"""Parsing the words of a command line into options; mistakes are explained in one line."""
+"""Parsing of command lines into options, with one-line messages for invalid ones."""
 
 import contextlib
 import io
@@ -36,9 +36,13 @@ _FIRST_OPTIONS = (
 _LAST_OPTIONS = ("json", "overwrite")
 """Options that come last in the help."""
 _NEGATIVE_NUMBER = re.compile(r"-\.?\d.*")
+"""A word that begins like an option, but is a negative number."""
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
+"""A value of a gain that is a word."""
 _JSON_CONSTANTS = frozenset(("null", "true", "false", "NaN", "Infinity"))
+"""Words that are values in JSON."""
 _MIN_SIMILARITY = 0.8
+"""Minimum similarity, as measured by `difflib`, of an option that is suggested."""
 
 
 def _describe_choices(text: str) -> str:
@@ -190,6 +194,7 @@ def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
     kind : type
         Dataclass of the options.
     words : list of str
+        The words after the name of the command.
 
     Returns
     -------
@@ -200,7 +205,7 @@ def merge_repeated_options(kind: Any, words: list[str]) -> list[str]:
     names = _map_multiple_options(kind)
     merged: list[str] = []
     values_by_option: dict[str, list[str]] = {}
-    # The list to which values are appended: that of the current option, if its values are merged.
+    # The list to which values are appended: that of the current option if its values are merged, or `merged`.
     current = merged
     for position, word in enumerate(words):
         if word == "--":
@@ -253,7 +258,7 @@ def _takes_many_values(hint: Any) -> bool:
 
 
 def _arrange_help(kind: type[T]) -> type[T]:
-    """Put the most frequently used options first in the help, and omit default values that say nothing.
+    """Put the most frequently used options first in the help, and omit uninformative default values.
 
     This changes the annotations and the field order of the dataclass, from which tyro builds the help.
     """
@@ -322,6 +327,7 @@ def summarize_complaint(text: str) -> str:
     Parameters
     ----------
     text : str
+        The output of tyro.
 
     Returns
     -------
@@ -361,6 +367,7 @@ def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[
     option : str
         Name of the option in messages.
     text : str
+        Value of the option.
     minimum, maximum : (width, height), px
         Range of valid sizes.
 

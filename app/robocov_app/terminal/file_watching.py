@@ -1,4 +1,4 @@
-"""Watching files for changes, whichever way an editor writes them."""
+"""Watching files for changes, whether an editor overwrites or replaces them."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +12,7 @@ SETTLING_TIME_S = 0.1
 MAX_SETTLING_TIME_S = 2.0
 """Time after which a file is reported even if it keeps changing."""
 _State: TypeAlias = tuple[int, int, int, int] | None
+"""Modification time, size, inode and device of a file; None if it does not exist."""
 
 
 def watch_files(
@@ -22,6 +23,7 @@ def watch_files(
     Parameters
     ----------
     paths : sequence of Path
+        The files or links.
     sleep : callable
         Called to wait for a number of seconds.
 
@@ -30,20 +32,20 @@ def watch_files(
     tuple of Path
         First all paths, then those that were written, removed or replaced.
     """
-    known = [_get_state(path) for path in paths]
+    known_states = [_get_state(path) for path in paths]
     yield tuple(paths)
     while True:
         sleep(POLLING_INTERVAL_S)
-        first = [_get_state(path) for path in paths]
-        if first == known:
+        new_states = [_get_state(path) for path in paths]
+        if new_states == known_states:
             continue
-        settled = _wait_for_end_of_changes(paths, first, sleep)
+        settled_states = _wait_for_end_of_changes(paths, new_states, sleep)
         changed = []
-        for path, old, new, newest in zip(paths, known, first, settled, strict=True):
-            if not old == new == newest:
+        for path, known, new, settled in zip(paths, known_states, new_states, settled_states, strict=True):
+            if not known == new == settled:
                 changed.append(path)
         # Later writes are reported as another change, even if they happen while the caller handles this one.
-        known = settled
+        known_states = settled_states
         yield tuple(changed)
 
 

@@ -11,7 +11,7 @@ MIN_WIDTH = 40
 _EMPTY_BOX_LINE = re.compile(r"│ *│")
 _NO_BREAK_SPACE = "\u00a0"
 _ITEM_TEXT = re.compile(r"^ *\S+(?: \S+)* {2,}(?=\S)")
-"""The beginning of an item of a list, up to its text, which follows two spaces or more."""
+"""The name of an item of a list, with the two or more spaces between the name and the text of the item."""
 
 
 class HelpBuffer(io.StringIO):
@@ -62,8 +62,8 @@ def insert_description(help_text: str, docstring: str, width: int) -> str:
     usage = _wrap_usage(Text.from_ansi(usage).plain, max(width, MIN_WIDTH))
     lines = options.splitlines()
     plain_lines = [Text.from_ansi(line).plain for line in lines]
-    kept = [line for row, line in enumerate(lines) if not _is_superfluous(plain_lines, row)]
-    return f"{usage}\n\n{wrap_description(docstring, width)}\n\n" + "\n".join(kept) + "\n"
+    kept_lines = [line for row, line in enumerate(lines) if not _is_superfluous(plain_lines, row)]
+    return f"{usage}\n\n{wrap_description(docstring, width)}\n\n" + "\n".join(kept_lines) + "\n"
 
 
 def wrap_description(docstring: str, width: int) -> str:
@@ -101,8 +101,8 @@ def wrap_description(docstring: str, width: int) -> str:
 def _is_superfluous(lines: list[str], row: int) -> bool:
     """Return whether a line is empty, but does not separate two groups of options.
 
-    tyro adds such a line to a text that fills its last line. Groups are boxes; without characters for boxes,
-    options are indented by two spaces, and titles of groups by one.
+    tyro adds such a line to a text that fills its last line. Groups of options are drawn as boxes. If the
+    terminal has no characters for boxes, options are indented by two spaces, and titles of groups by one.
     """
     if lines[row].strip():
         return _EMPTY_BOX_LINE.fullmatch(lines[row]) is not None
@@ -116,7 +116,7 @@ def _wrap_usage(usage: str, width: int) -> str:
 
 
 def _join_items(lines: list[str]) -> list[str]:
-    """Return the items of a list on one line each, given lines that are wrapped in the source."""
+    """Return each item of a list as one line, given lines that are wrapped in the source."""
     first_indent = _count_leading_spaces(lines[0])
     items: list[str] = []
     for line in lines:

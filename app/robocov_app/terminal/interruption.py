@@ -1,4 +1,4 @@
-"""Ctrl-C that keeps the results so far."""
+"""Handling of Ctrl-C that keeps the results so far."""
 
 import os
 import signal
@@ -49,7 +49,7 @@ class Interruption:
     Attributes
     ----------
     requested : bool
-        Whether the user has asked to stop.
+        Whether the user has requested to stop.
     """
 
     def __init__(self) -> None:

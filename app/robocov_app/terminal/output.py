@@ -39,9 +39,11 @@ def echo(
     Parameters
     ----------
     *texts : object
+        Objects to print, which are converted by `str`.
     sep, end, flush
         As for `print`.
     to_stderr : bool
+        Whether to print to standard error instead of standard output.
     """
     file = sys.stderr if to_stderr else sys.stdout
     safe = [escape_controls(str(text)) for text in texts]
@@ -54,11 +56,11 @@ def print_answer(options: Any, answer: Any, *lines: str, indent: int | None = No
     Parameters
     ----------
     options : JsonOption
-        Options of the command; ``options.json`` says whether to print JSON.
+        Options of the command. If ``options.json`` is set, the answer is printed as JSON.
     answer : object
-        Content of the JSON; numbers that are not finite become null.
+        The answer as JSON; numbers that are not finite become null.
     *lines : str
-        Lines that are printed otherwise.
+        The answer as lines of text.
     indent : int or None
         Indentation of the JSON content.
     """
@@ -74,7 +76,9 @@ def find_free_path(folder: Path, stem: str, suffix: str) -> Path:
     Parameters
     ----------
     folder : Path
+        Folder of the file.
     stem, suffix : str
+        Beginning of the file name, and its extension.
 
     Returns
     -------
@@ -130,8 +134,9 @@ def write_json(path: Path, content: Any) -> None:
     Parameters
     ----------
     path : Path
+        The file.
     content : object
-        Content whose numbers are all finite.
+        Content of the file; all numbers must be finite.
 
     Raises
     ------
@@ -153,10 +158,11 @@ def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None
     Parameters
     ----------
     path : Path
+        The file.
     header : str
         First line.
     rows : iterable of iterable of object
-        See `format_csv`.
+        Cells of the other lines; see `format_csv`.
 
     Raises
     ------
@@ -175,8 +181,8 @@ def format_csv(header: str, rows: Iterable[Iterable[object]]) -> str:
     header : str
         First line.
     rows : iterable of iterable of object
-        Numbers keep all digits, None becomes an empty cell, and texts are quoted such that spreadsheets do
-        not interpret them as formulas.
+        Cells of the other lines. Numbers keep all digits, None becomes an empty cell, and texts are quoted
+        such that spreadsheets do not interpret them as formulas.
 
     Returns
     -------
@@ -243,7 +249,9 @@ def print_table(
     columns : iterable of (str, mapping)
         Title of each column, and its look as arguments of `rich.table.Table.add_column`.
     rows : iterable of iterable of str
+        Cells of each row.
     title : str or None
+        Title above the table.
     """
     from rich.table import Table
 

@@ -20,6 +20,7 @@ def show_progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Ca
     Parameters
     ----------
     label : str
+        Name of the task.
     total : int
         Number of steps.
     quiet : bool
@@ -67,6 +68,7 @@ def show_late_progress(label: str, *, quiet: bool = False) -> Iterator[Callable[
     Parameters
     ----------
     label : str
+        Name of the task.
     quiet : bool
         Whether nothing is shown.
 

@@ -8,7 +8,9 @@ from contextlib import suppress
 from typing import IO
 
 _DESCRIPTORS = {"stdout": 1, "stderr": 2}
+"""File descriptors of the streams."""
 _LABELS = {"stdout": "standard output", "stderr": "standard error"}
+"""Names of the streams in messages."""
 
 
 class StandardStreams:

@@ -27,8 +27,11 @@ _DESCRIPTOR_VARIABLE = "_ROBOCOV_SUPERVISOR"
 """Private environment variable with the descriptor of the pipe."""
 _CONTROLLER = re.compile(r"[^\s,\"'\[\]]+\.py:[^\W\d]\w*")
 _MAX_STUDY_BYTES = 1_000_000
+"""Maximum size of the part of a study file that is searched for controllers."""
 _FORWARDED_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+"""Signals that the first process sends on to the second one."""
 _PARENT_POLL_S = 1.0
+"""Time between two checks of whether the parent process is still running."""
 
 
 def find_own_controllers(words: Sequence[str]) -> list[str]:

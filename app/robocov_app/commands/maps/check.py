@@ -118,7 +118,7 @@ def _display_outcomes(
     new_outcomes: Mapping[str, MapReport | InputError],
     previous_reports: Mapping[str, MapReport],
 ) -> None:
-    """Display new outcomes with their changes; in a terminal, clear it and show all other maps as well."""
+    """Display new outcomes with their changes. A terminal is cleared first, and also shows all other maps."""
     if console.is_terminal:
         console.clear()
     clock_time = time.strftime("%H:%M:%S")
@@ -169,7 +169,7 @@ def _build_row(name: str, outcome: MapReport | InputError) -> dict[str, Any]:
 
 
 def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None = None) -> Iterator[str]:
-    """Yield the lines of a report or, for an invalid map, one per issue in the order of the file."""
+    """Yield the lines of a report or, for an invalid map, a line for each issue in the order of the file."""
     if isinstance(outcome, MapReport):
         yield from format_report(outcome, previous)
     elif not isinstance(outcome, MapError) or not outcome.issues:
@@ -188,6 +188,7 @@ def format_report(report: MapReport, previous: MapReport | None = None) -> Itera
     Parameters
     ----------
     report : MapReport
+        Report on the current state of the map.
     previous : MapReport or None
         Report on an earlier state of the map; by default nothing is marked.
 
@@ -246,6 +247,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
 
 
 def _format_narrowest_gap(report: MapReport) -> str:
+    """Return the width of the narrowest gap, and the points at its ends, as text."""
     if report.narrowest_gap is None:
         return "none"
     (x1, y1), (x2, y2) = report.narrowest_gap.between

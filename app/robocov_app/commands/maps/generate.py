@@ -35,8 +35,9 @@ KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
 MAX_MAPS = 10_000
 """Maximum number of maps that are generated in one call."""
 _DEFAULT_SIDE_M = 10.0
+"""Default side of a square map."""
 _FIXED_BY_STUDY = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height", "count")
-"""Options on the kind and the number of maps, which ``--study`` fixes."""
+"""Options that cannot be combined with ``--study``, which fixes the kind and the number of maps."""
 
 
 @dataclass
@@ -107,11 +108,14 @@ class Arguments(FigureOptions):
 
 
 class _MapTask(NamedTuple):
-    """A map to build: its name, the function that builds it, and its seed if it is one of a series."""
+    """A map to build."""
 
     name: str
+    """File name of the map, without the suffix."""
     build: Callable[[], Environment]
+    """Builds the map."""
     seed: int | None = None
+    """Seed of a map of a series, for messages; None for a single map."""
 
 
 def command(options: Arguments) -> None:
@@ -146,7 +150,7 @@ def command(options: Arguments) -> None:
 
 
 def _build_map(task: _MapTask) -> Environment:
-    """Build a map; error messages name the option and, in a series of maps, the seed."""
+    """Build a map. Error messages name the option and, in a series of maps, the seed."""
     try:
         return task.build()
     except ParameterError as error:
@@ -196,7 +200,7 @@ def _check_file(path: Path, *, overwrite: bool) -> None:
 
 
 def _check_replaced_map(path: Path) -> None:
-    """Raise an InputError if a file exists and is not a map of robocov, as only maps are replaced."""
+    """Raise an InputError if a file exists and is not a map of robocov, because only maps are replaced."""
     if not resolve_target(path).exists():
         return
     try:
@@ -227,7 +231,7 @@ def _list_tasks(options: Arguments) -> list[_MapTask]:
 
 
 def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
-    """List the generated maps of a study of the paper, without the bundled ones."""
+    """List the generated maps of a study of the paper, without the bundled maps."""
     from robocov_app.replication.design.plan import FULL, QUICK
     from robocov_app.replication.design.study_maps import (
         build_claim_maps,
