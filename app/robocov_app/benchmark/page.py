@@ -451,8 +451,8 @@ def _describe_entries_without_messages(
         yield (
             f"{', '.join(old_entries)}: made with an earlier version, in which robots read the current maps "
             "of all robots in communication range, without messages. Loss, latency, message rate and "
-            "bandwidth had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each changed "
-            "cell of a map, 28 for each reported position of another robot (number, position, time)."
+            "bandwidth had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each "
+            "changed cell of a map, 28 for each reported position of another robot (number, position, time)."
         )
 
 
