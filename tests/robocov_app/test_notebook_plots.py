@@ -184,9 +184,9 @@ class TestDistances:
         apart = get_sizes(radius=[0.9, 0.1, 0.1, 0.1, 0.1])
         assert apart[0] > 4 * apart[1:].max()
 
-    def test_a_result_that_does_not_know_its_map_says_so(self):
+    def test_a_result_without_its_map_is_rejected(self):
         for lost in (replace(RESULT, environment=None), replace(RESULT, sites=None)):
-            with pytest.raises(ParameterError, match="does not know its map"):
+            with pytest.raises(ParameterError, match="expected a result with its map"):
                 lost.plot()
 
 

@@ -188,6 +188,7 @@ def read_result(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
+        The result, whose keys and types have been checked.
 
     Raises
     ------

@@ -51,7 +51,7 @@ _OBSTACLE_CORNERS = 5
 _BLOCKED_FRACTION = 0.23
 """Total area of the random obstacles divided by the area of the map, if no obstacles overlap."""
 _MEAN_OBSTACLE_AREA_RADII2 = 2.2
-"""Mean area of an obstacle, divided by the square of the minimum distance of its corners from its center."""
+"""Mean area of an obstacle, divided by the square of the smallest circumradius."""
 _MIN_OBSTACLE_AREA_RADII2 = 0.3
 """Minimum area of an obstacle, divided by the same square; slivers with a smaller area are drawn again."""
 _MIN_ROUNDS = 7
@@ -115,16 +115,17 @@ def has_yardstick() -> bool:
 
 
 def build_random_map(vertices: int, seed: int = 0) -> Environment:
-    """Build a unit square in which obstacles with five corners each block about a quarter of the area."""
+    """Build a unit square with random pentagons, which block about a quarter of the area."""
     rng = np.random.default_rng(seed)
     area_per_obstacle = _BLOCKED_FRACTION / (vertices / _OBSTACLE_CORNERS)
-    radius = np.sqrt(area_per_obstacle / _MEAN_OBSTACLE_AREA_RADII2)
+    min_radius = np.sqrt(area_per_obstacle / _MEAN_OBSTACLE_AREA_RADII2)
     obstacles: list[PolygonObstacle] = []
     while len(obstacles) < vertices // _OBSTACLE_CORNERS:
         angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, _OBSTACLE_CORNERS))
         directions = np.column_stack([np.cos(angle), np.sin(angle)])
-        ring = rng.random(2) + radius * rng.uniform(1.0, 1.5) * directions
-        if shapely.Polygon(ring).area > _MIN_OBSTACLE_AREA_RADII2 * radius**2:
+        # The corners are at random angles on a circle.
+        ring = rng.random(2) + min_radius * rng.uniform(1.0, 1.5) * directions
+        if shapely.Polygon(ring).area > _MIN_OBSTACLE_AREA_RADII2 * min_radius**2:
             obstacles.append(PolygonObstacle(tuple((float(x), float(y)) for x, y in ring)))
     return Environment("random", ((0, 0), (1, 0), (1, 1), (0, 1)), tuple(obstacles))
 

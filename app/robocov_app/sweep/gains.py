@@ -52,8 +52,8 @@ def build_gains(
     controller_class : type
         Class of the controller.
     specification : mapping, sequence of mapping, or Gains
-        Either a mapping from each gain to a value, a list of values or a `Range`, of which every combination
-        is tried, or a list of sets of gains. Gains that are not mentioned have their defaults.
+        Either a mapping from gains to a value, a list of values or a `Range`, or a list of sets of gains. All
+        combinations of the values in a mapping are tried. Gains that are not mentioned have their defaults.
     sampling : Sampling or None
         Method and number of samples; required if there are ranges.
     path : tuple of str and int

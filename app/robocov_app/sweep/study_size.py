@@ -11,7 +11,7 @@ from robocov_app.sweep.gains import Gains
 from robocov_app.sweep.sampling import Range, Sampling
 
 DEFAULT_MAX_RUNS = 100_000
-"""Maximum number of runs unless the study sets another one. So many runs take some days on ten cores."""
+"""Maximum number of runs unless the study sets another one. This number takes some days on ten cores."""
 MAX_MAX_RUNS = 10_000_000
 """Upper limit of the maximum that a study may set, because the runs are listed in memory."""
 _MAX_LISTED_FACTORS = 5

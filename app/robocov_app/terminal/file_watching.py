@@ -39,7 +39,7 @@ def watch_files(
         new_states = [_get_state(path) for path in paths]
         if new_states == known_states:
             continue
-        settled_states = _wait_for_end_of_changes(paths, new_states, sleep)
+        settled_states = _wait_until_unchanged(paths, new_states, sleep)
         changed = []
         for path, known, new, settled in zip(paths, known_states, new_states, settled_states, strict=True):
             if not known == new == settled:
@@ -49,7 +49,7 @@ def watch_files(
         yield tuple(changed)
 
 
-def _wait_for_end_of_changes(
+def _wait_until_unchanged(
     paths: Sequence[Path], states: list[_State], sleep: Callable[[float], None]
 ) -> list[_State]:
     """Wait until the states of files stay the same, and return them."""

@@ -87,6 +87,7 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
         status = child.wait()
     message = _read_message(reader)
     if message:
+        # The second process has ended properly, and its message is its status.
         return int(message), ""
     if received_signals:
         # If a signal ends a process, its status is -signal in Python, and 128 + signal in shells.

@@ -82,6 +82,8 @@ def _fit_bins(points: Array, first: int, stop: int, max_distance: float) -> Bins
         top = max(top, points[i, 1])
     width = right - left
     height = top - bottom
+    # The second limit of the side implies width * height / side² <= count, and the third one implies
+    # max(width, height) / side <= count. The length of `starts` relies on both, see `count_starts`.
     side = max(_SIDE_MARGIN * max_distance, np.sqrt(width * height / count), max(width, height) / count)
     # With a scale of 0, all points are in one bin.
     scale = 1.0 / side if count >= _MIN_BINNED_POINTS and 0.0 < side < np.inf else 0.0

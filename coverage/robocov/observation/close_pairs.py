@@ -74,19 +74,19 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
     starts = np.empty(count_starts(n), np.intp)
     order = np.empty(n, np.intp)
     bins = sort_into_bins(points, 0, n, ranges.max(), starts, order)
-    total = 0
+    pair_count = 0
     for i in range(n):
-        # All other points may be in range of this one.
-        if total + n > len(second):
-            capacity = 2 * (total + n)
-            first = _enlarge(first, total, capacity)
-            second = _enlarge(second, total, capacity)
-            distance = _enlarge(distance, total, capacity)
-        begin = total
+        # Make space for pairs of this point with all others.
+        if pair_count + n > len(second):
+            capacity = 2 * (pair_count + n)
+            first = _enlarge(first, pair_count, capacity)
+            second = _enlarge(second, pair_count, capacity)
+            distance = _enlarge(distance, pair_count, capacity)
+        first_pair = pair_count
         row = find_bin(points[i, 1] - bins.bottom, bins.scale)
         column = find_bin(points[i, 0] - bins.left, bins.scale)
-        # Points in range are in the same bin or in one of the eight around it. The bins of a row follow each
-        # other, and so do the points in them, in `order`.
+        # Points in range are in the same bin or in one of the eight bins around it. Bins are numbered row by
+        # row, so the points of three adjacent bins of a row are consecutive in `order`.
         for bin_row in range(max(row - 1, 0), min(row + 2, bins.rows)):
             first_bin = bin_row * bins.columns + max(column - 1, 0)
             stop_bin = bin_row * bins.columns + min(column + 2, bins.columns)
@@ -96,11 +96,12 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
                 dy = points[j, 1] - points[i, 1]
                 separation = np.sqrt(dx * dx + dy * dy)
                 if j != i and separation <= min(ranges[i], ranges[j]):
-                    first[total] = i
-                    _insert(second, distance, begin, total, j, separation)
-                    total += 1
-        indptr[i + 1] = total
-    return indptr, ClosePairs(first[:total].copy(), second[:total].copy(), distance[:total].copy())
+                    first[pair_count] = i
+                    _insert(second, distance, first_pair, pair_count, j, separation)
+                    pair_count += 1
+        indptr[i + 1] = pair_count
+    pairs = ClosePairs(first[:pair_count].copy(), second[:pair_count].copy(), distance[:pair_count].copy())
+    return indptr, pairs
 
 
 @kernel

@@ -250,6 +250,7 @@ class Simulation:
         next_inbox, sent_bytes = self._radio.send_messages(
             inbox, self._steps, messages, self.positions, self.working
         )
+        # The physics may raise an error, so everything else that belongs to the state changes after it.
         positions_before = self.positions
         self._world.step(forces, self.dt, external_forces, time=self.time)
         self.memory = next_memory
