@@ -243,15 +243,15 @@ def _divide_cell(cell: Cell, fraction: float, street: _Street) -> tuple[Cell, Ce
     Both parts get a new edge along the middle line of the street.
     """
     normal_x, normal_y = street.normal
-    # Signed distances of the corners from the origin, in the direction of the normal.
-    distances = [edge.x * normal_x + edge.y * normal_y for edge in cell]
+    # Coordinates of the corners along the normal.
+    coordinates = [edge.x * normal_x + edge.y * normal_y for edge in cell]
     # Two widths are subtracted: that of the new street, and half of the width of the street at either end.
-    free_extent = max(distances) - min(distances) - 2.0 * street.width
-    distance = min(distances) + street.width + fraction * free_extent
-    origin = (normal_x * distance, normal_y * distance)
+    free_extent = max(coordinates) - min(coordinates) - 2.0 * street.width
+    street_coordinate = min(coordinates) + street.width + fraction * free_extent
+    street_point = (normal_x * street_coordinate, normal_y * street_coordinate)
     setback = street.width / 2.0
-    first = cut_cell(cell, origin, (normal_x, normal_y), setback, street.widening_share)
-    second = cut_cell(cell, origin, (-normal_x, -normal_y), setback, street.widening_share)
+    first = cut_cell(cell, street_point, (normal_x, normal_y), setback, street.widening_share)
+    second = cut_cell(cell, street_point, (-normal_x, -normal_y), setback, street.widening_share)
     return first, second
 
 

@@ -161,7 +161,7 @@ class _CaveBuilder:
         low_area = low_area.intersection(_build_inner_rectangle(self.request, self.min_radius))
         min_area = _MIN_CHAMBER_AREA_RATIO * self.request.mean_spacing**2
         chambers = [chamber for chamber in shapely.get_parts(low_area) if chamber.area >= min_area]
-        # The core will be dilated by at least `min_radius`, which restores the eroded start area.
+        # Dilating the core by `min_radius` or more will restore the start area, which is eroded here.
         eroded_start = self.start_area.buffer(-self.min_radius)
         if eroded_start.is_empty:
             eroded_start = self.start_area.centroid

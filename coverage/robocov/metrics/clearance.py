@@ -170,8 +170,8 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
             for second in range(first + 1, len(radius)):
                 j = order[t, second]
                 # This is a lower bound on the gap, from x alone. It grows with each following robot, so that
-                # no robot after the first one beyond the limit needs to be compared. For a robot that does
-                # not work, the bound is nan, which ends the loop too.
+                # the loop can end at the first bound above the limit. For a robot that does not work, the
+                # bound is nan, which ends the loop too.
                 gap_bound = positions[t, j, 0] - positions[t, i, 0] - max_diameter
                 if not gap_bound <= max(min_gaps[t], MAX_CONTACT_GAP_M):
                     break

@@ -332,14 +332,14 @@ def read_rows(
     lines = _read_lines(table)
     names = next(lines)
     selected = list(columns or names)
-    positions = [names.index(name) for name in selected]
-    for number, line in enumerate(lines):
+    column_indices = [names.index(name) for name in selected]
+    for row_index, cells in enumerate(lines):
         row = {}
         try:
-            for name, position in zip(selected, positions, strict=True):
-                row[name] = _parse_value(line[position], kinds.get(name))
+            for name, column_index in zip(selected, column_indices, strict=True):
+                row[name] = _parse_value(cells[column_index], kinds.get(name))
         except (ValueError, IndexError) as error:
-            raise InputError(f"{table}: row {number}: cannot be read: {error}") from error
+            raise InputError(f"{table}: row {row_index}: cannot be read: {error}") from error
         yield row
 
 

@@ -210,7 +210,8 @@ class ContactSolver:
         self._space.add(*bodies)
         try:
             rows = self._arrays.find_rows(bodies)
-            self._arrays.states[:] = 0.0  # One of the rows belongs to the static body.
+            # The states of all other bodies, such as the static body, are 0.
+            self._arrays.states[:] = 0.0
             self._arrays.states[self._moving_rows] = obstacle_states
             self._arrays.states[rows] = states
             self._arrays.write_states()

@@ -183,6 +183,7 @@ class World:
         World
             The copy.
         """
+        # The copy has the state that `__getstate__` returns: its own spaces are built when they are needed.
         return copy(self)
 
     def __getstate__(self) -> dict[str, Any]:
