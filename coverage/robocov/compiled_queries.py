@@ -186,6 +186,7 @@ def _read_offsets(structure: str) -> dict[str, int]:
 
 _POINT_QUERY = _get_address(ffi.addressof(lib, "cpSpacePointQueryNearest"))
 _SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
+"""Addresses of the C functions."""
 
 
 @kernel

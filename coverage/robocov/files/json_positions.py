@@ -14,6 +14,7 @@ from itertools import count, islice
 _WHITESPACE = re.compile(r"[ \t\n\r]*")
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _STRING_OR_BRACKET = re.compile(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
+"""A string, which may contain brackets, or a bracket outside strings."""
 
 # Numbers may have any number of digits, because `len` replaces the conversion of digits to a value.
 _SKIPPING_DECODER = json.JSONDecoder(parse_float=len, parse_int=len, parse_constant=len, strict=False)

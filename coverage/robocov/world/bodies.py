@@ -27,9 +27,12 @@ MAX_TEAMS_PER_SPACE = 31
 """Largest number of teams in one space. A filter has 32 categories: one for walls, and one for each team."""
 
 _ALL_BUT_WALLS = pymunk.ShapeFilter.ALL_CATEGORIES() & ~WALL_CATEGORY
+"""Filter categories of moving obstacles, and of robots that collide with all others."""
 _FORCE_FIELD = batch.BodyFields.FORCE
 _STATE_FIELDS = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY
+"""Fields of bodies in `BodyArrays.forces` and `BodyArrays.states`."""
 _CONTACT_FIELDS = batch.ArbiterFields.BODY_A_ID | batch.ArbiterFields.BODY_B_ID
+"""Fields of contacts: the ids of the two bodies."""
 
 
 def build_obstacle_space(obstacles: Obstacles) -> tuple[pymunk.Space, list[pymunk.Body]]:
