@@ -18,9 +18,9 @@ from robocov_app.editor.edits.create import add_rectangle
 from robocov_app.editor.ui.importing.dialog import SET_COLOR, ImportDialog
 from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.viewer.launch import HEADLESS_FPS, ViewerLauncher
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.screen_video import copy_pixels
 
 if TYPE_CHECKING:

@@ -32,8 +32,8 @@ from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.window.input import format_key, split_key_name
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.files.models import build_session_schema
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx

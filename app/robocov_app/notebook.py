@@ -436,11 +436,11 @@ def show(
 
 def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
     """Show the window of a session that starts from the state of a simulation."""
-    from robocov_app.viewer.session.controller_choice import ControllerChoice
     from robocov_app.viewer.session.files.session_file import save_session
-    from robocov_app.viewer.session.robot_properties import RobotProperties
-    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+    from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+    from robocov_app.viewer.session.setup.scenario import SessionScenario
 
     controller = simulation.controller
     gains = get_gain_values(unwrap_controller(controller))

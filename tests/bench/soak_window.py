@@ -22,9 +22,9 @@ from robocov_app.toolkit.window.display import open_display
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.window import ViewerWindow
 
 MAP_NAME = "rooms"

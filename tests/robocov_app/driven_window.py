@@ -21,8 +21,8 @@ from robocov_app.viewer.commands.viewer_commands import list_parameter_commands,
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window.screen_video import copy_pixels
 from robocov_app.viewer.window.window import ViewerWindow
 

@@ -64,8 +64,8 @@ def play_frames(window, frames: int) -> None:
 def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Render a scene. `spoil` changes its window before, to test the tolerance."""
     from robocov_app.viewer.launch import ViewerLauncher
-    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.session.setup.scenario import SessionScenario
     from robocov_app.viewer.window.screen_video import copy_pixels
 
     theme, play = SCENES[name]

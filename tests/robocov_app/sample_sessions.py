@@ -9,9 +9,9 @@ import shapely
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 HALL = Environment(
     "hall",

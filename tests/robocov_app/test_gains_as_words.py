@@ -24,7 +24,7 @@ from robocov_app.sweep.gains import build_gains
 from robocov_app.sweep.sampling import Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 STUDY = """
 maps = ["room.json"]

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from robocov_app.runs.encoding import Frame
     from robocov_app.viewer.launch import ViewerLauncher
-    from robocov_app.viewer.session.scenario import SessionScenario
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.session.setup.scenario import SessionScenario
     from robocov_app.viewer.start.cards import StartChoice
     from robocov_app.viewer.start.launch import StartLauncher
     from robocov_app.viewer.window.window import ViewerWindow
@@ -244,9 +244,9 @@ def build_session(options: Arguments) -> Session:
     """
     from robocov.mapfile import load_map
     from robocov.team_files import read_team
-    from robocov_app.viewer.session.controller_choice import ControllerChoice
-    from robocov_app.viewer.session.robot_properties import RobotProperties
-    from robocov_app.viewer.session.scenario import SessionScenario
+    from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+    from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+    from robocov_app.viewer.session.setup.scenario import SessionScenario
 
     robots = options.robots
     properties = RobotProperties(radius=options.radius)

@@ -18,10 +18,10 @@ from robocov_app.toolkit.window.display import collect_garbage_rarely, open_disp
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.window import ViewerWindow
 
 TEAM_SIZES = (6, 50, 200, 1000)

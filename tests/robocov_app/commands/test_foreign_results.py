@@ -17,8 +17,8 @@ from robocov_app.replication.design.contenders import Contender
 from robocov_app.replication.design.studies import Contest
 from robocov_app.replication.results.outcome_tables import read_outcomes
 from robocov_app.sweep.study_file import read_study
-from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.missing_controller import MissingController
 from robocov_app.viewer.window.window import ViewerWindow
 
 SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")

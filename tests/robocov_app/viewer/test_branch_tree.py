@@ -9,7 +9,7 @@ from sample_sessions import PILLAR, advance_session
 from robocov_app.toolkit.widgets.icons import ICONS
 from robocov_app.viewer.chart.branch_tree import MAX_BRANCH_LINES, list_branch_lines
 from robocov_app.viewer.chart.events import _EVENT_ICONS, _OTHER_EVENT_ICON, select_badges
-from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 
 STEPS = 60
 

@@ -21,7 +21,7 @@ from sample_sessions import (
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
 from robocov_app.viewer.session import pane_group as module
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 
 @pytest.mark.parametrize("controllers", [(RAPF,), (RPF, LLOYD)])

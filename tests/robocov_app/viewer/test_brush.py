@@ -16,7 +16,7 @@ from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
 from robocov_app.render.density_shading import get_density_range
 from robocov_app.viewer.costs.costs import Costs
-from robocov_app.viewer.session.map_edits import (
+from robocov_app.viewer.session.editing.map_edits import (
     MAX_PAINTED_DENSITY,
     MIN_PAINTED_DENSITY,
     PAINTED_RASTER_CELLS,

@@ -13,7 +13,7 @@ from driven_window import Driver, open_viewer
 
 from robocov_app.render.canvas import Canvas
 from robocov_app.viewer.chart.curves import map_curve_colors
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window.screen_video import copy_pixels
 
 

@@ -22,12 +22,12 @@ from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import load_saved_runs
 from robocov_app.viewer.costs.costs import Costs
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.pane import Continuation
 from robocov_app.viewer.session.recorded import build_replay_session
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import MAX_COMMUNICATING_ROBOTS, SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import MAX_COMMUNICATING_ROBOTS, SessionScenario
 
 CART = CircleObstacle((1.0, 3.0), 0.4, "cart", ObstaclePath(((1, 3), (5, 3)), 1.0, "back-and-forth"))
 HALL = Environment("hall", ((0, 0), (6, 0), (6, 4), (0, 4)), (CART,))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from sample_sessions import LLOYD, RAPF, RPF, advance_session, start_session
 
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.past import decision_replay as module
 from robocov_app.viewer.session.past.decision_replay import rebuild_snapshot
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 USER_CONTROLLERS = """
 from dataclasses import dataclass

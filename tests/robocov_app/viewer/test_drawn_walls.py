@@ -8,8 +8,8 @@ from driven_window import open_viewer
 from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle, Environment, WallObstacle
-from robocov_app.viewer.session.map_edits import add_obstacle
-from robocov_app.viewer.session.passages import describe_passage_changes
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
+from robocov_app.viewer.session.editing.passages import describe_passage_changes
 from robocov_app.viewer.tools.snapping import MapSnapper
 
 RADIUS = 0.1

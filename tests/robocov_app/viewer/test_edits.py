@@ -25,9 +25,9 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
 from robocov.team import Team
 from robocov.world.free_positions import find_free_position
-from robocov_app.viewer.session import edits as module
-from robocov_app.viewer.session.edits import AddRobot
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.editing import edits as module
+from robocov_app.viewer.session.editing.edits import AddRobot
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 RADIUS = 0.1
 NO_ROBOTS = np.empty((0, 2))

@@ -19,7 +19,7 @@ from robocov_app.toolkit.window.input import drop_late_repeats
 from robocov_app.viewer.panel.parameters import list_limit_parameters
 from robocov_app.viewer.session.files.session_file import MAX_FILE_SAMPLES
 from robocov_app.viewer.session.past.curves import Curve
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.window.status import list_facts
 
 

@@ -15,7 +15,7 @@ from sample_sessions import RAPF, RPF, compute_penetration
 
 from robocov.environment import Environment
 from robocov_app.viewer.costs.costs import Costs
-from robocov_app.viewer.session.scenario import MAX_PANES
+from robocov_app.viewer.session.setup.scenario import MAX_PANES
 from robocov_app.viewer.window.window import ViewerWindow
 
 EVENTS = 5_000

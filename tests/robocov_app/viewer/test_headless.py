@@ -18,10 +18,10 @@ from robocov_app.cli import main
 from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.branch_output.parts import split_branch
 from robocov_app.viewer.branch_output.video import draw_branch_frames
-from robocov_app.viewer.session.edits import PlaceRobot
+from robocov_app.viewer.session.editing.edits import PlaceRobot
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.session.files.session_file import load_session, save_session
-from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.session import Session
 
 SMALL = ["--lattice", "16", "--size", "320x240"]

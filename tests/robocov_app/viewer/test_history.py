@@ -12,7 +12,7 @@ from robocov.environment import CircleObstacle
 from robocov_app.viewer.session.past import history as module
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 DT = 1 / 60
 MIN_STATES = 24

@@ -14,9 +14,9 @@ from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.window import ViewerWindow
 
 

@@ -19,7 +19,7 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
-from robocov_app.viewer.session.map_edits import (
+from robocov_app.viewer.session.editing.map_edits import (
     MIN_SHAPE_SIZE_M,
     add_obstacle,
     build_circle,

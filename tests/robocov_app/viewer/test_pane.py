@@ -10,7 +10,6 @@ from sample_sessions import HALL, LLOYD, RAPF, RPF
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.pane import (
     STEPS_BETWEEN_SENSED_POINTS,
     Continuation,
@@ -19,7 +18,8 @@ from robocov_app.viewer.session.pane import (
     start_simulation,
 )
 from robocov_app.viewer.session.past.states import PaneSetup
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 DT = 1 / 60
 PANE_NUMBER = 7

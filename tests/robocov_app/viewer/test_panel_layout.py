@@ -20,8 +20,8 @@ from robocov_app.viewer.panel.parameters import (
     list_gain_parameters,
     list_limit_parameters,
 )
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 MIN_SLIDER_PX = 140
 

@@ -20,8 +20,8 @@ from robocov_app.viewer.panel.parameters import (
     list_limit_parameters,
     replace_limit,
 )
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 CONTROLLERS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
 GAINS = [parameter for controller in CONTROLLERS for parameter in list_gain_parameters(controller)]

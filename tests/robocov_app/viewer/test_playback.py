@@ -18,10 +18,10 @@ from sample_sessions import (
 
 from robocov.errors import ParameterError, StartError
 from robocov.simulation import Simulation
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 USER_CONTROLLER = """
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ from driven_window import open_viewer
 from robocov.cost import CoverageCost
 from robocov.team import Team
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 FAST = Team.homogeneous(2, max_speed=1.0)
 SLOW = Team.homogeneous(1, max_speed=0.25)

@@ -14,7 +14,7 @@ from sample_sessions import HALL, LLOYD, RAPF, RPF, build_presenter, describe_st
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
-from robocov_app.viewer.session.scenario import MAX_ROBOTS
+from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS
 from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 

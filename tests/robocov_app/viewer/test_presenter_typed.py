@@ -17,7 +17,7 @@ from robocov_app.toolkit.window.window_model import MESSAGE_S
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import simplify_message
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import MAX_ROBOTS
+from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS
 
 # layers and messages
 

@@ -18,10 +18,10 @@ from robocov.team import Team
 from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.launch import ViewerLauncher
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.missing_controller import MissingController
 from robocov_app.viewer.session.recorded import build_replay_session, get_control_period
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.missing_controller import MissingController
 
 STEPS = 60
 DT = 1 / 60

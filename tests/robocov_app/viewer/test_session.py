@@ -21,11 +21,11 @@ from sample_sessions import (
 
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.pane import resume_simulation
-from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 # Restarts
 

@@ -24,12 +24,12 @@ from robocov.density import Gaussian, Gaussians
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import RobocovError
 from robocov_app.viewer.session import playback as module
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.edits import SetDensity
+from robocov_app.viewer.session.editing.edits import SetDensity
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session, parse_session
-from robocov_app.viewer.session.map_edits import add_obstacle
-from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 ATLAS = ControllerChoice("atlas")
 Point = tuple[float, float]

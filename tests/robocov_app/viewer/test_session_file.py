@@ -18,7 +18,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map
 from robocov_app.cli import main
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.models import build_session_schema
 from robocov_app.viewer.session.files.session_file import (
     build_session_content,
@@ -26,8 +26,8 @@ from robocov_app.viewer.session.files.session_file import (
     load_session,
     save_session,
 )
-from robocov_app.viewer.session.map_edits import add_obstacle
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 MAX_FILE_BYTES = 3000
 USER_CONTROLLER = """

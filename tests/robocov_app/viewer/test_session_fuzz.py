@@ -13,11 +13,11 @@ from sample_sessions import LLOYD, RAPF, get_positions, start_session
 from robocov.conditions import Conditions, Failure
 from robocov.environment import CircleObstacle
 from robocov.errors import RobocovError
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session, parse_session
-from robocov_app.viewer.session.map_edits import add_obstacle
-from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 UNKNOWN_ROBOT = 9
 

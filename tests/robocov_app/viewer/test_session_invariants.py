@@ -30,9 +30,9 @@ from sample_sessions import (
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.session.map_edits import add_obstacle, move_obstacle, replace_obstacles
+from robocov_app.viewer.session.editing.map_edits import add_obstacle, move_obstacle, replace_obstacles
 from robocov_app.viewer.session.past.ghosts import MAX_GHOST_BRANCHES, QUANTITIES
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 MAX_PENETRATION_M = 2e-3
 points = st.tuples(st.floats(-0.5, 6.5), st.floats(-0.5, 4.5))

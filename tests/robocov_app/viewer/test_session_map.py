@@ -19,9 +19,9 @@ from sample_sessions import (
 
 from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.map_edits import replace_obstacles
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import MAX_PANES
+from robocov_app.viewer.session.editing.map_edits import replace_obstacles
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import MAX_PANES
 
 MAX_PENETRATION_M = 2e-3
 

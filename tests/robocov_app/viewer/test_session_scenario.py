@@ -13,9 +13,9 @@ from robocov.controllers import make_controller
 from robocov.errors import ParameterError, StartError
 from robocov.team import Team
 from robocov_app.viewer.panel.parameters import list_limit_parameters, replace_limit
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import MAX_PANES, MAX_ROBOTS, SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import MAX_PANES, MAX_ROBOTS, SessionScenario
 
 USER_CONTROLLER = """
 from dataclasses import dataclass

@@ -17,10 +17,10 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.window.clipboard import Clipboard
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import load_session
-from robocov_app.viewer.session.map_edits import add_obstacle
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.sharing.share import ShareActions
 from robocov_app.viewer.sharing.values import format_number
 

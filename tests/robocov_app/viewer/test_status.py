@@ -10,8 +10,8 @@ import pytest
 from robocov.mapfile import load_map
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.status import describe_cursor, list_facts
 
 

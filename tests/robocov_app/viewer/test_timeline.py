@@ -18,14 +18,14 @@ from sample_sessions import (
 
 from robocov.errors import InputError, ParameterError, StartError
 from robocov_app.viewer.session import playback
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import SessionDocument
-from robocov_app.viewer.session.edits import FailRobot, Restart
+from robocov_app.viewer.session.editing.edits import FailRobot, Restart
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session, parse_session
 from robocov_app.viewer.session.pane_group import PaneGroup
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 FAILING = """

@@ -9,7 +9,7 @@ from robocov_app.viewer.panel.parameters import (
     list_limit_parameters,
     replace_limit,
 )
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 _KINDS_NOT_REPEATED = frozenset({"hand", "robot", "failure"})
 """Kinds of events that are lost when a run restarts; edited maps, controllers and limits are kept."""

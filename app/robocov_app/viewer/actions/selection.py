@@ -8,7 +8,7 @@ from robocov.environment import Obstacle, WallObstacle
 from robocov.errors import ParameterError
 from robocov_app.viewer.actions.robots import RobotActions
 from robocov_app.viewer.model import ViewerModel
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.tools.obstacle_drags import add_obstacles, describe_obstacles, exchange_obstacles
 from robocov_app.viewer.tools.outlines import MAX_WALL_WIDTH_M, MIN_WALL_WIDTH_M
 

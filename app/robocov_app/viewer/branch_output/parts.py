@@ -14,12 +14,12 @@ from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.scene import Scene
 from robocov_app.runs.saved_runs import name_failed_robot
 from robocov_app.viewer.session.document import Node, SessionDocument, replay
-from robocov_app.viewer.session.edits import PlaceRobot
-from robocov_app.viewer.session.map_edits import add_obstacle
+from robocov_app.viewer.session.editing.edits import PlaceRobot
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.states import PaneSetup
-from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 _TIME_TOLERANCE_S = 1e-9
 

@@ -25,7 +25,7 @@ from robocov_app.viewer.explanation.sentences import ReportLine
 from robocov_app.viewer.panel.parameters import NumberParameter, OptionParameter, Parameter
 from robocov_app.viewer.panel.sketches import get_sketch
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import MAX_PANES
+from robocov_app.viewer.session.setup.scenario import MAX_PANES
 
 LAYERS_WITHOUT_CHECK_BOX = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
 """Layers that are nearly always visible. They can still be toggled by keys."""

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from robocov.controllers.gains import Gain, Option, Value
 from robocov.errors import ParameterError, quote
 from robocov.team import DEFAULT_TRACK_PER_RADIUS, KINEMATICS, POINT, UNICYCLE, UNITS
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 
 SLIDER_SPAN = 30.0  # a slider ranges from 1 / 30 of the default to 30 times the default
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"

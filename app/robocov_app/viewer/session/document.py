@@ -13,13 +13,13 @@ from operator import attrgetter
 from typing import NamedTuple, Self
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.edits import RemovePane, Restart, SessionEdit, SetController
+from robocov_app.viewer.session.editing.edits import RemovePane, Restart, SessionEdit, SetController
 from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup
 from robocov_app.viewer.session.past.curves import Curve, SessionEvent
 from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.past.trails import TrailSection
-from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 MAX_CACHED_STATES = 160
 """Maximum number of states that a node keeps while another branch is displayed."""

@@ -14,10 +14,10 @@ from robocov.simulation import Simulation
 from robocov.world.free_positions import relocate_robots
 from robocov_app.render.scene import Scene
 from robocov_app.render.sensed_points import SensedPoints
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.past.curves import Curve
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 from robocov_app.viewer.session.past.trails import Trail
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 STEPS_BETWEEN_SENSED_POINTS = 3
 """Interval, in steps, at which sensed points are recorded."""

@@ -11,8 +11,8 @@ from robocov.conditions import TIME_TOLERANCE_S
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
-from robocov_app.viewer.session.drag_spring import compute_spring_forces
-from robocov_app.viewer.session.edits import (
+from robocov_app.viewer.session.editing.drag_spring import compute_spring_forces
+from robocov_app.viewer.session.editing.edits import (
     AddRobot,
     DragRobot,
     EditObstacles,
@@ -28,7 +28,7 @@ from robocov_app.viewer.session.edits import (
 )
 from robocov_app.viewer.session.pane import Continuation, Pane, resume_simulation, start_simulation
 from robocov_app.viewer.session.past.states import Drag, PaneSetup, RunState
-from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 MIN_REPORTED_OFFSET_M = 5e-4
 """If a robot joins farther than this from the requested position, the event states the distance."""

@@ -14,18 +14,18 @@ from robocov.files.result_names import RECORD_FILE
 from robocov.observation import Decision
 from robocov.record import Record
 from robocov_app.runs.saved_runs import SavedRun, build_roster
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import SessionDocument
-from robocov_app.viewer.session.missing_controller import find_controller, use_placeholder
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
 from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup
 from robocov_app.viewer.session.past.history import MAX_HISTORY_BYTES, RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
 from robocov_app.viewer.session.past.trails import rebuild_trail
 from robocov_app.viewer.session.present import Present
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.missing_controller import find_controller, use_placeholder
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECORD_BYTES = 400_000_000

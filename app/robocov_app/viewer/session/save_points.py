@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.document import Node
-from robocov_app.viewer.session.edits import SessionEdit
+from robocov_app.viewer.session.editing.edits import SessionEdit
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.past.history import RunHistory

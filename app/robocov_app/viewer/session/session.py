@@ -8,10 +8,9 @@ import numpy as np
 
 from robocov.environment import Environment, Point
 from robocov.errors import ParameterError
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.displayed import DisplayedState
 from robocov_app.viewer.session.document import Node, SessionDocument
-from robocov_app.viewer.session.edits import (
+from robocov_app.viewer.session.editing.edits import (
     AddRobot,
     DragRobot,
     FailRobot,
@@ -32,14 +31,15 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.pane_group import PaneGroup
 from robocov_app.viewer.session.playback import Playback
 from robocov_app.viewer.session.present import Present
-from robocov_app.viewer.session.robot_properties import RobotProperties
 from robocov_app.viewer.session.save_points import (
     SavePoint,
     build_save_point,
     is_at_save_point,
     restore_save_point,
 )
-from robocov_app.viewer.session.scenario import MAX_PANES, SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 MIN_PUSH_M = 5e-3

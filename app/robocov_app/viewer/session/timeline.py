@@ -12,8 +12,8 @@ from robocov_app.viewer.session.past.curves import GhostCurve, SessionEvent
 from robocov_app.viewer.session.past.ghosts import build_ghost_curves
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.present import Present, build_present, cache_present
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.seek import Seek
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 STEPS_BETWEEN_SETTLED_CHECKS = 12
 _TIME_TOLERANCE_S = 1e-9

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from robocov.conditions import PARAMETERS, Conditions
 from robocov.defaults import DEFAULT_DT_S
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import DEFAULT_PROPERTIES, SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import DEFAULT_PROPERTIES, SessionScenario
 from robocov_app.viewer.sharing.shared_run import SharedRun
 from robocov_app.viewer.sharing.values import format_gain_value, format_number, format_time
 

@@ -7,8 +7,8 @@ from typing import Any
 from robocov.conditions import PARAMETERS, Conditions
 from robocov.defaults import DEFAULT_DT_S
 from robocov.team import UNITS, Team
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.scenario import DEFAULT_PROPERTIES, SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.scenario import DEFAULT_PROPERTIES, SessionScenario
 from robocov_app.viewer.sharing.shared_run import SharedRun
 from robocov_app.viewer.sharing.values import format_gain_value, format_python_number, format_time
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from robocov.errors import InputError, RobocovError
 from robocov.mapfile import load_map, to_json
-from robocov_app.viewer.session.controller_choice import ControllerChoice
 from robocov_app.viewer.session.document import Node
-from robocov_app.viewer.session.edits import (
+from robocov_app.viewer.session.editing.edits import (
     MapEdit,
     RemovePane,
     Restart,
@@ -16,8 +15,9 @@ from robocov_app.viewer.session.edits import (
     SetController,
     SetRobotProperties,
 )
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 

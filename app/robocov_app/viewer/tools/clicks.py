@@ -1,6 +1,6 @@
 """Tools that act on a single click: deleting, adding a robot, letting a robot fail."""
 
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.session.session import Session, toggle_failure
 from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, delete_obstacle
 

@@ -6,7 +6,7 @@ from math import dist
 from robocov.environment import Obstacle, Point
 from robocov_app.toolkit.tools.tool import CursorShape
 from robocov_app.viewer.inspection import Inspection
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.handles import find_handle, list_handles
 from robocov_app.viewer.tools.obstacle_drags import BoxDrag, HandleDrag, MoveDrag, ObstacleDrag

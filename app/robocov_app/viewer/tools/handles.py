@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.environment import CircleObstacle, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov_app.toolkit.tools.geometry import constrain_angle
-from robocov_app.viewer.session.map_edits import MIN_SHAPE_SIZE_M, build_circle, map_points
+from robocov_app.viewer.session.editing.map_edits import MIN_SHAPE_SIZE_M, build_circle, map_points
 
 HandleKind: TypeAlias = Literal["point", "rim", "corner"]
 

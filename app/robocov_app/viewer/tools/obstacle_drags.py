@@ -10,7 +10,7 @@ import shapely
 from robocov.environment import Environment, Obstacle
 from robocov.errors import RobocovError
 from robocov_app.viewer.inspection import Inspection
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.handles import ObstacleHandle, drag_handle
 from robocov_app.viewer.tools.snapping import MapSnapper

@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.environment import CircleObstacle, Point
 from robocov.errors import RobocovError
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, ViewerToolOverlay, add_obstacle
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from robocov.environment import Environment, Obstacle, Point
 from robocov_app.toolkit.tools.tool import PointerEvent, Tool, ToolOverlay
-from robocov_app.viewer.session import map_edits
-from robocov_app.viewer.session.passages import describe_passage_changes
+from robocov_app.viewer.session.editing import map_edits
+from robocov_app.viewer.session.editing.passages import describe_passage_changes
 from robocov_app.viewer.session.session import Session
 
 

@@ -24,7 +24,7 @@ from robocov_app.viewer.canvas.layer_bar import LayerBar
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.scrubbing import TimeGesture
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session import map_edits
+from robocov_app.viewer.session.editing import map_edits
 from robocov_app.viewer.tools.snapping import MapSnapper
 from robocov_app.viewer.tools.tool import ViewerPointerEvent
 

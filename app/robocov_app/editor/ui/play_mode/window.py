@@ -14,9 +14,9 @@ from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import get_key_name
 from robocov_app.viewer.costs.costs import Costs
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.top_bar import TopBar
 from robocov_app.viewer.window.window import ViewerWindow
 

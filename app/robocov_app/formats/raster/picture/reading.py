@@ -19,14 +19,14 @@ from robocov_app.formats.foreign_map import ForeignMap, Thumbnail
 from robocov_app.formats.geometry.cells.grid_map import GridFrame, build_grid_map
 from robocov_app.formats.options import ReadOptions
 from robocov_app.formats.raster.picture.brightness import Brightness
-from robocov_app.formats.raster.picture.classification import (
+from robocov_app.formats.raster.picture.decoding import is_picture, read_picture
+from robocov_app.formats.raster.picture.pixel_classification import (
     classify_pixels,
     describe_doubts,
     drop_strokes,
     is_on_transparent_ground,
     require_free_cells,
 )
-from robocov_app.formats.raster.picture.decoding import is_picture, read_picture
 
 GEOREFERENCE_CHUNK = "robocov"
 """Key of the text chunk with the scale and position: JSON with ``cell_m`` and ``origin_m``."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from robocov_app.viewer.session.document import Node
-from robocov_app.viewer.session.edits import AddRobot, Restart
+from robocov_app.viewer.session.editing.edits import AddRobot, Restart
 from robocov_app.viewer.session.files.maps import refuse_value
 from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, LessonModel
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field
 
-from robocov_app.viewer.session.edits import (
+from robocov_app.viewer.session.editing.edits import (
     DragRobot,
     MapEdit,
     PaneEdit,

@@ -14,7 +14,7 @@ from robocov.errors import OutputError
 from robocov_app.runs.saved_runs import name_folders
 from robocov_app.terminal.output import echo, find_free_path
 from robocov_app.viewer.session.document import SessionDocument
-from robocov_app.viewer.session.edits import Restart, SetController
+from robocov_app.viewer.session.editing.edits import Restart, SetController
 from robocov_app.viewer.session.files.session_file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
 

@@ -18,7 +18,7 @@ from robocov.files.documents import build_document_error, check_header
 from robocov.files.strictjson import locate_issues, parse_json, read_bytes
 from robocov.files.writing import replace_file
 from robocov_app.viewer.session.document import Node, SessionDocument
-from robocov_app.viewer.session.edits import DragRobot, Restart, SessionEdit
+from robocov_app.viewer.session.editing.edits import DragRobot, Restart, SessionEdit
 from robocov_app.viewer.session.files.lesson_checks import check_lesson_references
 from robocov_app.viewer.session.files.maps import FileContext, refuse_value
 from robocov_app.viewer.session.files.models import LessonModel, NodeModel, SessionModel

@@ -11,9 +11,9 @@ from robocov.conditions.communication import Inbox
 from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
 from robocov.team import Team
-from robocov_app.viewer.session.controller_choice import ControllerChoice
-from robocov_app.viewer.session.robot_properties import RobotProperties
-from robocov_app.viewer.session.scenario import SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
+from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 
 @dataclass(frozen=True, eq=False)

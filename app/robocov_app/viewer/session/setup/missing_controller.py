@@ -11,7 +11,7 @@ from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.team import Team
-from robocov_app.viewer.session.controller_choice import ControllerChoice
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from robocov.errors import MapError, ParameterError, RobocovError
 from robocov.mapfile import parse_density, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, to_json_value
 from robocov.world.free_positions import find_free_position
-from robocov_app.viewer.session.controller_choice import FileController
+from robocov_app.viewer.session.editing.map_edits import paint_density, replace_obstacles
 from robocov_app.viewer.session.files.fields import Position, RobotNumber, Step, build_refusal, convert_field
-from robocov_app.viewer.session.map_edits import paint_density, replace_obstacles
 from robocov_app.viewer.session.pane import Continuation, Pane
-from robocov_app.viewer.session.robot_properties import FileProperties
-from robocov_app.viewer.session.scenario import MAX_ROBOTS, SessionScenario
+from robocov_app.viewer.session.setup.controller_choice import FileController
+from robocov_app.viewer.session.setup.robot_properties import FileProperties
+from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS, SessionScenario
 
 MAX_PANE_NUMBER = 100
 MAX_BRUSH_RADIUS_M = 1e6

@@ -12,9 +12,9 @@ from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
 from robocov.scenario import Scenario
-from robocov_app.viewer.session.controller_choice import ControllerChoice, FileController
 from robocov_app.viewer.session.files.fields import Position, Text, convert_field, keep_none
-from robocov_app.viewer.session.robot_properties import FileProperties, RobotProperties
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice, FileController
+from robocov_app.viewer.session.setup.robot_properties import FileProperties, RobotProperties
 
 MAX_ROBOTS = 1000
 """Maximum number of robots in the window."""

@@ -1,0 +1,1 @@
+"""What a session simulates: map, team, controllers and their gains."""
