@@ -206,6 +206,36 @@ def test_public_methods_say_what_they_take_and_return(name: str) -> None:
     assert not incomplete
 
 
+def test_docstrings_of_further_names_in_the_reference_are_complete(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(ROOT / "app/handbook")
+    incomplete = []
+    for names in importlib.import_module("reference").OTHER_NAMES.values():
+        for name in names:
+            module, _, attribute = name.rpartition(".")
+            value = getattr(importlib.import_module(module), attribute)
+            sections = list_sections(value)
+            if "See Also" not in sections:
+                incomplete.append(f"{name}: See Also")
+            if not sections & {"Parameters", "Attributes"} and not inspect.isabstract(value):
+                incomplete.append(f"{name}: Parameters or Attributes")
+            if inspect.isfunction(value):
+                has_value = inspect.signature(value).return_annotation not in (None, "None")
+                if has_value and "Returns" not in sections:
+                    incomplete.append(f"{name}: Returns")
+    assert not incomplete
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_errors_that_public_functions_raise_are_documented(name: str) -> None:
+    value = DOCUMENTED[name]
+    if not inspect.isfunction(value):
+        return
+    tree = ast.parse(inspect.getsource(value))
+    if any(isinstance(node, ast.Raise) and node.exc is not None for node in ast.walk(tree)):
+        assert "Raises" in list_sections(value)
+
+
 @pytest.mark.parametrize("name", ["Lloyd", "Rapf", "Rpf", "Atlas"])
 def test_docstrings_of_controllers_list_their_gains_with_units(name: str) -> None:
     text = inspect.getdoc(getattr(rc, name)) or ""

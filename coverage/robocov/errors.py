@@ -80,11 +80,15 @@ class Issue(NamedTuple):
     path : tuple of str and int
         Path of the value that is wrong or missing.
     text : str
-        The place, the expected value and the actual value.
+        The position in the document, the expected value and the actual value.
     at_key : bool
         Whether the last key of the path is wrong, rather than its value.
     line, column : int or None
-        Place of the issue in the file, in lines and characters from 1; None if there is no file.
+        Position of the issue in the file, in lines and characters from 1; None if there is no file.
+
+    See Also
+    --------
+    MapError : The error that contains the issues of a map.
     """
 
     path: JsonPath

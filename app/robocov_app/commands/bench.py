@@ -162,7 +162,7 @@ def _print_machine(machine: dict[str, Any]) -> None:
     """Print the versions and the number of cores, below an explanation of the column "before"."""
     console = create_console()
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    console.print("before: approximate ratio before any code was compiled (commit 8838167)")
+    console.print("before: approximate ratio of the first version, in which no code was compiled")
     console.print(f"Python {machine['python']}, {machine['system']}, {machine['cores']} cores; {packages}")
 
 

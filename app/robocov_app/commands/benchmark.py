@@ -72,7 +72,7 @@ class Arguments(JsonOption):
     workers: int | None = None
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
-    """Address of a Dask scheduler whose workers do the runs."""
+    """Address of a Dask scheduler whose workers execute the runs."""
     sample: int = 10
     """Number of runs that verify repeats."""
     robots: int = 2

@@ -41,7 +41,7 @@ class Arguments(FigureOptions):
     speeds: Annotated[tuple[float, ...], tyro.conf.arg(metavar="SPEED ...")] = ()
     """Speed of each robot, or one for all, m/s; sites then belong to the first robot to arrive."""
     radius: float = DEFAULT_RADIUS_M
-    """Radius of the smallest robot, m. What lies behind a narrower gap is uncovered; 0 for points."""
+    """Radius of the smallest robot, m. Space behind narrower gaps counts as uncovered; 0 for points."""
     lattice: int = 128
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None

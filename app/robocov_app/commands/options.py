@@ -220,7 +220,7 @@ class VideoOptions(LayerOptions):
     film_speed: float = 4.0
     """Simulated seconds per second of video."""
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
-    """Colors (default: light; in a window the last ones)."""
+    """Colors (default: light; in a window, those of the last window)."""
     colors: Literal["paper", "robots"] = "paper"
     """Colors of trajectories, also in videos: the paper's red, or one color per robot."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
@@ -285,7 +285,7 @@ class ScenarioOptions:
     robots: int = DEFAULT_ROBOTS
     """Number of robots."""
     start: str | None = None
-    """Named start of the map; the map's first by default."""
+    """Name of a start of the map; by default the first one."""
     seed: int = 0
     """Seed of the starting positions, the same for every controller."""
     dt: float = DEFAULT_DT_S

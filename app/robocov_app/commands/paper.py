@@ -50,7 +50,7 @@ class Arguments(JsonOption):
     workers: int | None = None
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
-    """Address of a Dask scheduler whose workers do the runs, as in tcp://host:8786."""
+    """Address of a Dask scheduler whose workers execute the runs, as in tcp://host:8786."""
     keep_versions: bool = False
     """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
 

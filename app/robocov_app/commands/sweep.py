@@ -26,7 +26,7 @@ FAILED = 1
 
 @dataclass
 class Arguments(JsonOption):
-    """Run a parameter study in parallel: every combination of the values in a study file, each once.
+    """Run every combination of the values in a study file, in parallel on all cores.
 
     The folder contains results.csv, with one row per run, and a folder for each run. For the same map and
     seed, all controllers start from the same positions.
@@ -54,7 +54,7 @@ class Arguments(JsonOption):
     workers: int | None = None
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None
-    """Address of a Dask scheduler whose workers do the runs, as in tcp://host:8786."""
+    """Address of a Dask scheduler whose workers execute the runs, as in tcp://host:8786."""
     parquet: bool = False
     """Write the table as results.parquet, too (pip install "robocov[parquet]")."""
     retry_failed: bool = False
@@ -62,7 +62,7 @@ class Arguments(JsonOption):
     keep_versions: bool = False
     """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
     dry_run: bool = False
-    """Count the runs, do one, estimate the time and disk space of all, and write nothing."""
+    """Count the runs, execute one of them, estimate time and disk space of all, and write nothing."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:

@@ -43,7 +43,7 @@ _KINDS = [
     (r"%!PS", "PostScript", "ps2pdf {name}, then pdftocairo -svg"),
     (r"GIF8|RIFF.{4}WEBP|\0\0\0.jP  |.{4}ftyp(?:heic|avif|mif1)|8BPS|gimp xcf", "a picture", _PNG),
     (r"\x80[\x02-\x05][\x95\x8c\]}(cK]", "a Python pickle", "save its polygons as GeoJSON or WKT"),
-    (r"\x93NUMPY", "a NumPy array", "save it as a picture"),
+    (r"\x93NUMPY", "a NumPy array", "save it as an image"),
     (r"version https://git-lfs", "a Git LFS pointer, not the file itself", "git lfs pull"),
     (_XML + r"html\b", "a web page, not the file itself", "download the raw file"),
     # except for IMDF, which `robocov_app.formats.geodata.imdf` reads

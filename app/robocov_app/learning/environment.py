@@ -62,6 +62,10 @@ def draw_episode(
         If the positions are invalid, or the map has no start of the given name.
     InputError
         If a map cannot be read.
+
+    See Also
+    --------
+    EpisodeEnv : Base class of environments that run episodes.
     """
     options = options or {}
     environment = sampler.draw(rng)
@@ -170,6 +174,11 @@ class EpisodeEnv:
         If a value is out of range.
     InputError
         If a map cannot be read.
+
+    See Also
+    --------
+    CoverageEnv : Environment with one agent for all robots, for gymnasium.
+    CoverageParallelEnv : Environment with one agent per robot, for PettingZoo.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": _FRAME_RATE}

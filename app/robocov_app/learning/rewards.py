@@ -61,6 +61,10 @@ def share_reward(
     -------
     (n,) array, m
 
+    See Also
+    --------
+    CoverageTask : Task of an environment, with its reward.
+
     Notes
     -----
     The decrease that a robot's own motion caused is the negative scalar product of its displacement and the

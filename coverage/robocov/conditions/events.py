@@ -96,6 +96,10 @@ class JoinedRobot(NamedTuple):
         Simulation time at which it joined.
     position, requested_position : (x, y), m
         Position at which it joined, and the position that was requested.
+
+    See Also
+    --------
+    Join : Request that a robot joins late.
     """
 
     robot: int

@@ -134,10 +134,19 @@ def get_information(controller: Any) -> Information:
     controller : Controller or type
         A controller, or a class of controllers.
 
+    Returns
+    -------
+    str
+        "own", "shared map" or "whole map".
+
     Raises
     ------
     ParameterError
         If its attribute ``information`` is not one of `Information`.
+
+    See Also
+    --------
+    get_gains : Return the gains of a controller.
 
     Examples
     --------

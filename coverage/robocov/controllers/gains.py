@@ -245,6 +245,17 @@ def get_gains(controller: Any) -> dict[str, Gain | Option]:
     -------
     dict of str to Gain or Option
         Gains by name. A plain number in a user's dataclass is a gain with a very wide range.
+
+    See Also
+    --------
+    gain : Declare a gain of a controller.
+    make_controller : Build a controller from its name and gains.
+
+    Examples
+    --------
+    >>> from robocov.controllers import Rapf, get_gains
+    >>> get_gains(Rapf)["k_rep"].unit
+    'N m³'
     """
     if not is_dataclass(controller):
         return {}

@@ -49,6 +49,10 @@ class Gap(NamedTuple):
         Diameter of the largest disc that fits through.
     between : pair of (x, y), m
         Points at which the walls face each other.
+
+    See Also
+    --------
+    find_narrowest_gap : Find the narrowest passage of the free space.
     """
 
     width: float

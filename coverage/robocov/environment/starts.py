@@ -129,6 +129,10 @@ class Start:
         Where robots may start.
     free : geometry, m
         Free space of the environment.
+
+    See Also
+    --------
+    Environment.start : Return a start of an environment by its name.
     """
 
     name: str

@@ -83,6 +83,10 @@ class MapReport:
         Smallest and largest value of the density.
     mean_density : float
         Mean of the density over the free space.
+
+    See Also
+    --------
+    check_map : Check a map, and return its report.
     """
 
     name: str

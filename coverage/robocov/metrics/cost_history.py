@@ -37,6 +37,10 @@ class CostHistory(Drawable):
     mean_time : (K,) array or None, s
         Mean over the points of the map of the time until the first robot arrives, if every robot drives at
         its maximum speed. None if all robots have the same maximum speed.
+
+    See Also
+    --------
+    compute_cost_history : Compute the cost over a run.
     """
 
     _drawing_name = "history"

@@ -16,7 +16,13 @@ from robocov.density.cell_edges import POLAR_MOMENT, CellEdges
 
 @dataclass(eq=False)
 class Cells(ABC):
-    """The cells of robots in a region. Edges, outlines and polar moments are computed on first use."""
+    """The cells of robots in a region. Edges, outlines and polar moments are computed on first use.
+
+    See Also
+    --------
+    VoronoiPartition : Cells of the nearest robot.
+    WeightedCells : Cells of the first robot to arrive.
+    """
 
     generators: Array
     """(n, 2) m, the points to which the cells belong."""

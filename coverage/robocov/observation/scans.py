@@ -30,6 +30,10 @@ class Scanning:
     ------
     ParameterError
         If a value is out of range.
+
+    See Also
+    --------
+    Scans : The scans that the controller receives.
     """
 
     rays: int = 120
@@ -69,6 +73,10 @@ class Scans:
         Distance to the first obstacle along each ray; the robot's sensing range if there is none.
     hit : (n, rays) bool array
         Whether there is an obstacle within the sensing range.
+
+    See Also
+    --------
+    Scanning : Settings with which a controller requests scans.
     """
 
     distances: Array

@@ -35,7 +35,7 @@ class Arguments(JsonOption):
       imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
-                 an unknown value is answered with the known ones; svg also by color, as a picture
+                 svg also accepts the color options of picture
 
     --ignore-layer (or --skip) and --only select by the name of a layer, group, class or shape. Options with
     several values can be repeated.

@@ -50,7 +50,7 @@ class AtlasShared(Atlas):
 
     name = "atlas-shared"
     label = "Atlas, shared maps"
-    summary = "as Atlas, with maps merged among the robots that hear each other"
+    summary = "Atlas, with maps that robots within communication range share"
     information = "shared map"
     is_staggered = False
 
