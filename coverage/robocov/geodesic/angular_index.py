@@ -225,10 +225,10 @@ def is_box_hidden(boxes: Array, box: int, index: AngularWallIndex, source: int) 
 
 @kernel
 def _wrap_bin(unwrapped_bin: int, bin_count: int) -> int:
-    """Return the bin from 0 up to `bin_count` that contains the same directions, whole turns apart.
+    """Convert the index of a bin that was counted beyond a full turn, or backward, to 0 up to `bin_count`.
 
     Since `bin_count` is a power of 2, the bit mask gives the remainder of the division by it, also for a
-    negative bin.
+    negative index.
     """
     return unwrapped_bin & (bin_count - 1)
 

@@ -553,7 +553,7 @@ def _build_configuration_space(cost: CoverageCost, is_covered: BoolArray, radius
 
     The area may be slightly too large, but is never too small, so that the bound holds for every placement.
     """
-    # The arcs around corners are replaced by two chords each. These are closer to the corners than the arcs,
+    # Two chords replace each quarter circle around a corner. They are closer to the corner than the circle,
     # which makes the area larger.
     areas = compute_center_areas(
         cost.environment.free, cost.closed_environment.free, _EROSION * radius, edges_per_quarter=2
