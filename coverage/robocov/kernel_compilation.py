@@ -38,6 +38,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.files.writing import replace_file
+from robocov.geodesic import Geodesics
 from robocov.metrics import compute_cost_history, summarize
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -123,6 +124,12 @@ def call_density_kernels() -> None:
         CoverageCost(environment, 2)(simulation.positions)
 
 
+def call_path_kernels() -> None:
+    """Call the kernels of shortest paths."""
+    path = Geodesics(_DIVIDED_MAP).find_path(np.array([0.5, 0.5]), np.array([5.0, 0.5]))
+    assert len(path) > 2, "the path leads around the end of the wall"
+
+
 def call_controller_kernels() -> None:
     """Call the kernels of all built-in controllers, on a map with a wall around which they plan routes."""
     for controller in CONTROLLERS.values():
@@ -140,6 +147,7 @@ ALL_EXAMPLES: tuple[Example, ...] = (
     call_large_team_kernels,
     call_team_kernels,
     call_density_kernels,
+    call_path_kernels,
     call_controller_kernels,
 )
 """Examples for all kernels."""

@@ -20,10 +20,12 @@ from robocov.compiled import (
     is_interpreting,
     open_cache_folder,
 )
-from robocov.controllers import Controller, Lloyd, Rapf
+from robocov.controllers import CONTROLLERS, Controller, Lloyd, Rapf
 from robocov.environment import Environment
 from robocov.kernel_compilation import (
     are_kernels_compiled,
+    call_controller_kernels,
+    call_path_kernels,
     call_step_kernels,
     compile_in_background,
     compile_kernels,
@@ -141,6 +143,20 @@ def test_a_kernel_is_interpreted_for_types_without_machine_code(
     read_only = np.ones(3)
     read_only.setflags(write=False)
     assert compilation.must_interpret(double.name, (read_only,))
+
+
+@pytest.mark.slow
+def test_examples_call_the_kernels_of_planned_routes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Examples on an open map did not, so that windows compiled these kernels at the first detour."""
+    name = "frontier-median"
+    monkeypatch.setattr(kernel_compilation, "CONTROLLERS", {name: CONTROLLERS[name]})
+    call_path_kernels()
+    call_controller_kernels()
+    compiled_types = compiled.list_compiled_kernels()
+    assert "robocov.geodesic.geodesics._find_corner_distances" in compiled_types
+    read_only = "Array(float64, 1, 'C', False, aligned=True)"
+    nodes = compiled_types["robocov.planning.lattice.find_nearest_nodes"]
+    assert any(types.startswith(read_only) for types in nodes), nodes
 
 
 @pytest.mark.slow
