@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from driven_window import Driver
 from sample_sessions import PILLAR, advance_session
 
 from robocov_app.toolkit.widgets.icons import ICONS
-from robocov_app.viewer.chart.branch_tree import MAX_BRANCH_LINES, list_branch_lines
+from robocov_app.viewer.chart.branch_tree import MAX_BRANCH_LINES, find_branch_line, list_branch_lines
 from robocov_app.viewer.chart.events import _EVENT_ICONS, _OTHER_EVENT_ICON, select_badges
 from robocov_app.viewer.session.editing.map_edits import add_obstacle
 
@@ -55,6 +57,17 @@ def test_a_branch_is_described_under_the_pointer(driver: Driver) -> None:
     driver.run_frames(1)
     assert driver.window.chart._describe_ghost(driver.at) == line.text
     assert not driver.shows_frame(before)
+
+
+def test_a_branch_beyond_the_axis_ends_there(driver: Driver) -> None:
+    """A lesson starts at time 0, and its axis is shorter than the branches of the session before."""
+    branch_off(driver)
+    chart = driver.window.chart
+    long_line = replace(chart.branch_lines[0], end_time=1e4)
+    box = chart.get_branch_box(long_line)
+    assert box.right <= chart._frame.times.right + 5 * driver.window.layout.scale
+    pixel = (round(chart._frame.times.right) + 30, box.centery)
+    assert find_branch_line(chart._frame, [long_line], pixel) is None
 
 
 def test_a_branch_is_entered_by_the_keyboard(driver: Driver) -> None:

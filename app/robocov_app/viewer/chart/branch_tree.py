@@ -127,10 +127,11 @@ def draw_branch_tree(
         is_hovered = line.node == hovered
         color = theme.accent if is_hovered else mix(theme.panel, theme.ink, _LINE_STRENGTH)
         row = _get_row(frame, line.lane)
-        left = round(frame.times.to_column(line.start_time))
-        right = max(round(frame.times.to_column(line.end_time)), left)
+        left, right = _get_columns(frame, line)
         pygame.draw.line(screen, color, (left, _get_row(frame, line.parent_lane)), (left, row), width)
         pygame.draw.line(screen, color, (left, row), (right, row), width)
+        if line.end_time > frame.times.end:
+            continue  # The branch ends beyond the axis.
         radius = _HOVERED_DOT_RADIUS_PX if is_hovered else _DOT_RADIUS_PX
         pygame.draw.aacircle(screen, color, (right, row), round(radius * frame.scale))
 
@@ -141,9 +142,9 @@ def find_branch_line(
     """Return the line at a pixel of the window; None if there is none."""
     reach = _REACH_PX * frame.scale
     for line in lines:
-        left = frame.times.to_column(line.start_time) - reach
-        right = frame.times.to_column(line.end_time) + reach
-        if abs(pixel[1] - _get_row(frame, line.lane)) < reach and left <= pixel[0] <= right:
+        left, right = _get_columns(frame, line)
+        is_beside = left - reach <= pixel[0] <= right + reach
+        if is_beside and abs(pixel[1] - _get_row(frame, line.lane)) < reach:
             return line
     return None
 
@@ -151,10 +152,17 @@ def find_branch_line(
 def get_line_box(frame: ChartFrame, line: BranchLine) -> pygame.Rect:
     """Return the area of a line in the window."""
     reach = round(_REACH_PX * frame.scale)
-    left = round(frame.times.to_column(line.start_time))
-    right = round(frame.times.to_column(line.end_time))
+    left, right = _get_columns(frame, line)
     row = _get_row(frame, line.lane)
     return pygame.Rect(left - reach, row - reach, right - left + 2 * reach, 2 * reach)
+
+
+def _get_columns(frame: ChartFrame, line: BranchLine) -> tuple[int, int]:
+    """Return the columns of the window at which a line starts and ends; it ends at the end of the axis."""
+    times = frame.times
+    left = round(min(times.to_column(line.start_time), times.right))
+    right = round(min(times.to_column(line.end_time), times.right))
+    return left, max(left, right)
 
 
 def _get_row(frame: ChartFrame, lane: int) -> int:
