@@ -150,7 +150,7 @@ def record_messages(browser):
     return lambda: [each for each in browser.run_script("return kept.splice(0)") if each["kind"] != "shown"]
 
 
-def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_path):
+def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_path):
     set_size(browser, 1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
@@ -163,6 +163,10 @@ def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_pa
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "watching map")
+        assert browser.find("#line").text.startswith("You watch Teacher 1")
+        assert not any(button.is_displayed() for button in browser.find_all("#touch button"))
+        browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
         browser.run_script("tell({kind: 'control', to: 0})")
         phone = browser.driver.current_window_handle
         browser.driver.switch_to.window(projector)
@@ -175,13 +179,16 @@ def test_a_phone_asks_for_control_and_gets_the_projectors_window(browser, tmp_pa
         browser.wait_until(lambda: browser.run_script("return document.body.className") == "watching")
         assert not browser.find("#toast").is_displayed()
         browser.driver.switch_to.window(phone)
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
-        assert get_canvas_size(browser) == [1280, 720], "the projector keeps its size"
+        browser.wait_until(lambda: browser.run_script("return document.body.className") == "map")
         assert browser.run_script("return canvas.getBoundingClientRect().width") <= 390
-        browser.press_keys("w")
+        browser.run_script("document.getElementById('choose').click()")
+        wall = next(button for button in browser.find_all("#tools button") if button.text == "Wall")
+        wall.click()
         browser.wait_until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
+        assert not browser.find("#tools").is_displayed()
         browser.driver.close()
         browser.driver.switch_to.window(projector)
+        assert get_canvas_size(browser) == [1280, 720], "the projector keeps its size"
         assert not browser.read_console()
 
 
@@ -258,18 +265,18 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
         set_size(browser, 390, 844, 3.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
-            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2400])
+            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2388])
             narrow = wait_for_rest(browser)
             box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
             assert browser.run_script(f"{box} return [box.left, box.top, box.width, box.height]") == [
                 0,
                 0,
                 390,
-                800,
+                796,
             ]
             assert (
                 browser.run_script("return document.getElementById('touch').getBoundingClientRect().top")
-                == 800
+                == 796
             )
             browser.find("[data-key=h]").click()
             browser.wait_until(lambda: read_picture(browser) != narrow)
