@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import count
+from itertools import count, pairwise
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -26,6 +26,7 @@ from robocov.planning.lattice import (
     find_nearest_nodes,
 )
 from robocov.planning.map_window import MapWindow
+from robocov.planning.portals import Portals, add_portals, find_portals
 from robocov.planning.window import Window
 
 _MAX_ROUTE_ENDS = 12
@@ -104,8 +105,8 @@ class GridPlanner(MapWindow):
         return later
 
     @cached_property
-    def _edges(self) -> Edges:
-        """Edges between nodes; those through unknown cells are longer."""
+    def _moves(self) -> Edges:
+        """Straight edges between neighboring nodes; those through unknown cells are longer."""
         return build_edges(
             cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.has_clearance),
             rows=self.window.rows,
@@ -115,11 +116,27 @@ class GridPlanner(MapWindow):
         )
 
     @cached_property
+    def _portals(self) -> Portals:
+        """Paths through passages that the straight edges miss."""
+        rows, columns = np.indices((self.window.rows, self.window.columns)).reshape(2, -1)
+        stride = self.window.stride
+        return find_portals(
+            is_passable=self.is_free & ~self.is_tight,
+            node_cells=np.column_stack([rows, columns]) * stride + stride // 2,
+            graph=_build_graph(self._moves),
+        )
+
+    @cached_property
+    def _edges(self) -> Edges:
+        """All edges between nodes: the straight ones, and the portals."""
+        if not len(self._portals.paths):
+            return self._moves
+        return add_portals(self._moves, self._portals, self.known_map.raster.cell_size)
+
+    @cached_property
     def _graph(self) -> csr_array:
         """The edges as a sparse matrix."""
-        edges = self._edges
-        shape = (len(self.nodes), len(self.nodes))
-        return csr_array((edges.lengths, edges.ends, edges.first_edge), shape=shape)
+        return _build_graph(self._edges)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -344,10 +361,36 @@ class GridPlanner(MapWindow):
         while path[-1] != first:
             path.append(int(predecessor[path[-1]]))
         path.reverse()
-        points = self.nodes[path]
+        points = self._expand_portals(path)
         if is_visible.any():
             points = np.vstack([points, goal])
         return self._remove_detours(position, points)
+
+    def _expand_portals(self, path: Sequence[int]) -> Array:
+        """Return the positions along a path of nodes, (k, 2) m, with those of the cells in its portals."""
+        if not len(self._portals.paths):
+            return np.asarray(self.nodes[path])
+        raster = self.known_map.raster
+        origin = np.array([self.window.first_row, self.window.first_column])
+        positions = [self.nodes[path[:1]]]
+        for node, next_node in pairwise(path):
+            cells = self._portal_cells.get((node, next_node))
+            if cells is not None:
+                positions.append(raster.compute_centers(*(cells + origin).T))
+            positions.append(self.nodes[[next_node]])
+        return np.concatenate(positions)
+
+    @cached_property
+    def _portal_cells(self) -> dict[tuple[int, int], IntArray]:
+        """The cells of the portal from one node to another, by the two nodes."""
+        cells = {}
+        portals = self._portals
+        for first, last, path in zip(
+            portals.first_nodes.tolist(), portals.last_nodes.tolist(), portals.paths, strict=True
+        ):
+            cells[first, last] = path
+            cells[last, first] = path[::-1]
+        return cells
 
     def _find_shortest_paths(self, node: int) -> tuple[Array, IntArray]:
         """Return the distances from a node to all nodes, m, and the node before each on the shortest path."""
@@ -386,6 +429,12 @@ class GridPlanner(MapWindow):
             remaining.append(current)
             k += 1
         return np.array(remaining)
+
+
+def _build_graph(edges: Edges) -> csr_array:
+    """Return edges as a sparse matrix."""
+    node_count = len(edges.first_edge) - 1
+    return csr_array((edges.lengths, edges.ends, edges.first_edge), shape=(node_count, node_count))
 
 
 _PLANNERS_IN_USE: WeakValueDictionary[tuple[int, Window, float], GridPlanner] = WeakValueDictionary()
