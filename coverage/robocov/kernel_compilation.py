@@ -10,6 +10,7 @@ and a file there marks the example as ready. No two processes call the same exam
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -40,6 +41,11 @@ from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.files.writing import replace_file
 from robocov.geodesic import Geodesics
 from robocov.metrics import compute_cost_history, summarize
+from robocov.observation.region import Region
+from robocov.planning import raster as planning_raster
+from robocov.planning.discovered_map import FREE, WALL, DiscoveredMap
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.window import Window
 from robocov.simulation import Simulation
 from robocov.team import Team
 
@@ -138,6 +144,18 @@ def call_controller_kernels() -> None:
             simulation.step()
 
 
+def call_planning_kernels() -> None:
+    """Call the kernels that only routes on large maps need."""
+    raster = planning_raster.Raster(Region(np.array(_SQUARE)), cell_size=0.1)
+    state = np.full(raster.shape, FREE, dtype=np.uint8)
+    state[:33, 30] = WALL
+    state[38:, 30] = WALL
+    middle = np.array([3.0, 3.0])
+    window = Window.build_around(raster, middle, reach=math.inf, max_nodes=16)
+    planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)
+    planner.find_route(np.array([1.0, 1.0]), np.array([5.0, 1.0]))
+
+
 COMMON_EXAMPLES: tuple[Example, ...] = (call_cost_kernels, call_step_kernels, call_summary_kernels)
 """Examples for a run of the controllers of the paper, and its summary."""
 ALL_EXAMPLES: tuple[Example, ...] = (
@@ -149,6 +167,7 @@ ALL_EXAMPLES: tuple[Example, ...] = (
     call_density_kernels,
     call_path_kernels,
     call_controller_kernels,
+    call_planning_kernels,
 )
 """Examples for all kernels."""
 

@@ -1,8 +1,9 @@
 """Measure the goals of the controller `atlas` that the benchmark's tracks do not cover.
 
-    python tests/bench/bench_atlas.py doors sizes ranges rest pace --controller atlas-shared
+    python tests/bench/bench_atlas.py doors large-maps sizes ranges rest pace --controller atlas-shared
 
 - ``doors``: whether robots find narrow doors in walls of random direction
+- ``large-maps``: the same on larger maps, where nodes of planners are farther apart
 - ``sizes``: whether a larger team is ever worse than a smaller one
 - ``ranges``: gaps, rest and path lengths with limited ranges, beside `rapf`
 - ``rest``: whether a team that has rested for ten minutes responds to a failure and to an open door
@@ -51,6 +52,11 @@ DOOR_WIDTH_RANGE = (1.6, 3.0)
 MAX_DOOR_OFFSET_M = 1.5
 """Maximum distance of a door from the center of its wall."""
 MAX_CROSSING_TIME_S = 30.0
+SIDES_M = (8.0, 16.0, 25.0, 40.0)
+"""Sides of larger squares."""
+DOOR_WIDTHS_M = (0.4, 0.5, 0.6)
+DOORS_PER_WIDTH = 5
+MAX_LARGE_MAP_TIME_S = 120.0
 CROSSED_DISTANCE_M = 0.15
 """A robot has crossed the wall if its center is this far behind the wall's center line."""
 
@@ -97,7 +103,9 @@ class LimitedRun(NamedTuple):
     """m"""
 
 
-def build_wall(direction: float, door_offset: float, door_width: float) -> tuple[WallObstacle, WallObstacle]:
+def build_wall(
+    direction: float, door_offset: float, door_width: float, side: float = SQUARE_SIDE_M
+) -> tuple[WallObstacle, WallObstacle]:
     """Build the two halves of a wall with a door, through the center of the square.
 
     Parameters
@@ -107,14 +115,16 @@ def build_wall(direction: float, door_offset: float, door_width: float) -> tuple
     door_offset : float, m
         Position of the door along the wall, from the center of the square.
     door_width : float, m
+    side : float, m
+        Side of the square.
 
     Returns
     -------
     tuple of two WallObstacle
     """
     along = np.array([-math.sin(direction), math.cos(direction)])
-    center = 0.5 * SQUARE_SIDE_M
-    half_length = 0.75 * SQUARE_SIDE_M
+    center = 0.5 * side
+    half_length = 0.75 * side
     half_width = 0.5 * door_width
     ends = [-half_length, door_offset - half_width, door_offset + half_width, half_length]
     points = [(float(x), float(y)) for x, y in center + np.outer(ends, along)]
@@ -123,24 +133,48 @@ def build_wall(direction: float, door_offset: float, door_width: float) -> tuple
     return first_half, second_half
 
 
-def build_divided_square(name: str, wall: tuple[WallObstacle, WallObstacle]) -> Environment:
-    """Build the square with a wall through its center."""
-    side = SQUARE_SIDE_M
+def build_divided_square(
+    name: str, wall: tuple[WallObstacle, WallObstacle], side: float = SQUARE_SIDE_M
+) -> Environment:
+    """Build a square with a wall through its center."""
     return Environment(name, ((0.0, 0.0), (side, 0.0), (side, side), (0.0, side)), wall)
 
 
-def crosses_door(controller: str, seed: int) -> bool:
+def crosses_random_door(controller: str, seed: int) -> bool:
     """Return whether one of three robots passes through a random door in time."""
     rng = np.random.default_rng(seed)
     door_width = 2.0 * ROBOT_RADIUS_M * rng.uniform(*DOOR_WIDTH_RANGE)
+    return crosses_door(controller, rng, door_width, SQUARE_SIDE_M, MAX_CROSSING_TIME_S)
+
+
+def crosses_door(
+    controller: str, rng: np.random.Generator, door_width: float, side: float, max_time: float
+) -> bool:
+    """Return whether one of three robots passes through a door at a random place in time.
+
+    Parameters
+    ----------
+    controller : str
+    rng : numpy.random.Generator
+        Draws the direction of the wall and the place of the door.
+    door_width : float, m
+    side : float, m
+        Side of the square.
+    max_time : float, s
+
+    Returns
+    -------
+    bool
+    """
     direction = rng.uniform(0.0, math.tau)
     door_offset = rng.uniform(-MAX_DOOR_OFFSET_M, MAX_DOOR_OFFSET_M)
-    environment = build_divided_square("door", build_wall(direction, door_offset, door_width))
+    wall = build_wall(direction, door_offset, door_width, side)
+    environment = build_divided_square("door", wall, side)
     normal = np.array([math.cos(direction), math.sin(direction)])
-    center = 0.5 * SQUARE_SIDE_M
+    center = 0.5 * side
     starts = center - 2.0 * normal + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
     simulation = Simulation(environment, make_controller(controller), starts)
-    while simulation.time < MAX_CROSSING_TIME_S:
+    while simulation.time < max_time:
         simulation.step()
         if ((simulation.positions - center) @ normal).max() >= CROSSED_DISTANCE_M:
             return True
@@ -149,10 +183,27 @@ def crosses_door(controller: str, seed: int) -> bool:
 
 def measure_doors(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """Yield the number of random doors that robots pass through."""
-    is_crossed = np.array(list(pool.map(partial(crosses_door, controller), range(count))))
+    is_crossed = np.array(list(pool.map(partial(crosses_random_door, controller), range(count))))
     failed_seeds = np.flatnonzero(~is_crossed)
     low, high = DOOR_WIDTH_RANGE
     yield f"{is_crossed.sum()} of {count} doors of {low:g} to {high:g} diameters crossed; not {failed_seeds}"
+
+
+def crosses_door_on_large_map(controller: str, case: tuple[float, float, int]) -> bool:
+    """Return whether a robot passes through a door, for a side of the square, a width and a seed."""
+    side, door_width, seed = case
+    return crosses_door(controller, np.random.default_rng(seed), door_width, side, MAX_LARGE_MAP_TIME_S)
+
+
+def measure_large_maps(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield the number of doors that robots pass through, by the side of the square and the doors' width."""
+    for side in SIDES_M:
+        cases = [(side, width, seed) for width in DOOR_WIDTHS_M for seed in range(DOORS_PER_WIDTH)]
+        is_crossed = list(pool.map(partial(crosses_door_on_large_map, controller), cases))
+        crossed_counts = np.reshape(is_crossed, (len(DOOR_WIDTHS_M), DOORS_PER_WIDTH)).sum(axis=1)
+        counts = ", ".join(map(str, crossed_counts.tolist()))
+        widths = ", ".join(f"{width:g}" for width in DOOR_WIDTHS_M)
+        yield f"{side:g} m: {counts} of {DOORS_PER_WIDTH} doors of {widths} m crossed"
 
 
 def run_in_rooms(controller: str, seed: int, communication_range: float, robots: int) -> FinalState:
@@ -279,6 +330,7 @@ def measure_pace(controller: str, count: int, pool: ProcessPoolExecutor) -> Iter
 Measure: TypeAlias = Callable[[str, int, ProcessPoolExecutor], Iterator[str]]
 MEASURES: Mapping[str, Measure] = {
     "doors": measure_doors,
+    "large-maps": measure_large_maps,
     "sizes": measure_sizes,
     "ranges": measure_ranges,
     "rest": measure_rest,
