@@ -148,8 +148,8 @@ def call_planning_kernels() -> None:
     """Call the kernels that only routes on large maps need."""
     raster = planning_raster.Raster(Region(np.array(_SQUARE)), cell_size=0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)
-    state[:33, 30] = WALL
-    state[38:, 30] = WALL
+    state[:34, 30] = WALL
+    state[37:, 30] = WALL
     middle = np.array([3.0, 3.0])
     window = Window.build_around(raster, middle, reach=math.inf, max_nodes=16)
     planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)
