@@ -1,10 +1,10 @@
-"""The occupancy grid of one robot, built from its own range scans.
+"""The occupancy grid of one robot, built from range scans.
 
 All cells are *unknown* at first. A cell becomes *free* when a ray or a robot passes through it. It becomes a
-*wall* when a ray ends in it, and remains one until several rays have passed through it since a ray last ended
-there. If the ends of neighboring rays are close together, they belong to one surface: the cells between them
-are *presumed* to be wall until a ray passes through them. Routes may lead through unknown cells. In the
-coverage cost, these are weighted by their `openness`.
+*wall* when a ray ends in it, and remains one until several later rays have passed through it. If the ends of
+neighboring rays are close together, they are taken to belong to one surface: the cells between them are
+*presumed walls* until a ray passes through them. Routes may lead through unknown cells. In the coverage cost,
+unknown cells are weighted by their `openness`.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ be closed.
 _RAY_STEP_CELLS = 0.7
 """Distance between the sampled points of a ray."""
 _END_DEPTH_CELLS = 0.25
-"""A hit is attributed to the cell this far behind the end of the ray, which may lie on a cell border."""
+"""Distance beyond the end of a ray at which its hit is counted, since the end may lie between two cells."""
 _CORE_HALF_WIDTH_CELLS = 0.3
-"""A ray clears a presumed wall only if it passes this close to the center of the cell."""
+"""Distance from the center of a presumed wall, in x and y, within which a ray must pass to free the cell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +115,8 @@ class DiscoveredMap:
         distances : (k, rays) array, m
         is_hit : (k, rays) bool array
         robot_radius : float or None, m
-            Radius around each position within which cells become free, unless they are walls. None: they stay
-            as they are.
+            Radius around each position within which cells become free, unless they are walls. None: only
+            the cells that rays pass through become free.
 
         Returns
         -------
@@ -179,14 +179,14 @@ class DiscoveredMap:
         return DiscoveredMap(self.raster, state)
 
 
-def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
+def dilate(is_blocked: BoolArray, radius: float) -> BoolArray:
     """Find the cells close to blocked ones. Everything outside the array counts as blocked.
 
     Parameters
     ----------
     is_blocked : (rows, columns) bool array
-    reach : float
-        Maximum distance between the centers of two cells, in cells.
+    radius : float
+        Maximum distance between the center of a cell and that of a blocked cell, in cells.
 
     Returns
     -------
@@ -204,12 +204,12 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
     rows, columns = is_blocked.shape
     # A view of the padded array that starts at (margin + up, margin + right) contains, for each cell, the one
     # that is `up` rows above it and `right` columns to the right.
-    margin = int(reach)
+    margin = int(radius)
     padded = np.pad(is_blocked, margin, constant_values=True)
     is_close = np.zeros_like(is_blocked)
     for up in range(-margin, margin + 1):
         for right in range(-margin, margin + 1):
-            if up**2 + right**2 <= reach * reach:
+            if up**2 + right**2 <= radius * radius:
                 first_row = margin + up
                 first_column = margin + right
                 is_close |= padded[first_row : first_row + rows, first_column : first_column + columns]
@@ -218,9 +218,10 @@ def dilate(is_blocked: BoolArray, reach: float) -> BoolArray:
 
 @kernel
 def _count_opened_walls(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
-    """Count the cells that were walls before and are now free, like their eight neighbors.
+    """Count the cells that were walls before, and are now free together with their eight neighbors.
 
-    Cells at the border of a wall do not count: they may be free or wall, depending on the point of view.
+    Cells at the border of a wall do not count, because they may be free or wall, depending on the position
+    from which they are scanned.
     """
     count = 0
     rows, columns = before.shape
@@ -254,6 +255,7 @@ def _mark_passed_cells(
     rows, columns = state.shape
     step = _RAY_STEP_CELLS * grid.cell_size
     for ray in range(len(lengths)):
+        # Distance of the sampled point from the robot.
         along = 0.5 * _RAY_STEP_CELLS * grid.cell_size
         while along < lengths[ray] - step:
             x = position[0] + along * directions[ray, 0]
@@ -266,8 +268,8 @@ def _mark_passed_cells(
             elif cell_state > WALL:
                 state[row, column] = cell_state - 1
             elif cell_state == PRESUMED_WALL:
-                # The offset of the ray from the center of the cell, in cells: a ray that only cuts a corner
-                # of the cell proves nothing.
+                # The offset of the point from the center of the cell, in cells. A ray that only cuts a corner
+                # of the cell does not show that the cell is free.
                 offset_x = (x - grid.low_x) / grid.cell_size - column - 0.5
                 offset_y = (y - grid.low_y) / grid.cell_size - row - 0.5
                 if max(abs(offset_x), abs(offset_y)) < _CORE_HALF_WIDTH_CELLS:
@@ -288,7 +290,7 @@ def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, length
 
 @kernel
 def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
-    """Mark unknown cells between the ends of neighboring rays as presumed walls; confirm walls there.
+    """Mark unknown cells between the ends of neighboring rays as presumed walls, and known walls as certain.
 
     If the ends of two neighboring rays are close together, both have probably hit the same surface.
     """

@@ -30,23 +30,24 @@ from robocov.planning.portals import Portals, add_portals, find_portals
 from robocov.planning.window import Window
 
 _MAX_ROUTE_ENDS = 12
-"""Number of nodes that are tried as the first node of a route, and as the last."""
-_MAX_SOURCES = 180
-"""Maximum number of candidate goals of a team in a small window."""
-_NODES_PER_SOURCE = 9
-"""Minimum number of nodes per candidate goal in a large window."""
+"""Maximum number of nodes that are tried as the first node of a route, and as the last."""
+_MAX_CANDIDATES = 180
+"""Maximum number of nodes that may become goals of a team, in a small window."""
+_NODES_PER_CANDIDATE = 9
+"""Minimum number of nodes for each node that may become a goal, in a large window."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose visible nodes are cached."""
 NO_NODE = -1
-"""Stands for a node where there is none."""
+"""Index that stands for no node."""
 
 
 @dataclass(eq=False)
 class GridPlanner(MapWindow):
-    """Distances and routes in a window of a discovered map, around its walls.
+    """Distances and routes around known walls, in a window of a discovered map.
 
-    A planner computes each result only once, and robots that share a map share the planner. The m nodes are
-    given by their indices. For nodes *with clearance* and *tight* cells, see `MapWindow`.
+    A planner stores results that are needed several times, and robots that share a map share the planner.
+    Nodes are given by their indices, from 0 to m - 1. For nodes *with clearance* and cells *near a wall*, see
+    `MapWindow`.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ class GridPlanner(MapWindow):
     def _moves(self) -> Edges:
         """Straight edges between neighboring nodes; those through unknown cells are longer."""
         return build_edges(
-            cells=LatticeCells(self.is_tight, self.is_blocked, self.is_unknown, self.has_clearance),
+            cells=LatticeCells(self.is_near_wall, self.is_blocked, self.is_unknown, self.has_clearance),
             rows=self.window.rows,
             columns=self.window.columns,
             stride=self.window.stride,
@@ -155,25 +156,25 @@ class GridPlanner(MapWindow):
         )
 
     @cached_property
-    def sources(self) -> IntArray:
-        """Candidate goals for a team, (c,): the nodes with clearance in every k-th row and column.
+    def candidate_nodes(self) -> IntArray:
+        """Nodes that may become goals of a team, (c,): those with clearance in every k-th row and column.
 
-        The stride k is the smallest one that limits their number; see `_MAX_SOURCES`.
+        The step k is the smallest one for which there are not too many; see `_MAX_CANDIDATES`.
         """
-        max_sources = max(_MAX_SOURCES, len(self.nodes) // _NODES_PER_SOURCE)
-        row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
+        max_candidates = max(_MAX_CANDIDATES, len(self.nodes) // _NODES_PER_CANDIDATE)
+        rows, columns = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
             # One node in the middle of each block of k rows and k columns.
-            is_middle = (row % k == k // 2) & (column % k == k // 2)
-            sources = np.flatnonzero(self.has_clearance & is_middle)
-            if len(sources) <= max_sources:
+            is_middle = (rows % k == k // 2) & (columns % k == k // 2)
+            candidates = np.flatnonzero(self.has_clearance & is_middle)
+            if len(candidates) <= max_candidates:
                 break
-        return sources
+        return candidates
 
     @cached_property
-    def source_distances(self) -> Array:
-        """Distances from the sources to all nodes, (c, m) m."""
-        return self.compute_distance_table(self.sources)
+    def candidate_distances(self) -> Array:
+        """Distances from the candidate nodes to all nodes, (c, m) m."""
+        return self.compute_distance_table(self.candidate_nodes)
 
     def get_distances(self, node: int) -> Array:
         """Return the distances from a node to all nodes.
@@ -198,19 +199,19 @@ class GridPlanner(MapWindow):
         ----------
         nodes : sequence of int
         limit : float, m
-            Nodes farther away may be reported as infinitely far. A lower limit is faster.
+            The distances of nodes farther away may be infinite. A lower limit takes less time.
 
         Returns
         -------
         list of (m,) arrays, m
         """
-        tables = []
+        distances_by_node = []
         for node in nodes:
             distances = self._distances_of_node.get(node)
             if distances is None:
                 distances = self._search([node], [0.0], limit)
-            tables.append(distances)
-        return tables
+            distances_by_node.append(distances)
+        return distances_by_node
 
     def compute_distance_table(self, nodes: IntArray) -> Array:
         """Compute the distances from each of the given nodes to all nodes.
@@ -246,7 +247,7 @@ class GridPlanner(MapWindow):
         return self._search(np.concatenate(first_nodes), np.concatenate(lengths))
 
     def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
-        """Compute the distance from each node to the nearest of `nodes`, which start with offsets."""
+        """Compute the distance from each node to the nearest of `nodes`, where paths start with offsets, m."""
         return compute_distances(
             self._edges,
             self.spacing,
@@ -273,7 +274,7 @@ class GridPlanner(MapWindow):
         return int(np.where(self.has_clearance, squared_distances, np.inf).argmin())
 
     def find_own_node(self, position: Array) -> int:
-        """Find the node of a robot: the nearest node with clearance that it sees.
+        """Find the node that represents the position of a robot: the nearest one with clearance in its sight.
 
         Parameters
         ----------
@@ -282,13 +283,13 @@ class GridPlanner(MapWindow):
         Returns
         -------
         int
-            The nearest node with clearance if the robot sees none. `NO_NODE` if no node has clearance.
+            If no node is in sight, the nearest one with clearance. `NO_NODE` if no node has clearance.
         """
         visible = self._find_visible_nodes(position)
         return int(visible[0]) if len(visible) else NO_NODE
 
     def _find_visible_nodes(self, position: Array) -> IntArray:
-        """Return the nodes with clearance that are close to a position and in sight of it, nearest first.
+        """Return the nodes with clearance that are close to a position and in sight, the nearest first.
 
         If none is in sight, return only the nearest one with clearance.
         """
@@ -298,12 +299,12 @@ class GridPlanner(MapWindow):
                 self._visible_nodes.clear()
             close_nodes = self._find_close_nodes(position, self.has_clearance)
             is_visible = self.find_clear_lines(position, self.nodes[close_nodes], self.is_blocked)
-            # A robot that seems to be inside a wall is actually next to it.
+            # A robot in a cell that counts as wall is actually next to the wall, and sees no node.
             self._visible_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
         return self._visible_nodes[key]
 
     def _find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
-        """Return a limited number of candidates close to a position, the nearest first."""
+        """Return the candidates closest to a position, up to `_MAX_ROUTE_ENDS`, the nearest first."""
         return find_nearest_nodes(position, self.nodes, is_candidate, _MAX_ROUTE_ENDS)
 
     def find_clear_lines(
@@ -316,10 +317,10 @@ class GridPlanner(MapWindow):
         position : (2,) array, m
         ends : (k, 2) array, m
         is_obstructing : (h, w) bool array
-            For example `is_blocked` or `is_tight`.
+            For example `is_blocked` or `is_near_wall`.
         ignored_length : float, m
-            Cells closer to the position do not count: a robot may be too close to a wall, where a route can
-            start but not pass.
+            Cells closer to the position do not obstruct a line. Routes start at the position of a robot,
+            which may itself be too close to a wall.
 
         Returns
         -------
@@ -337,11 +338,12 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (w, 2) array, m
-            Waypoints, each in sight of the one before. The last one is the goal, or the closest node to it
-            that can be reached, or the position itself if no node can be reached. No tight cell is crossed
-            between waypoints. If the position itself is tight, the route leaves it in a straight line.
+            Waypoints, each in sight of the one before. The last one is the goal. If that cannot be reached,
+            it is the reachable node closest to the goal, or the position itself if no node can be reached.
+            Between waypoints, the route crosses no cell near a wall. If the position itself is near a wall,
+            the route leaves it in a straight line.
         """
-        is_direct = self.find_clear_lines(position, goal[None], self.is_tight, self.clearance)[0]
+        is_direct = self.find_clear_lines(position, goal[None], self.is_near_wall, self.clearance)[0]
         if is_direct:
             return np.array(goal[None])
         first = self._find_first_node(position)
@@ -353,7 +355,7 @@ class GridPlanner(MapWindow):
             return np.array(position[None])
         # The robot may be too close to a wall where its route starts, but not where it ends. Therefore no
         # cells around the goal are ignored.
-        is_visible = self.find_clear_lines(goal, self.nodes[close_nodes], self.is_tight)
+        is_visible = self.find_clear_lines(goal, self.nodes[close_nodes], self.is_near_wall)
         # The last node is the nearest one in sight of the goal, or simply the nearest one if none is in sight
         # (`argmax` returns the first True, or 0 if there is none).
         last = int(close_nodes[is_visible.argmax()])
@@ -398,32 +400,32 @@ class GridPlanner(MapWindow):
         return distances[0], predecessors[0]
 
     def _find_first_node(self, position: Array) -> int:
-        """Return the first node of a route, near the position, with clearance and in sight, or `NO_NODE`.
+        """Return the first node of a route: a node with clearance, close to a position and in sight.
 
-        If possible, no tight cell, which is too close to a wall, lies on the line to the node. Those around
-        the position do not count, because the robot may be too close to a wall.
+        If possible, the line to the node crosses no cell near a wall, except for those around the position:
+        the robot may itself be too close to a wall. `NO_NODE` if no such node is in sight.
         """
         close_nodes = self._find_close_nodes(position, self.has_clearance)
         ends = self.nodes[close_nodes]
-        is_visible = self.find_clear_lines(position, ends, self.is_tight, 2.0 * self.clearance)
+        is_visible = self.find_clear_lines(position, ends, self.is_near_wall, 2.0 * self.clearance)
         if not is_visible.any():
             is_visible = self.find_clear_lines(position, ends, self.is_blocked)
         return int(close_nodes[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
     def _remove_detours(self, position: Array, points: Array) -> Array:
-        """Return the waypoints without those that can be skipped, because later ones are in sight.
+        """Return the points of a route without those that can be skipped, because later ones are in sight.
 
-        A waypoint is in sight if no cell on the line to it is tight, that is, too close to a wall. On the
-        first line, cells around the robot do not count, because it may itself be too close to a wall.
+        A point is in sight if the line to it crosses no cell near a wall. On the first line, cells around the
+        position do not count, because the robot may itself be too close to a wall.
         """
         remaining: list[Array] = []
         current = position
         k = 0
         while k < len(points):
             ignored_length = 0.0 if remaining else self.clearance
-            is_visible = self.find_clear_lines(current, points[k:], self.is_tight, ignored_length)
+            is_visible = self.find_clear_lines(current, points[k:], self.is_near_wall, ignored_length)
             if is_visible.any():
-                # Go on with the last visible waypoint.
+                # Skip the points before the last one in sight.
                 k += int(is_visible.nonzero()[0][-1])
             current = points[k]
             remaining.append(current)
@@ -438,3 +440,4 @@ def _build_graph(edges: Edges) -> csr_array:
 
 
 _PLANNERS_IN_USE: WeakValueDictionary[tuple[int, Window, float], GridPlanner] = WeakValueDictionary()
+"""The planners in use, by the id of the map, the window and the clearance."""

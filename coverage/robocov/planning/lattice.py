@@ -1,8 +1,9 @@
 """A lattice of nodes in a window: its graph, shortest distances on it, and lines of sight.
 
-A node is joined to its neighbors in 16 directions: straight, diagonal, and a knight's move away. A path on
-the lattice is therefore at most 2.8 % longer than the shortest one. Two nodes are joined if no cell on the
-straight line between them is too close to a wall. Nodes close to walls can be reached, but not passed.
+Edges lead from a node to its neighbors in 16 directions: straight, diagonal, and a knight's move away. In
+open space, a path on the lattice is therefore at most 2.8 % longer than the straight line. Two nodes are
+connected if no cell on the straight line between them is near a wall. Nodes near walls can be reached, but
+paths do not pass through them.
 """
 
 from __future__ import annotations
@@ -17,22 +18,22 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, kernel
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
-"""Rows and columns of half of the moves; the others are their opposites."""
+"""Rows and columns of half of the moves from a node to its neighbors. The others are their opposites."""
 _MAX_MOVE = 2
 """Maximum number of rows or columns in one move."""
 _MOVES_PER_AXIS = 2 * _MAX_MOVE + 1
 """Number of different changes of the row, or of the column, in one move."""
 _UNKNOWN_DETOUR = 0.4
-"""Assumed excess length of routes through unknown cells, as a fraction: walls may turn up there."""
+"""Fraction by which routes through unknown cells are assumed to be longer, because of unknown walls."""
 _SIGHT_STEP_CELLS = 0.5
 """Maximum distance between the sampled points of a line of sight."""
 
 
 class LatticeCells(NamedTuple):
-    """The properties of a lattice on which its graph depends."""
+    """The properties of the cells and the nodes on which the graph of a lattice depends."""
 
-    is_tight: BoolArray
-    """(h, w) Whether each cell is too close to a wall."""
+    is_near_wall: BoolArray
+    """(h, w) Whether each cell is closer to a wall than the clearance."""
     is_blocked: BoolArray
     """(h, w) Whether each cell is a wall or a presumed wall."""
     is_unknown: BoolArray
@@ -42,7 +43,7 @@ class LatticeCells(NamedTuple):
 
 
 class Edges(NamedTuple):
-    """The edges of a directed graph in compressed sparse rows."""
+    """The edges of a directed graph with m nodes, in compressed sparse rows."""
 
     lengths: Array
     """(e,) m"""
@@ -53,33 +54,33 @@ class Edges(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """Position of the cells of a window."""
+    """Position and size of the cells of a window, in the raster and in the plane."""
 
     low_x: float
     """x coordinate of the lower left corner of the raster, m."""
     low_y: float
     """y coordinate of that corner, m."""
     cell_size: float
-    """m"""
+    """Side of a cell, m."""
     first_row: int
-    """The first row of the raster that the window contains."""
+    """First row of the raster that is in the window."""
     first_column: int
-    """The first column."""
+    """First column of the raster that is in the window."""
     last_row: int
-    """The last row."""
+    """Last row of the raster that is in the window."""
     last_column: int
-    """The last column."""
+    """Last column of the raster that is in the window."""
 
 
 class _Moves(NamedTuple):
-    """The moves from a node to its neighbors."""
+    """The k moves from a node to its neighbors, and the c cells that they cross."""
 
     rows: IntArray
-    """(k,) Number of rows of nodes up."""
+    """(k,) Number of rows of nodes that each move leads up."""
     columns: IntArray
-    """(k,) Number of columns of nodes to the right."""
+    """(k,) Number of columns of nodes that each move leads to the right."""
     lengths: Array
-    """(k,) m"""
+    """(k,) m, length of each move."""
     crossed_rows: IntArray
     """(c,) Row of each cell that the moves cross, relative to the cell of the node."""
     crossed_columns: IntArray
@@ -104,8 +105,9 @@ def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spaci
     Returns
     -------
     Edges
-        Their lengths are those of the lines, increased for unknown cells. Nodes in tight cells are dead ends:
-        no edge leads on from there, for example through a hole in a wall that has been seen only in part.
+        The length of an edge is that of the line between its nodes, increased for unknown cells. Nodes near
+        walls are dead ends: no edge leads on from there. Otherwise, a path could lead through a hole in a
+        wall that has been seen only in part.
     """
     moves = _build_moves(stride, spacing)
     lengths = _compute_move_lengths(cells, moves, rows, columns, stride)
@@ -113,7 +115,7 @@ def build_edges(cells: LatticeCells, rows: int, columns: int, stride: int, spaci
 
 
 def _build_moves(stride: int, spacing: float) -> _Moves:
-    """Build the moves and find the cells that they cross."""
+    """Build the moves on a lattice with a spacing in m, and find the cells that they cross."""
     crossed = [_list_crossed_cells(up, right, stride) for up, right in _MOVES]
     counts = np.array([len(cells) for cells in crossed])
     rows, columns = np.array(_MOVES).T.copy()
@@ -148,9 +150,9 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
     (m, _MOVES_PER_AXIS, _MOVES_PER_AXIS): entry [node, _MAX_MOVE + up, _MAX_MOVE + right] belongs to the move
     from this node by `up` rows and `right` columns.
 
-    A move is possible if no cell on the straight line is tight, that is, too close to a wall. Moves through
-    unknown cells count as up to `_UNKNOWN_DETOUR` longer. `moves` contains only one of each two opposite
-    moves, so that each line is examined once, for both directions.
+    A move is possible if no cell on the straight line is near a wall. Moves through unknown cells count as
+    longer, by a fraction of up to `_UNKNOWN_DETOUR`. `moves` contains only one of each two opposite moves, so
+    that each line is examined once, for both directions.
     """
     lengths = np.full((rows * columns, _MOVES_PER_AXIS, _MOVES_PER_AXIS), np.inf)
     for move in range(len(moves.lengths)):
@@ -169,8 +171,8 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
                 node = row * columns + column
                 neighbor = (row + up) * columns + column + right
                 length = moves.lengths[move] * (1.0 + _UNKNOWN_DETOUR / crossed_count * unknown_count)
-                # A node without clearance lies in a tight cell and is a dead end: the only moves are to it,
-                # from nodes with clearance.
+                # A node without clearance is a dead end: moves lead to it, from nodes with clearance, but no
+                # move leads on from there.
                 has_clearance = cells.has_clearance[node]
                 neighbor_has_clearance = cells.has_clearance[neighbor]
                 if is_passable or (is_without_wall and has_clearance and not neighbor_has_clearance):
@@ -184,9 +186,10 @@ def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns
 def _examine_crossed_cells(
     cells: LatticeCells, moves: _Moves, move: int, node_row: int, node_column: int
 ) -> tuple[bool, bool, int]:
-    """Return whether a move from a node crosses no tight cell, and no wall, and the number of unknown cells.
+    """Examine the cells that a move crosses, from a node in the cell with the given row and column.
 
-    The cell of the node is in row `node_row` and column `node_column`.
+    Return whether none of them is near a wall, whether none of them is a wall, and the number of unknown
+    ones.
     """
     is_passable = True
     is_without_wall = True
@@ -194,7 +197,7 @@ def _examine_crossed_cells(
     for k in range(moves.first_crossed[move], moves.first_crossed[move + 1]):
         i = node_row + moves.crossed_rows[k]
         j = node_column + moves.crossed_columns[k]
-        is_passable = is_passable and not cells.is_tight[i, j]
+        is_passable = is_passable and not cells.is_near_wall[i, j]
         is_without_wall = is_without_wall and not cells.is_blocked[i, j]
         unknown_count += cells.is_unknown[i, j]
     return is_passable, is_without_wall, unknown_count
@@ -202,10 +205,10 @@ def _examine_crossed_cells(
 
 @kernel
 def _compress_edges(lengths: Array, columns: int) -> Edges:
-    """Collect the edges of all nodes in compressed sparse rows.
+    """Collect the possible moves from all nodes as edges in compressed sparse rows.
 
-    The entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths` is the length in meters of the move by
-    `up` rows and `right` columns; see `_compute_move_lengths`. A move of infinite length is not possible.
+    Entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths` is the length in meters of the move by `up`
+    rows and `right` columns; see `_compute_move_lengths`. A move of infinite length is not possible.
     """
     count = 0
     edge_lengths = np.empty(lengths.size)
@@ -234,13 +237,13 @@ def compute_distances(
     edges : Edges
         Directed edges between m nodes.
     shortest_edge : float, m
-        Lower bound on the lengths of the edges.
+        Lower bound of the lengths of the edges.
     sources : (k,) int array
         Nodes at which paths start.
     offsets : (k,) array, m
-        Distances that paths from each source start with.
+        Length that is added to the paths from each source.
     limit : float, m
-        Longest path that is followed.
+        Maximum length of a path.
 
     Returns
     -------
@@ -251,21 +254,15 @@ def compute_distances(
     -----
     This is Dijkstra's algorithm, except that it settles several nodes in each iteration: the nearest node of
     the front, and all nodes whose distance exceeds that of the nearest by less than the shortest edge. A
-    path from one of these nodes to another would be longer than the path already known.
+    path from one of these nodes to another would be longer than the path already known. The *front* contains
+    the nodes that a path has reached, but whose distance is not final yet.
     """
-    # The front contains the nodes that a path has reached, but that are not settled yet.
     node_count = len(edges.first_edge) - 1
     distance = np.full(node_count, np.inf)
+    # The first `front_size` entries of `front` are the nodes of the front, in any order.
     front = np.empty(node_count, dtype=np.intp)
     is_in_front = np.zeros(node_count, dtype=np.bool_)
-    front_size = 0
-    for k in range(len(sources)):
-        node = sources[k]
-        distance[node] = min(distance[node], offsets[k])
-        if not is_in_front[node]:
-            front[front_size] = node
-            is_in_front[node] = True
-            front_size += 1
+    front_size = _add_sources(sources, offsets, distance, front, is_in_front)
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
         remaining_count = _settle_nearest_nodes(distance, front, front_size, shortest_edge, settled)
@@ -273,7 +270,7 @@ def compute_distances(
         front_size = remaining_count
         for k in range(settled_count):
             is_in_front[settled[k]] = False
-        # Shorten the distances of the neighbors of settled nodes.
+        # Update the distances of the neighbors of settled nodes.
         for k in range(settled_count):
             node = settled[k]
             for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
@@ -286,6 +283,25 @@ def compute_distances(
                         is_in_front[end] = True
                         front_size += 1
     return distance
+
+
+@kernel
+def _add_sources(
+    sources: IntArray, offsets: Array, distance: Array, front: IntArray, is_in_front: BoolArray
+) -> int:
+    """Set the distances of the sources, in m, and add them to an empty front; return their number.
+
+    The last three arrays are changed in place. A source that is given several times is added once.
+    """
+    front_size = 0
+    for k in range(len(sources)):
+        node = sources[k]
+        distance[node] = min(distance[node], offsets[k])
+        if not is_in_front[node]:
+            front[front_size] = node
+            is_in_front[node] = True
+            front_size += 1
+    return front_size
 
 
 @kernel
@@ -329,8 +345,8 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
     (k,) int array
         At most `max_count` nodes.
     """
-    # The nearest nodes so far are kept in order of distance. A new one is inserted at its place, and the last
-    # one drops out.
+    # This is an insertion sort of the nearest nodes so far: a new one moves forward to its place, and the
+    # last one drops out.
     nearest = np.empty(max_count, dtype=np.intp)
     squared_distances = np.empty(max_count)
     count = 0
@@ -360,11 +376,11 @@ def find_clear_lines(
     position : (2,) array, m
     ends : (k, 2) array, m
     is_obstructing : (h, w) bool array
-        Cells of a window.
+        Whether each cell of a window obstructs lines.
     frame : Frame
         Position of these cells.
     ignored_length : float, m
-        Cells closer to the position do not count.
+        Cells closer to the position do not obstruct a line.
 
     Returns
     -------

@@ -14,40 +14,43 @@ from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap, dilate
 from robocov.planning.openness import MAX_BLOCKS, compute_openness
 from robocov.planning.window import Window
 
-SIDES = ((0, 1), (1, 0), (0, -1), (-1, 0))
-"""Rows and columns from a cell to those that share a side with it: to the right, above, left and below."""
+SIDE_STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+"""Steps, in rows and columns, to the four cells that share a side with a cell: right, above, left, below."""
 
 
 class Frontier(NamedTuple):
     """The unknown cells next to free cells with space for a robot."""
 
     rows: IntArray
-    """(b,) Row in the window."""
+    """(b,) Row of each unknown cell in the window."""
     columns: IntArray
-    """(b,) Column in the window."""
+    """(b,) Column of each unknown cell in the window."""
     patches: IntArray
-    """(b,) Label of the unknown patch that each cell belongs to, from 1."""
+    """(b,) Label of the unknown patch to which each cell belongs, from 1."""
     is_side_free: BoolArray
-    """(b, 4) Whether there is such a free cell in each of the directions of `SIDES`."""
+    """(b, 4) Whether there is such a free cell on each of the four sides, in the order of `SIDE_STEPS`."""
 
 
 class UnknownArea(NamedTuple):
-    """The expected numbers of free cells in unknown patches, for each pair of a patch and a node."""
+    """Unknown cells, grouped by patch and by the node that represents them.
+
+    Entry k belongs to the cells of one patch that one node represents.
+    """
 
     patches: IntArray
     """(p,) Label of the patch, from 1."""
     nodes: IntArray
-    """(p,) The node that represents the cells."""
+    """(p,) Index of the node."""
     expected_free_counts: Array
-    """(p,) Expected number of free cells."""
+    """(p,) Expected number of free ones among these cells."""
 
 
 @dataclass(eq=False)
 class MapWindow:
     """The cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
 
-    A cell is *tight* if its distance from a wall is less than the clearance. A node *has
-    clearance* if the cell in which it lies is not tight.
+    A cell is *near a wall* if its distance from a wall is less than the clearance. A node *has clearance* if
+    the cell in which it lies is not near a wall.
 
     Parameters
     ----------
@@ -82,20 +85,20 @@ class MapWindow:
         return np.asarray(~(self.is_unknown | self.is_blocked | self.is_outside))
 
     @cached_property
-    def is_tight(self) -> BoolArray:
-        """Whether each cell is closer to a wall than the clearance, (h, w)."""
+    def is_near_wall(self) -> BoolArray:
+        """Whether each cell is near a wall: closer to it than the clearance, (h, w)."""
         return dilate(self.is_blocked, self.clearance / self.known_map.raster.cell_size)
 
     @cached_property
     def openness(self) -> Array:
-        """Probability that each unknown cell is free, 0 for all others, (h, w)."""
+        """Probability that each unknown cell is free, (h, w); 0 for all other cells."""
         state = self.window.crop(self.known_map.state, np.uint8(UNKNOWN))
         max_blocks = min(MAX_BLOCKS, self.window.rows * self.window.columns)
         return compute_openness(state, self.is_outside, max_blocks)
 
     @cached_property
     def patches(self) -> IntArray:
-        """Label of the connected patch of each unknown cell, from 1; 0 for all other cells, (h, w)."""
+        """Label, from 1, of the connected patch of each unknown cell, (h, w); 0 for all other cells."""
         labels, _ = ndimage.label(self.is_unknown & ~self.is_outside)
         return np.asarray(labels)
 
@@ -113,7 +116,7 @@ class MapWindow:
     def has_clearance(self) -> BoolArray:
         """Whether each node has the clearance, (m,)."""
         stride = self.window.stride
-        return np.asarray(~self.is_tight[stride // 2 :: stride, stride // 2 :: stride].ravel())
+        return np.asarray(~self.is_near_wall[stride // 2 :: stride, stride // 2 :: stride].ravel())
 
     @cached_property
     def free_counts(self) -> Array:
@@ -122,7 +125,7 @@ class MapWindow:
 
     @cached_property
     def expected_free_counts(self) -> Array:
-        """Expected number of free cells that each node represents, (m,): unknown ones count by openness."""
+        """Expected number of free cells that each node represents, (m,), with unknown ones by openness."""
         return self.sum_by_node(self.is_free + self.openness)
 
     @cached_property
@@ -130,9 +133,9 @@ class MapWindow:
         """The unknown cells next to free cells with space for a robot."""
         # With a margin of one cell, shifted views contain the neighbor of each cell in one direction.
         height, width = self.is_free.shape
-        is_usable = np.pad(self.is_free & ~self.is_tight, 1)
+        is_usable = np.pad(self.is_free & ~self.is_near_wall, 1)
         is_side_free = np.stack(
-            [is_usable[1 + up : 1 + up + height, 1 + right : 1 + right + width] for up, right in SIDES],
+            [is_usable[1 + up : 1 + up + height, 1 + right : 1 + right + width] for up, right in SIDE_STEPS],
             axis=-1,
         )
         rows, columns = np.nonzero(is_side_free.any(axis=-1) & (self.patches > 0))
@@ -145,7 +148,7 @@ class MapWindow:
 
     @cached_property
     def unknown_area(self) -> UnknownArea:
-        """The expected numbers of free cells in unknown patches."""
+        """The unknown cells, grouped by patch and by node."""
         rows, columns = self.patches.nonzero()
         stride = self.window.stride
         nodes = rows // stride * self.window.columns + columns // stride

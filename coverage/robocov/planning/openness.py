@@ -14,12 +14,12 @@ from robocov.planning.discovered_map import FREE, UNKNOWN
 PRIOR_OPENNESS = 0.8
 """Openness of cells that are far from all known cells."""
 WALK_LENGTH_BLOCKS = 30.0
-"""Typical distance of a random walk from its start when it is cut off."""
+"""Typical distance, in blocks, of a random walk from its start when it is cut off."""
 MAX_BLOCKS = 1000
-"""Default maximum number of blocks in a map."""
+"""Default of the maximum number of blocks into which a map is divided."""
 
 _RELAXATION_FACTOR = 1.9
-"""Factor of the overrelaxation that converges fastest for walks of `WALK_LENGTH_BLOCKS`."""
+"""Overrelaxation factor with which walks of `WALK_LENGTH_BLOCKS` converge fastest."""
 _MAX_ITERATIONS = 1000
 """Maximum number of iterations of the relaxation."""
 _TOLERANCE = 1e-5
@@ -29,7 +29,7 @@ _OUTSIDE = 255
 
 
 class _BlockGrid(NamedTuple):
-    """Square blocks of cells, with counts of the cell sides at which unknown cells border on other cells."""
+    """Square blocks of cells, with the number of sides that their unknown cells share with other cells."""
 
     unknown_counts: Array
     """(rows, columns) Number of unknown cells in each block."""
@@ -38,9 +38,9 @@ class _BlockGrid(NamedTuple):
     wall_side_counts: Array
     """(rows, columns) Number of sides between unknown cells of each block and walls."""
     link_counts_up: Array
-    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the one above."""
+    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the block above."""
     link_counts_right: Array
-    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the next one."""
+    """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of its right neighbor."""
 
 
 def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS) -> Array:
@@ -90,7 +90,7 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
 @kernel
 def _count_blocks(cell_count: int, block_side: int) -> int:
-    """Return the number of blocks that a row or column of cells extends over, rounded up."""
+    """Return the number of blocks into which a row or a column of cells is divided, rounded up."""
     return (cell_count + block_side - 1) // block_side
 
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import NO_NODE, GridPlanner
-from robocov.planning.map_window import SIDES
+from robocov.planning.map_window import SIDE_STEPS
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_MOVES = 6
 """Maximum number of moves of a search, each to a neighboring node."""
 _LIMIT_PER_CELL_RADIUS = 1.5
-"""Limit of the distances of a search, divided by the radius of the robot's cell."""
+"""Limit of the distances that a search computes, divided by the radius of the robot's cell."""
 _LIMIT_MARGIN_SPACINGS = 4.0
-"""Number of spacings of nodes that are added to this limit."""
+"""Length that is added to this limit, in spacings of nodes."""
 _MAX_SHIFT_SPACINGS = 0.5
 """Maximum distance of a goal from the nearest node, in x and in y, in spacings of nodes."""
 
@@ -29,11 +29,11 @@ class OwnGoal(NamedTuple):
     goal: Array
     """(2,) m"""
     node: int
-    """Node nearest to it."""
+    """The node at which the search ended, close to the goal."""
     cell_distances: Array
     """(m,) m, distances from that node to the nodes of the robot's own cell, 0 for all other nodes."""
     cost: float
-    """Coverage cost J of the whole team, in cells times meters."""
+    """Coverage cost J of the whole team with the robot at that node, in cells times meters."""
 
 
 def find_own_goal(
@@ -56,7 +56,7 @@ def find_own_goal(
     first_node : int
         Node at which the search starts.
     previous_goal : (2,) array, m
-        Kept if the new goal is barely better; nan if there is none.
+        Goal that the robot keeps unless a new one saves enough; nan if there is none.
     min_saving : float
         Fraction of the cost of the robot's own cell that a new goal must save.
 
@@ -89,7 +89,17 @@ def find_own_goal(
 
 
 class _NodeSearch:
-    """Coverage costs with the robot at different nodes, computed when the search gets close to them."""
+    """Coverage costs with the robot at different nodes, each computed when the search comes close to it.
+
+    Attributes
+    ----------
+    targets : (t,) int array
+        The nodes that count in the cost.
+    target_weights : (t,) array
+        Weights of these nodes.
+    costs : dict of int to float
+        Coverage cost with the robot at each node that has been evaluated.
+    """
 
     def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
         """Start a search at a node.
@@ -139,12 +149,15 @@ class _NodeSearch:
 
 
 def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
-    """Return the four nodes next to a node, in the order of `SIDES`; `NO_NODE` where none has clearance."""
+    """Return the nodes on the four sides of a node, in the order of `SIDE_STEPS`.
+
+    `NO_NODE` stands for a node without clearance or outside the window.
+    """
     rows = planner.window.rows
     columns = planner.window.columns
     row, column = divmod(node, columns)
     neighbors = []
-    for up, right in SIDES:
+    for up, right in SIDE_STEPS:
         is_inside = 0 <= row + up < rows and 0 <= column + right < columns
         neighbor = node + up * columns + right
         neighbors.append(neighbor if is_inside and planner.has_clearance[neighbor] else NO_NODE)
@@ -154,14 +167,14 @@ def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
 def _refine_goal(
     planner: GridPlanner, node: int, neighbors: list[int], costs: Mapping[int, float], previous_goal: Array
 ) -> tuple[Array, float]:
-    """Return the minimum of the parabolas around a node, and the excess cost of the previous goal over it.
+    """Return the position of minimum cost near a node, and the excess cost of the previous goal.
 
-    In x and in y, a parabola leads through the costs of the node and of its two neighbors: at the offset t
-    from the node, in spacings of nodes, the cost changes by slope t + curvature t² / 2. Along an axis on
-    which a neighbor is missing, the goal stays at the node. The excess is infinite beyond one spacing from
-    the node, where the parabolas do not hold.
+    The cost is approximated by a parabola in x and one in y, each through the costs of the node and of its
+    two neighbors: at the offset t from the node, in spacings of nodes, the cost changes by
+    slope t + curvature t² / 2. Along an axis on which a neighbor is missing, the goal stays at the node. If
+    the previous goal is more than one spacing away, the parabolas do not hold, and the excess is infinite.
     """
-    # The order is that of `SIDES`. Axis 0 is x, and axis 1 is y.
+    # The order is that of `SIDE_STEPS`. Axis 0 is x, and axis 1 is y.
     right, up, left, down = neighbors
     goal = planner.nodes[node].copy()
     excess = 0.0

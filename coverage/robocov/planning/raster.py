@@ -21,11 +21,11 @@ class CellGrid(NamedTuple):
     """Lower left corner and cell size of a raster, for kernels."""
 
     low_x: float
-    """m"""
+    """x coordinate of the lower left corner, m."""
     low_y: float
-    """m"""
+    """y coordinate of that corner, m."""
     cell_size: float
-    """m"""
+    """Side of a cell, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Raster:
 
 @kernel
 def find_row(y: float, grid: CellGrid, rows: int) -> int:
-    """Return the row of cells at a y coordinate, or the nearest row if it is outside the raster.
+    """Return the row of cells at a y coordinate. Outside the raster, it is the nearest row.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def find_row(y: float, grid: CellGrid, rows: int) -> int:
 
 @kernel
 def find_column(x: float, grid: CellGrid, columns: int) -> int:
-    """Return the column of cells at an x coordinate, or the nearest column if it is outside the raster.
+    """Return the column of cells at an x coordinate. Outside the raster, it is the nearest column.
 
     Parameters
     ----------

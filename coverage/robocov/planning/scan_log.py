@@ -1,8 +1,8 @@
 """The scans that a robot has, its own and those of others, and the map that it builds from them.
 
-All robots scan at the same times. The scans of one time are a *round*; rounds and robots are numbered from 0.
-The map is the result of adding all scans in the order of rounds, and of robots within a round, whenever they
-arrived. Robots with the same scans therefore have the same map, bit for bit.
+All robots scan at the same times. The scans that they take at one time are a *round*; rounds and robots are
+numbered from 0. The map is built by adding all scans in the order of rounds, and of robots within a round, no
+matter in which order they arrive. Robots with the same scans therefore have the same map, bit for bit.
 """
 
 from __future__ import annotations
@@ -22,14 +22,17 @@ from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 
 REPORTED_ROUNDS = 64
-"""Number of rounds after the first missing scan of a robot of which an `Inventory` reports the scans."""
+"""Number of rounds that an `Inventory` reports one by one, after the first missing scan of a robot."""
 
 _DISTANCE_STEPS = 65535
 """Number of steps in which distances up to the diameter of the region are stored."""
 _SCAN_HEADER_BYTES = 32
-"""Size of the number of a robot and of a round, the time, and the position."""
+"""Size of the numbers of the robot and the round, the time, and the position, in a message with a scan."""
 _MAX_CHECKPOINT_GAP = 1.0
-"""Maximum gap between two older checkpoints, as a fraction of the age of the younger one."""
+"""Maximum gap between two older checkpoints, as a fraction of the age of the younger one.
+
+The gap and the age are numbers of rounds.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +42,12 @@ class NumberedScan:
     Attributes
     ----------
     robot : int
-    number : int
-        Number of the round.
+        Number of the robot that took the scan.
+    round_number : int
     time : float, s
         Time at which it was taken.
     position : (2,) array, m
-        Position of the robot, as it knew it.
+        Position of the robot at that time, as the robot knew it.
     distances : (rays,) uint16 array
         Lengths of the rays, in steps of the diameter of the region divided by 65535.
     is_hit : (rays,) bool array
@@ -52,7 +55,7 @@ class NumberedScan:
     """
 
     robot: int
-    number: int
+    round_number: int
     time: float
     position: Array
     distances: NDArray[np.uint16]
@@ -77,7 +80,7 @@ class NumberedScan:
 
 
 def number_scans(
-    scans: Scans, positions: Array, region: Region, *, number: int, time: float
+    scans: Scans, positions: Array, region: Region, *, round_number: int, time: float
 ) -> list[NumberedScan]:
     """Build the numbered scans of a round.
 
@@ -88,9 +91,9 @@ def number_scans(
     positions : (n, 2) array, m
         Positions of the robots, as they know them.
     region : Region
-    number : int
-        Number of the round.
+    round_number : int
     time : float, s
+        Time at which the scans were taken.
 
     Returns
     -------
@@ -104,50 +107,54 @@ def number_scans(
     for array in (distances, positions, is_hit):
         array.setflags(write=False)
     return [
-        NumberedScan(robot, number, time, positions[robot], distances[robot], is_hit[robot])
+        NumberedScan(robot, round_number, time, positions[robot], distances[robot], is_hit[robot])
         for robot in range(len(positions))
     ]
 
 
 class Inventory(NamedTuple):
-    """The scans that a robot has, as it reports them to others."""
+    """List of the scans that a robot has, as it reports them to others."""
 
-    counts: IntArray
-    """(n,) Number of the first scan of each robot that is missing."""
+    first_missing: IntArray
+    """(n,) For each robot, the first round whose scan is missing."""
     has_later: BoolArray
-    """(n, `REPORTED_ROUNDS`) Whether the scan of each robot is there in each of the rounds after that."""
+    """(n, `REPORTED_ROUNDS`) For each robot, whether the scans of the rounds after that one are present."""
 
     def find_missing(self, is_present: BoolArray) -> BoolArray:
-        """Find the scans that are missing in this inventory, among those that are present elsewhere.
+        """Find the scans that this inventory lacks, among those that another robot has.
 
         Parameters
         ----------
         is_present : (rounds, n) bool array
+            The scans that the other robot has.
 
         Returns
         -------
         (rounds, n) bool array
             False for scans of rounds that the inventory does not report.
         """
-        offsets = np.arange(len(is_present))[:, None] - self.counts - 1
-        is_reported = (offsets >= -1) & (offsets < REPORTED_ROUNDS)
-        columns = np.clip(offsets, 0, REPORTED_ROUNDS - 1)
-        robots = np.arange(len(self.counts))
-        is_there = (offsets >= 0) & self.has_later[robots, columns]
-        return np.asarray(is_present & is_reported & ~is_there)
+        # Column k of `has_later` belongs to the round `first_missing` + 1 + k.
+        columns = np.arange(len(is_present))[:, None] - self.first_missing - 1
+        is_reported = (columns >= -1) & (columns < REPORTED_ROUNDS)
+        existing_columns = np.clip(columns, 0, REPORTED_ROUNDS - 1)
+        robots = np.arange(len(self.first_missing))
+        is_in_inventory = (columns >= 0) & self.has_later[robots, existing_columns]
+        return np.asarray(is_present & is_reported & ~is_in_inventory)
 
     def equals(self, other: Inventory) -> bool:
         """Return whether two inventories report the same scans."""
         if other is self:
             return True
-        return np.array_equal(self.counts, other.counts) and np.array_equal(self.has_later, other.has_later)
+        is_first_equal = np.array_equal(self.first_missing, other.first_missing)
+        return is_first_equal and np.array_equal(self.has_later, other.has_later)
 
     def contains(self, scan: NumberedScan) -> bool:
-        """Return whether a scan is reported as present."""
-        offset = scan.number - int(self.counts[scan.robot]) - 1
-        if offset < 0:
-            return offset < -1
-        return offset < REPORTED_ROUNDS and bool(self.has_later[scan.robot, offset])
+        """Return whether the inventory reports a scan as present."""
+        first_missing = int(self.first_missing[scan.robot])
+        if scan.round_number <= first_missing:
+            return scan.round_number < first_missing
+        column = scan.round_number - first_missing - 1
+        return column < REPORTED_ROUNDS and bool(self.has_later[scan.robot, column])
 
 
 ScanRound: TypeAlias = tuple[NumberedScan | None, ...]
@@ -158,6 +165,7 @@ class Checkpoint(NamedTuple):
     """The map of the scans of the first rounds."""
 
     round_count: int
+    """Number of these rounds."""
     known_map: DiscoveredMap
 
 
@@ -165,20 +173,23 @@ class Checkpoint(NamedTuple):
 class ScanLog:
     """The scans that a robot has, and the map that it builds from them. Immutable.
 
-    The map is only updated on demand, by `update_map`, because many scans may arrive in between. Maps of the
-    past are stored as checkpoints, from which the map is rebuilt when a scan of an earlier round arrives.
+    The map is updated only when it is needed, by `update_map`, because many scans may arrive in between. Some
+    earlier maps are stored as checkpoints. When a scan of an earlier round arrives, the map is rebuilt from
+    the last checkpoint before that round.
 
     Attributes
     ----------
     rounds : tuple of ScanRound
+        The scans of each round.
     is_present : (rounds, n) bool array
         Whether each scan is in the log.
     checkpoints : tuple of Checkpoint
-        In the order of rounds. The first one is the unknown map.
+        In ascending order of their numbers of rounds. The first one has no rounds, and an unknown map.
     known_map : DiscoveredMap
         The map after its last update.
     robot_radius : float or None, m
-        Radius around the positions of robots within which cells are free; None if they may not be.
+        Radius around the position of each scan within which cells of the map become free. None: only the
+        cells that rays pass through become free.
     """
 
     rounds: tuple[ScanRound, ...]
@@ -198,7 +209,9 @@ class ScanLog:
         robot_count : int
             Number of robots n of the team.
         unknown_map : DiscoveredMap
+            Map in which all cells are unknown.
         robot_radius : float or None, m
+            See `ScanLog`.
 
         Returns
         -------
@@ -217,14 +230,14 @@ class ScanLog:
 
     @cached_property
     def inventory(self) -> Inventory:
-        """Which scans are in the log."""
+        """List of the scans in the log."""
         robot_count = self.is_present.shape[1]
-        # The rounds after the last one, all of them missing, are long enough for every window.
+        # Missing rounds are appended, so that each robot has a first missing round and enough later ones.
         padding = np.zeros((REPORTED_ROUNDS + 1, robot_count), dtype=bool)
         is_present = np.concatenate([self.is_present, padding])
-        counts = is_present.argmin(axis=0)
-        later_rounds = counts[:, None] + 1 + np.arange(REPORTED_ROUNDS)
-        return Inventory(counts, is_present[later_rounds, np.arange(robot_count)[:, None]])
+        first_missing = is_present.argmin(axis=0)
+        later_rounds = first_missing[:, None] + 1 + np.arange(REPORTED_ROUNDS)
+        return Inventory(first_missing, is_present[later_rounds, np.arange(robot_count)[:, None]])
 
     def get_scan(self, robot: int, number: int) -> NumberedScan:
         """Return the scan of a robot in a round, which must be in the log."""
@@ -238,7 +251,7 @@ class ScanLog:
         Parameters
         ----------
         scans : sequence of NumberedScan
-            In any order. Those that are in the log already are ignored.
+            In any order. Scans that are already in the log are ignored.
 
         Returns
         -------
@@ -247,26 +260,24 @@ class ScanLog:
         """
         old_count, robot_count = self.is_present.shape
         new_scans = [
-            scan for scan in scans if scan.number >= old_count or not self.is_present[scan.number, scan.robot]
+            scan
+            for scan in scans
+            if scan.round_number >= old_count or not self.is_present[scan.round_number, scan.robot]
         ]
         if not new_scans:
             return self
-        round_count = max(old_count, max(scan.number for scan in new_scans) + 1)
+        round_count = max(old_count, max(scan.round_number for scan in new_scans) + 1)
         is_present = np.zeros((round_count, robot_count), dtype=bool)
         is_present[:old_count] = self.is_present
-        changed_rounds: dict[int, list[NumberedScan | None]] = {}
+        empty_round: ScanRound = (None,) * robot_count
+        rounds = [*self.rounds, *[empty_round] * (round_count - old_count)]
         for scan in new_scans:
-            is_present[scan.number, scan.robot] = True
-            if scan.number not in changed_rounds:
-                is_known_round = scan.number < old_count
-                changed_rounds[scan.number] = (
-                    list(self.rounds[scan.number]) if is_known_round else [None] * robot_count
-                )
-            changed_rounds[scan.number][scan.robot] = scan
-        rounds = [*self.rounds, *[(None,) * robot_count] * (round_count - old_count)]
-        for number, round_scans in changed_rounds.items():
-            rounds[number] = tuple(round_scans)
-        first_changed = min(changed_rounds)
+            is_present[scan.round_number, scan.robot] = True
+            scans_of_round = list(rounds[scan.round_number])
+            scans_of_round[scan.robot] = scan
+            rounds[scan.round_number] = tuple(scans_of_round)
+        # Checkpoints with later rounds lack some of the new scans.
+        first_changed = min(scan.round_number for scan in new_scans)
         return replace(
             self,
             rounds=tuple(rounds),
@@ -275,12 +286,12 @@ class ScanLog:
         )
 
     def update_map(self) -> ScanLog:
-        """Return the log with the map of all of its scans.
+        """Return the log with a map of all scans in it.
 
         Returns
         -------
         ScanLog
-            If the cells of the map have not changed, it has the same map object as before.
+            It has the same map object as before if no cell has changed.
         """
         start = self.checkpoints[-1]
         if start.round_count == len(self.rounds):
@@ -301,7 +312,9 @@ class ScanLog:
         return self.share_map(known_map)
 
     def share_map(self, known_map: DiscoveredMap) -> ScanLog:
-        """Return the log with an equal map object, and a checkpoint with it.
+        """Return the log with a given map object, and with a checkpoint for it.
+
+        Robots with equal maps use this to share one object.
 
         Parameters
         ----------
@@ -318,10 +331,10 @@ class ScanLog:
 
 
 def _thin_out(checkpoints: Sequence[Checkpoint]) -> tuple[Checkpoint, ...]:
-    """Remove checkpoints such that older ones are farther apart, and keep the first and the last one.
+    """Remove checkpoints so that older ones are farther apart, but keep the first and the last one.
 
-    Their number then grows with the logarithm of the number of rounds, and the number of scans that are added
-    again when a late scan arrives is proportional to the age of that scan.
+    The number of checkpoints then grows only with the logarithm of the number of rounds. When a late scan
+    arrives, the number of rounds that have to be added again is proportional to the age of that scan.
     """
     kept = [checkpoints[0]]
     last_count = checkpoints[-1].round_count

@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import GridPlanner
-from robocov.planning.map_window import SIDES
+from robocov.planning.map_window import SIDE_STEPS
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
@@ -16,7 +16,7 @@ _ADDED_LENGTH_M = 1.0
 
 
 class _Candidates(NamedTuple):
-    """The cells next to b frontier cells: one on each of their four sides, in the order of `SIDES`."""
+    """The cells next to b frontier cells: one on each of their four sides, in the order of `SIDE_STEPS`."""
 
     rows: IntArray
     """(b, 4) Row in the window."""
@@ -68,7 +68,7 @@ def find_viewpoint(
         return None
     # The frontier consists of the unknown cells that have a free one on at least one of their four sides. The
     # cells on these sides are possible viewpoints if they are marked in `frontier.is_side_free`.
-    rows_up, columns_right = np.array(SIDES).T
+    rows_up, columns_right = np.array(SIDE_STEPS).T
     candidates = _Candidates(
         rows=frontier.rows[is_worth_visiting, None] + rows_up,
         columns=frontier.columns[is_worth_visiting, None] + columns_right,

@@ -1,7 +1,7 @@
 """The generalized Voronoi graph of free space: the points that are equally far from two walls.
 
-It is the roadmap of Choset and Burdick (IJRR 19, 2000) on a grid. The free cells are thinned in a way that
-preserves their connections, loops, and the points halfway between two walls that face each other.
+It is the roadmap of Choset and Burdick (IJRR 19, 2000) on a grid. The free cells are thinned to lines. This
+preserves connections and loops, and the points halfway between two walls that face each other.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.compiled import kernel
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
-"""Two walls face each other at a point if the directions to them differ by at least this angle."""
+"""Minimum angle between the directions from a point to two walls that face each other."""
 _NEIGHBOR_STEPS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
 """Rows and columns from a cell to its eight neighbors, in circular order.
 
@@ -32,7 +32,7 @@ _FORWARD_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 _CELL_STEP = 1.0
 """Distance between two adjacent cells, in cells."""
 NO_VERTEX = -1
-"""Vertex, or group, of a cell that does not belong to any."""
+"""Index that stands for no vertex, or no group of cells."""
 _UP = 0
 """Column of `_NEIGHBOR_STEPS`: number of rows up."""
 _RIGHT = 1
@@ -53,7 +53,7 @@ class VoronoiRoadmap(NamedTuple):
     def build(
         cls, has_clearance: BoolArray, is_free: BoolArray, spacing: float, max_vertices: int
     ) -> VoronoiRoadmap:
-        """Build the roadmap of the cells where a robot fits.
+        """Build the roadmap of the cells where the center of a robot may be.
 
         Parameters
         ----------
@@ -70,8 +70,8 @@ class VoronoiRoadmap(NamedTuple):
         -------
         VoronoiRoadmap
         """
-        # Each group of consecutive cells of the graph becomes a vertex, at its first cell. Two vertices are
-        # joined if their groups touch. Finally, the other free cells join the nearest group.
+        # Each group of adjacent cells of the graph becomes a vertex, at its first cell. Two vertices are
+        # connected if their groups touch. Finally, the other free cells are added to the nearest group.
         is_in_graph = find_voronoi_cells(has_clearance)
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_in_graph) / max_vertices)))
         first_cells, vertex_of_cell = _group_cells(is_in_graph, steps, _NEIGHBOR_STEPS)
@@ -102,9 +102,10 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
 
     Notes
     -----
-    Cells are removed from the walls inwards if that changes no connection (distance-ordered homotopic
-    thinning, Pudney 1998). A cell stays if its nearest wall is in a very different direction from that of the
-    next cell. Branches into corners therefore vanish, while those into rooms remain.
+    Cells are removed, from the walls inwards, if the cells around them stay connected (distance-ordered
+    homotopic thinning, Pudney 1998). A cell is not removed if the direction to its nearest wall is very
+    different from that of an adjacent cell. Branches into corners therefore vanish, while those into rooms
+    remain.
     """
     is_in_graph = np.pad(is_free, 1)
     wall_distance, nearest_wall = ndimage.distance_transform_edt(is_in_graph, return_indices=True)
@@ -119,12 +120,20 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
 def _find_cells_between_walls(wall_distance: Array, nearest_wall: NDArray[np.int32]) -> BoolArray:
     """Find the cells whose nearest wall is in a very different direction from that of an adjacent cell.
 
-    `wall_distance`, (rows, columns), is the distance of each cell from the nearest wall, and `nearest_wall`,
-    (2, rows, columns), the row and column of that wall. Cells are counted in both.
+    Parameters
+    ----------
+    wall_distance : (rows, columns) array
+        Distance of each cell from the nearest wall, in cells.
+    nearest_wall : (2, rows, columns) int array
+        Row and column of that wall.
+
+    Returns
+    -------
+    (rows, columns) bool array
     """
     is_between_walls = np.zeros(wall_distance.shape, dtype=bool)
     for axis in (0, 1):
-        # Views in which the axis is the first one of the array of cells.
+        # Views in which adjacent cells along the axis are in adjacent rows.
         distances = np.swapaxes(wall_distance, 0, axis)
         walls = np.swapaxes(nearest_wall, 1, 1 + axis)
         is_between = np.swapaxes(is_between_walls, 0, axis)
@@ -141,9 +150,10 @@ def _find_cells_between_walls(wall_distance: Array, nearest_wall: NDArray[np.int
 
 @kernel
 def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbor_steps: IntArray) -> None:
-    """Thin the free cells: remove those that no connection depends on, in the given order.
+    """Remove cells from the graph, in place, as long as the neighbors of each removed cell stay connected.
 
-    This is repeated until no more can be removed. `order` contains indices of the flattened array.
+    Cells that must stay are not removed. The other cells are tested in the given order, as indices of the
+    flattened array, again and again until no more can be removed.
     """
     columns = is_in_graph.shape[1]
     has_changed = True
@@ -161,10 +171,11 @@ def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbo
 
 @kernel
 def _count_crossings(is_in_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
-    """Return Hilditch's crossing number: 1 if the neighbors of a cell stay connected without it.
+    """Return Hilditch's crossing number of a cell. It is 1 if its neighbors stay connected without it.
 
-    It is the number of separate runs of cells of the graph among the eight neighbors. The neighbors above and
-    to the right, for example, touch diagonally, and belong to the same run.
+    This is the number of separate runs of cells of the graph among the eight neighbors. The neighbors above
+    and to the right, for example, touch diagonally, and belong to the same run. Each run is counted at its
+    start: a side neighbor that is not in the graph, followed by a neighbor that is.
     """
     crossings = 0
     for k in range(0, 8, 2):
@@ -260,10 +271,10 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 @kernel
 def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray) -> None:
-    """Give each free cell the group of the nearest cell that has one, measured in steps between cells.
+    """Add each free cell without a group to the group of the nearest cell that has one, in place.
 
-    Cells without a group, which contain `NO_VERTEX`, are reached by a breadth-first search from all the
-    others at once.
+    Distances are counted in steps between neighbors: a breadth-first search starts from all cells with a
+    group at once. Cells without a group contain `NO_VERTEX`.
     """
     rows, columns = is_free.shape
     # The queue contains indices of the flattened array, from `head` up to `tail`.

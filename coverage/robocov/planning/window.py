@@ -1,4 +1,4 @@
-"""The part of a raster on which a lattice of nodes lies."""
+"""The rectangular part of a raster that a lattice of nodes covers."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from robocov.arrays import Array
 from robocov.planning.raster import Raster
 
 _MIN_HALF_WIDTH_CELLS = 4
-"""Minimum distance of the border of a window from its center."""
+"""Minimum of half the width of a window."""
 _STEPS_PER_HALF_WIDTH = 4
-"""A window moves in steps of its half width divided by this number."""
+"""A window moves in steps of half its width divided by this number."""
 
 CellValue = TypeVar("CellValue", bound=np.generic)
 
 
 class Window(NamedTuple):
-    """The part of a raster on which nodes lie, one in the middle of each square block of cells."""
+    """A rectangle of square blocks of cells in a raster, with a node in the middle of each block."""
 
     first_row: int
     """The lowest row of cells."""
@@ -34,16 +34,17 @@ class Window(NamedTuple):
     """Number of cells along the side of a block."""
 
     @classmethod
-    def build_around(cls, raster: Raster, center: Array, reach: float, max_nodes: int) -> Window:
-        """Build the window around a point, with the finest possible blocks.
+    def build_around(cls, raster: Raster, center: Array, half_width: float, max_nodes: int) -> Window:
+        """Build the window around a point, with the smallest possible blocks.
 
         Parameters
         ----------
         raster : Raster
         center : (2,) array, m
-        reach : float, m
-            The window contains all points up to this distance; infinite for the whole raster. It moves in
-            steps of a quarter of the reach, so it stays the same while the center barely moves.
+        half_width : float, m
+            Half the width and half the height of the window, which may be a little larger: it moves in steps
+            of a quarter of this length, so that it stays the same while the center barely moves. Infinite
+            for the whole raster.
         max_nodes : int
             Maximum number of nodes.
 
@@ -53,12 +54,12 @@ class Window(NamedTuple):
         """
         rows, columns = raster.shape
         row, column = raster.find_cells(np.asarray(center, dtype=float))
-        if math.isinf(reach):
-            half_width = rows + columns
+        if math.isinf(half_width):
+            half_width_cells = rows + columns
         else:
-            half_width = max(_MIN_HALF_WIDTH_CELLS, math.ceil(reach / raster.cell_size))
-        low_row, high_row = _compute_stepped_interval(int(row), half_width, rows)
-        low_column, high_column = _compute_stepped_interval(int(column), half_width, columns)
+            half_width_cells = max(_MIN_HALF_WIDTH_CELLS, math.ceil(half_width / raster.cell_size))
+        low_row, high_row = _compute_stepped_interval(int(row), half_width_cells, rows)
+        low_column, high_column = _compute_stepped_interval(int(column), half_width_cells, columns)
         height = high_row - low_row
         width = high_column - low_column
         # The stride is the smallest one, starting from an estimate, for which there are not too many nodes.
@@ -88,7 +89,8 @@ class Window(NamedTuple):
 
         Parameters
         ----------
-        cells : (rows of the raster, columns of the raster) array
+        cells : (rows, columns) array
+            Values of all cells of the raster.
         fill : scalar
             Value for the cells of the window that lie beyond the raster.
 

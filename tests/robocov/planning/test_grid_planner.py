@@ -97,7 +97,7 @@ def test_routes_keep_their_clearance_from_walls(seed: int) -> None:
     """Between its way-points a route keeps the clearance, up to half a cell."""
     planner = build_planner(build_random_blocks(seed), max_nodes=400)
     rng = np.random.default_rng(seed)
-    free_cells = np.argwhere(~planner.is_tight)
+    free_cells = np.argwhere(~planner.is_near_wall)
     if not len(free_cells):
         return
     position = RASTER.compute_centers(*free_cells[rng.integers(len(free_cells))])

@@ -34,7 +34,7 @@ def build_scans(seed: int, round_count: int) -> list[NumberedScan]:
         positions = rng.uniform((1.0, 1.0), (7.0, 3.0), size=(ROBOT_COUNT, 2))
         distances = rng.uniform(0.1, 3.0, size=(ROBOT_COUNT, RAYS))
         scans = Scans(distances, rng.random(distances.shape) < 0.5)
-        numbered_scans += number_scans(scans, positions, REGION, number=number, time=0.5 * number)
+        numbered_scans += number_scans(scans, positions, REGION, round_number=number, time=0.5 * number)
     return numbered_scans
 
 
@@ -76,7 +76,7 @@ def test_scans_are_stored_with_the_precision_of_their_size() -> None:
     scan = build_scans(seed=0, round_count=1)[0]
     distances = np.random.default_rng(0).uniform(0.0, 20.0, size=(1, RAYS))
     scans = Scans(distances, distances > 0.0)
-    stored = number_scans(scans, np.array([[1.0, 1.0]]), REGION, number=0, time=0.0)[0]
+    stored = number_scans(scans, np.array([[1.0, 1.0]]), REGION, round_number=0, time=0.0)[0]
     step_m = REGION.diameter / 65535
     expected = np.minimum(distances[0], REGION.diameter)
     np.testing.assert_allclose(stored.distances * step_m, expected, atol=0.51 * step_m)
@@ -97,7 +97,7 @@ def test_a_map_whose_cells_stay_the_same_stays_the_same_object() -> None:
     log = build_log(scans)
     blind = Scans(np.zeros((ROBOT_COUNT, RAYS)), np.zeros((ROBOT_COUNT, RAYS), dtype=bool))
     positions = np.array([scan.position for scan in scans[:ROBOT_COUNT]])
-    later = log.add(number_scans(blind, positions, REGION, number=2, time=1.0)).update_map()
+    later = log.add(number_scans(blind, positions, REGION, round_number=2, time=1.0)).update_map()
     assert later is not log
     assert later.known_map is log.known_map
 
@@ -112,7 +112,7 @@ def test_an_inventory_reports_which_scans_are_missing(seed: int, fraction: float
     for scan in scans:
         is_remaining = scan in remaining
         assert inventory.contains(scan) == is_remaining
-        assert is_missing[scan.number, scan.robot] == (not is_remaining)
+        assert is_missing[scan.round_number, scan.robot] == (not is_remaining)
 
 
 def test_scans_long_after_the_first_missing_one_are_not_reported() -> None:

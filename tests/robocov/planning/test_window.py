@@ -12,15 +12,15 @@ RASTER = Raster(Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]]
 
 
 @settings(max_examples=30)
-@given(x=st.floats(0, 6), y=st.floats(0, 4), reach=st.floats(0.1, 9.0), max_nodes=st.integers(4, 900))
+@given(x=st.floats(0, 6), y=st.floats(0, 4), half_width=st.floats(0.1, 9.0), max_nodes=st.integers(4, 900))
 def test_a_window_contains_the_surroundings_of_its_center(
-    x: float, y: float, reach: float, max_nodes: int
+    x: float, y: float, half_width: float, max_nodes: int
 ) -> None:
-    window = Window.build_around(RASTER, np.array([x, y]), reach, max_nodes)
+    window = Window.build_around(RASTER, np.array([x, y]), half_width, max_nodes)
     assert window.rows * window.columns <= max_nodes
     row, column = np.indices(RASTER.shape)
     distance = np.abs(RASTER.compute_centers(row, column) - [x, y]).max(axis=-1)
-    is_near = distance < reach - 0.1
+    is_near = distance < half_width - 0.1
     height, width = window.shape
     assert (row[is_near] >= window.first_row).all()
     assert (row[is_near] < window.first_row + height).all()

@@ -118,8 +118,8 @@ class FrontierMedian(SharedMapController):
         state = planner.window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~planner.is_outside
         # Gaps between neighboring rays are not worth a visit.
-        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_tight
-        is_frontier = (state == FREE) & ~planner.is_tight & ndimage.binary_dilation(is_unknown_area)
+        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_near_wall
+        is_frontier = (state == FREE) & ~planner.is_near_wall & ndimage.binary_dilation(is_unknown_area)
         labels, _ = ndimage.label(is_frontier, _BLOCK)
         cell_size = situation.known_map.raster.cell_size
         is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
@@ -164,7 +164,7 @@ class FrontierMedian(SharedMapController):
     def _compute_median(self, situation: Situation) -> Array:
         """Return the final goals of all robots, (k, 2) m."""
         weights = situation.compute_weights(situation.known_map.state == FREE)
-        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.sources)
+        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.candidate_nodes)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return situation.positions

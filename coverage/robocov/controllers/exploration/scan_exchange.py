@@ -170,7 +170,7 @@ class ScanExchange:
                 scans.append(state.own_scan)
             if scans:
                 # Robots with the same log that receive the same scans share the next log.
-                scans.sort(key=attrgetter("number", "robot"))
+                scans.sort(key=attrgetter("round_number", "robot"))
                 key = (id(state.log), *map(id, scans))
                 if key not in logs:
                     logs[key] = state.log.add(scans)
@@ -220,7 +220,9 @@ class ScanExchange:
         -------
         ScanExchange
         """
-        own_scans = number_scans(scans, seen.positions, seen.region, number=self.round_count, time=seen.time)
+        own_scans = number_scans(
+            scans, seen.positions, seen.region, round_number=self.round_count, time=seen.time
+        )
         robot_count = len(own_scans)
         states = []
         for robot, own_scan in enumerate(own_scans):
@@ -323,7 +325,7 @@ def _prepare_messages(
     if repairs:
         min_time = seen.time - _MAX_REPAIR_MEMORY_S
         repair_times = {key: time for key, time in repair_times.items() if time >= min_time}
-        repair_times.update(dict.fromkeys(((scan.robot, scan.number) for scan in repairs), seen.time))
+        repair_times.update(dict.fromkeys(((scan.robot, scan.round_number) for scan in repairs), seen.time))
     others = [message for message in state.outgoing if not isinstance(message.payload, NumberedScan | Digest)]
     outgoing = [*others, Message(own_scan, own_scan.size), Message(digest, digest.size)]
     outgoing += [Message(scan, scan.size) for scan in repairs]
@@ -356,7 +358,7 @@ def _needs_repair(scan: NumberedScan, state: RobotExchange, received: ReceivedDi
 
     If it was sent too late to be in the digest, it may still arrive.
     """
-    sent_time = state.repair_times.get((scan.robot, scan.number), scan.time)
+    sent_time = state.repair_times.get((scan.robot, scan.round_number), scan.time)
     return sent_time + received.delay <= received.digest.time + TIME_TOLERANCE_S
 
 

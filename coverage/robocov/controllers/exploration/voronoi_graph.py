@@ -136,8 +136,8 @@ def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
     planner = situation.planner
     # The window of the planner extends beyond the raster if its last blocks do.
     row_count, column_count = raster.shape
-    is_tight = window.crop(planner.is_tight[:row_count, :column_count], fill=True)
-    has_clearance = ~is_tight.reshape(window.block_shape).any(axis=(1, 3))
+    is_near_wall = window.crop(planner.is_near_wall[:row_count, :column_count], fill=True)
+    has_clearance = ~is_near_wall.reshape(window.block_shape).any(axis=(1, 3))
     labels, _ = ndimage.label(has_clearance, np.ones((3, 3)))
     own_nodes = [planner.find_own_node(position) for position in situation.positions]
     rows, columns = raster.find_cells(planner.nodes[own_nodes])

@@ -161,7 +161,7 @@ def test_nothing_is_sent_twice_under_ideal_communication() -> None:
     for _ in range(60):
         for messages in simulation.observe_and_decide().decision.messages:
             scans = [each.payload for each in messages if isinstance(each.payload, NumberedScan)]
-            sent += [(scan.robot, scan.number) for scan in scans]
+            sent += [(scan.robot, scan.round_number) for scan in scans]
         simulation.step()
     assert sorted(sent) == [(robot, number) for robot in range(len(CORNER)) for number in range(6)]
 
