@@ -36,14 +36,14 @@ class NeighborReports(NamedTuple):
 
     time: float
     """s"""
-    pair: IntArray
-    """(m,) robot * n + neighbor, ascending."""
+    pairs: IntArray
+    """(m,) One number for each pair of a robot and a neighbor: robot * n + neighbor, ascending."""
     positions: Array
-    """(m, 2) m, of the neighbors."""
+    """(m, 2) m, reported position of the neighbor in each pair."""
 
 
 class HalfPlanes(NamedTuple):
-    """Half planes of allowed accelerations a of each robot: normals · a <= limits."""
+    """Half planes that contain the allowed accelerations a of each robot: normals · a <= limits."""
 
     normals: Array
     """(n, k, 2) Unit normals; nan for no constraint."""
@@ -66,12 +66,12 @@ class Barrier(BaseController):
 
         h_ij = sqrt(2 (alpha_i + alpha_j) (|dp| - D_s)) + dp · dv / |dp| >= 0
 
-    This is ensured by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Each of the two robots
-    takes the fraction alpha_i / (alpha_i + alpha_j) of it, so all decide independently. The desired
-    acceleration, here Lloyd's, is changed as little as these half planes require: one quadratic program for
-    each robot, solved exactly. If no acceleration is allowed, the robot brakes. An obstacle point does not
-    move and does not contribute: alpha_j = 0. The closest point of a wall moves on as the robot passes;
-    therefore the term for moving sideways past a single point is left out.
+    This is ensured by dh_ij/dt >= -gamma h_ij³, which is linear in the accelerations. Robot i is responsible
+    for the fraction alpha_i / (alpha_i + alpha_j) of this constraint, so that both robots decide
+    independently. The desired acceleration, here Lloyd's, is changed as little as these half planes require:
+    one quadratic program for each robot, solved exactly. If no acceleration is allowed, the robot brakes. An
+    obstacle point does not brake: alpha_j = 0. The closest point of a wall moves along the wall when a robot
+    passes, so the term for moving sideways past a single point is left out.
 
     Robots do not know the velocities of others: each derives them from two reported positions. Obstacle
     points are the closest one and those of the last scan. The bodies and limits of the others are assumed to
@@ -142,23 +142,23 @@ class Barrier(BaseController):
         near = self._find_near_neighbors(seen, team)
         reports = _collect_reports(near, seen)
         neighbor_velocities = _derive_velocities(reports, memory.reports, team.max_speed[near.neighbor])
-        robot_planes = self._keep_off_robots(seen, team, near, neighbor_velocities)
+        robot_planes = self._build_robot_planes(seen, team, near, neighbor_velocities)
         obstacle_points = collect_obstacle_points(seen, returns)
-        obstacle_planes = self._keep_off_obstacles(seen, team, obstacle_points)
+        obstacle_planes = self._build_obstacle_planes(seen, team, obstacle_points)
         nearest, is_feasible = find_nearest_allowed(
             desired,
             np.concatenate([robot_planes.normals, obstacle_planes.normals], axis=1),
             np.concatenate([robot_planes.limits, obstacle_planes.limits], axis=1),
             team.max_acceleration,
         )
-        # Where no acceleration is allowed, brake to rest within the response time, or as hard as possible.
+        # A robot that is allowed no acceleration brakes within the response time, or as hard as possible.
         speed = np.hypot(*seen.velocities.T)
         rate = -np.minimum(1.0 / self.response_time, team.max_acceleration / np.maximum(speed, _MIN_NORM))
         accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])
         return accelerations, replace(memory, reports=reports, returns=returns)
 
     def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
-        """Find the neighbors that constrain a robot now."""
+        """Find the neighbors that are close enough to constrain a robot."""
         min_distance = 2.0 * float(team.radius.max()) + self.safe_gap
         # Upper bound on the distance that two robots need to stop if they meet at full speed.
         stopping_distance = (
@@ -171,14 +171,15 @@ class Barrier(BaseController):
         """Return alpha, the deceleration that each robot is assumed to be capable of, (n,) m/s²."""
         return np.asarray(self.braking * team.max_acceleration)
 
-    def _keep_off_robots(
+    def _build_robot_planes(
         self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: Array
     ) -> HalfPlanes:
         """Return the half planes that keep robots apart.
 
-        With n the unit vector from the neighbor to the robot, the two may approach with an acceleration of at
-        most the limit of `_limit_approach` plus v²/d, because moving past each other at the sideways speed v
-        and the distance d turns n away. The robot takes its share alpha_i / (alpha_i + alpha_j) of it.
+        Two robots may accelerate toward each other by at most the limit of `_compute_approach_limit` plus
+        v²/d. The second term is due to their motion past each other, at the sideways speed v and the distance
+        d, which turns the direction from one to the other. Robot i takes the fraction
+        alpha_i / (alpha_i + alpha_j) of this limit.
         """
         n = len(seen.positions)
         robot, neighbor, offset, distance = near
@@ -195,7 +196,7 @@ class Barrier(BaseController):
         squared_speed = (relative_velocities * relative_velocities).sum(axis=1)
         squared_sideways_speed = np.maximum(squared_speed - speed_away**2, 0.0)
         min_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
-        limit = self._limit_approach(gap, speed_away, total_alpha)
+        limit = self._compute_approach_limit(gap, speed_away, total_alpha)
         limit += squared_sideways_speed / np.maximum(distance, min_distance)
         limit *= alpha[robot] / total_alpha
         return HalfPlanes(
@@ -203,7 +204,7 @@ class Barrier(BaseController):
             limits=arrange_in_rows(robot, n, limit, np.inf),
         )
 
-    def _keep_off_obstacles(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
+    def _build_obstacle_planes(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
         """Return the half planes that keep robots away from obstacle points, (n, k, 2) m; nan for none."""
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
@@ -211,10 +212,10 @@ class Barrier(BaseController):
         speed_away = (normal * seen.velocities[:, None]).sum(axis=2)
         gap = distance - (team.radius + self.safe_gap)[:, None]
         alpha = self._compute_braking_limits(team)[:, None]
-        limit = self._limit_approach(np.nan_to_num(gap), np.nan_to_num(speed_away), alpha)
+        limit = self._compute_approach_limit(np.nan_to_num(gap), np.nan_to_num(speed_away), alpha)
         return HalfPlanes(normals=-normal, limits=np.where(np.isnan(speed_away), np.inf, limit))
 
-    def _limit_approach(self, gap: Array, speed_away: Array, alpha: Array) -> Array:
+    def _compute_approach_limit(self, gap: Array, speed_away: Array, alpha: Array) -> Array:
         """Return the maximum acceleration of two robots, or of a robot and an obstacle, toward each other.
 
         The barrier function is h = sqrt(2 α (d - D_s)) + v, for the distance d, the safe distance D_s and the
@@ -243,9 +244,8 @@ class Barrier(BaseController):
 
 def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
     """Return the reported positions of near neighbors."""
-    # One number for each pair, so that the reports of two steps can be matched.
-    pair = near.robot * len(seen.positions) + near.neighbor
-    return NeighborReports(seen.time, pair, seen.positions[near.robot] - near.offset)
+    pairs = near.robot * len(seen.positions) + near.neighbor
+    return NeighborReports(seen.time, pairs, seen.positions[near.robot] - near.offset)
 
 
 def _derive_velocities(reports: NeighborReports, previous: NeighborReports | None, max_speed: Array) -> Array:
@@ -257,7 +257,8 @@ def _derive_velocities(reports: NeighborReports, previous: NeighborReports | Non
     previous : NeighborReports or None
         The reports at the last step.
     max_speed : (m,) array, m/s
-        Maximum speeds of the neighbors, which limit the result: positions jump after a late message.
+        Maximum speeds of the neighbors. They limit the result, because reported positions jump after a late
+        message.
 
     Returns
     -------
@@ -266,7 +267,7 @@ def _derive_velocities(reports: NeighborReports, previous: NeighborReports | Non
     velocities = np.zeros_like(reports.positions)
     if previous is not None and reports.time > previous.time:
         _, rows, previous_rows = np.intersect1d(
-            reports.pair, previous.pair, assume_unique=True, return_indices=True
+            reports.pairs, previous.pairs, assume_unique=True, return_indices=True
         )
         moves = reports.positions[rows] - previous.positions[previous_rows]
         velocities[rows] = moves / (reports.time - previous.time)

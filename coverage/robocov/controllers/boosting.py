@@ -72,14 +72,14 @@ class BoostLimits(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ascent:
-    """Ascent of one robot, part of its memory. Immutable."""
+    """Ascent of one robot along its gradient, from one optimum to the next. Immutable."""
 
     rest_position: Array
-    """(2,) m, position that it has been near since `rest_start`."""
+    """(2,) m, position near which the robot has been since `rest_start`."""
     rest_start: float
     """Time since which it has been near that position, s."""
     mode: Mode = Mode.GRADIENT
-    boosts: int = 0
+    boost_count: int = 0
     """Number of boosts so far."""
     best_value: float = -math.inf
     """Contribution of the robot at the optimum before the boost, m²."""
@@ -136,13 +136,14 @@ class Ascent:
         A robot that has had its maximum number of boosts stays.
         """
         if self.trail and value < self.best_value:
-            return replace(self, mode=Mode.RETURN, boosts=max_boosts, rest_start=time)
-        if self.boosts >= max_boosts:
+            # A robot that returns is not boosted again.
+            return replace(self, mode=Mode.RETURN, boost_count=max_boosts, rest_start=time)
+        if self.boost_count >= max_boosts:
             return replace(self, trail=())
         return replace(
             self,
             mode=Mode.BOOSTED,
-            boosts=self.boosts + 1,
+            boost_count=self.boost_count + 1,
             rest_start=time,
             boost_start=time,
             best_value=value,
@@ -163,14 +164,14 @@ class BoostingMemory(Memory):
 
 
 class Contributions(NamedTuple):
-    """Contribution of each robot to the objective, and how it changes with the robot's position."""
+    """Contribution of each robot to the objective, and its gradient with respect to the robot's position."""
 
     value: Array
     """(n,) m²"""
     gradient: Array
     """(n, 2) m"""
     boosted_gradient: Array
-    """(n, 2) m"""
+    """(n, 2) m, gradient of the boosted objective, which leads out of local optima."""
 
 
 class _ViewSamples(NamedTuple):
@@ -265,14 +266,14 @@ class Boosting(BaseController):
     def decide(self, seen: Observations, memory: BoostingMemory) -> Decision:
         """Compute the forces that drive each robot along its gradient, boosted gradient or trail."""
         team = memory.team
-        reach = np.minimum(team.sensing_range, seen.region.diameter)
-        view = compute_view(seen, memory.view, self.scanning, reach)
+        max_distances = np.minimum(team.sensing_range, seen.region.diameter)
+        view = compute_view(seen, memory.view, self.scanning, max_distances)
         gradient = memory.gradient
         speed_fraction = memory.speed_fraction
         ascents = memory.ascents
         # Robots follow the same gradient until the next scan.
         if gradient is None or speed_fraction is None or seen.scans is not None:
-            contributions = self.compute_contributions(seen, view, reach)
+            contributions = self.compute_contributions(seen, view, max_distances)
             ascents = self._update_ascents(ascents, seen, contributions.value)
             is_boosted = np.array([ascent.mode is Mode.BOOSTED for ascent in ascents])
             gradient = np.where(is_boosted[:, None], contributions.boosted_gradient, contributions.gradient)
@@ -316,41 +317,45 @@ class Boosting(BaseController):
             for ascent, position, value in zip(ascents, seen.positions, values.tolist(), strict=True)
         )
 
-    def compute_contributions(self, seen: Observations, view: View, reach: Array) -> Contributions:
+    def compute_contributions(self, seen: Observations, view: View, max_distances: Array) -> Contributions:
         """Compute the contribution of each robot to H, with its gradient and its boosted gradient.
 
         Parameters
         ----------
         seen : Observations
         view : View
-        reach : (n,) array, m
+        max_distances : (n,) array, m
             Maximum distance of each robot's view.
+
+        Returns
+        -------
+        Contributions
         """
         directions = compute_ray_directions(view.distances.shape[1])
-        pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
-        samples = self._sample_views(seen, view, pairs, directions, reach)
-        windows = find_windows(view, directions, reach, self.jump)
+        pairs = seen.find_near_neighbors(2.0 * float(max_distances.max()))
+        samples = self._sample_views(seen, view, pairs, directions, max_distances)
+        windows = find_windows(view, directions, max_distances, self.jump)
         boosted_weight = self._compute_boosted_weight(samples)
-        boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, reach)
+        boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, max_distances)
         if self.boost == "neighbours":
             repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
-                pairs.robot, repulsion[:, None] * pairs.offset, len(reach)
+                pairs.robot, repulsion[:, None] * pairs.offset, len(max_distances)
             )
         return Contributions(
             value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
-            gradient=self._compute_gradient(samples.weight, samples, view, windows, reach),
+            gradient=self._compute_gradient(samples.weight, samples, view, windows, max_distances),
             boosted_gradient=boosted_gradient,
         )
 
     def _sample_views(
-        self, seen: Observations, view: View, pairs: NearNeighbors, directions: Array, reach: Array
+        self, seen: Observations, view: View, pairs: NearNeighbors, directions: Array, max_distances: Array
     ) -> _ViewSamples:
         """Sample the views of all robots for numerical integration.
 
         A view consists of narrow sectors, one around each ray. A ray ends at a wall or at the sensing range,
         and is sampled at k equally spaced points. Each sample represents a piece of the sector, as long as
-        the spacing of the samples and as wide as the sector is there. `reach` contains the maximum length of
+        the spacing of the samples and as wide as the sector is there. `max_distances` contains the length of
         each robot's rays, (n,) m, and `pairs` the neighbors that may detect points of its view.
         """
         sector_angle = 2.0 * np.pi / len(directions)
@@ -361,7 +366,7 @@ class Boosting(BaseController):
         spacings = view.distances / _SAMPLES_PER_RAY
         areas = depths * (spacings * sector_angle)[:, :, None]
         wall_distances = np.where(view.hit, view.distances, np.inf)
-        undetected = compute_undetected(depths, wall_distances, directions, pairs, reach, self.decay)
+        undetected = compute_undetected(depths, wall_distances, directions, pairs, max_distances, self.decay)
         return _ViewSamples(
             depths=depths,
             areas=areas,
@@ -381,22 +386,32 @@ class Boosting(BaseController):
         return samples.weight
 
     def _compute_gradient(
-        self, weight: Array, samples: _ViewSamples, view: View, windows: Windows, reach: Array
+        self, weight: Array, samples: _ViewSamples, view: View, windows: Windows, max_distances: Array
     ) -> Array:
-        """Return the gradient of the integral of a weight times p over the views, (n, 2) m."""
+        """Return the gradient of the integral of a weight times p over the views, (n, 2) m.
+
+        Its three terms are those in the notes of `Boosting`.
+        """
         directions = compute_ray_directions(view.distances.shape[1])
-        angle = 2.0 * np.pi / len(directions)
+        sector_angle = 2.0 * np.pi / len(directions)
         integrand = weight * samples.detection
-        arcs = ~view.hit * np.exp(-self.decay * reach)[:, None] * reach[:, None] * angle
+        # p at the sensing range, times the length of the arc there, for each ray that hits no obstacle.
+        range_detection = np.exp(-self.decay * max_distances)[:, None]
+        arcs = ~view.hit * range_detection * max_distances[:, None] * sector_angle
         ray_terms = self.decay * (integrand * samples.areas).sum(axis=2) + weight[..., -1] * arcs
         growth = integrate_over_windows(windows, view, samples.depths, integrand)
-        window_terms = sum_by_robot(windows.robot, growth, len(reach))
+        window_terms = sum_by_robot(windows.robot, growth, len(max_distances))
         return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + window_terms)
 
 
 @kernel
 def compute_undetected(
-    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array, decay: float
+    depths: Array,
+    wall_distances: Array,
+    directions: Array,
+    pairs: NearNeighbors,
+    max_distances: Array,
+    decay: float,
 ) -> Array:
     """Compute the probability that no neighbor detects a point, for sampled points in each robot's view.
 
@@ -409,10 +424,10 @@ def compute_undetected(
     directions : (rays, 2) array
         Unit vectors along the rays.
     pairs : NearNeighbors
-        Pairs of a robot and a neighbor. The neighbor detects points within its own reach, unless a wall in
+        Pairs of a robot and a neighbor. The neighbor detects points within its own distance, unless a wall in
         the robot's view blocks the line of sight from the neighbor to the point.
-    reach : (n,) array, m
-        Distance up to which each robot detects points.
+    max_distances : (n,) array, m
+        Maximum distance at which each robot detects points.
     decay : float, 1/m
         λ in the probability exp(-λ d) of detecting a point at distance d.
 
@@ -426,7 +441,7 @@ def compute_undetected(
         # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
         neighbor_x = -pairs.offset[pair, 0]
         neighbor_y = -pairs.offset[pair, 1]
-        neighbor_reach = reach[pairs.neighbor[pair]]
+        neighbor_range = max_distances[pairs.neighbor[pair]]
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):
@@ -436,6 +451,6 @@ def compute_undetected(
                 dx = neighbor_x - x
                 dy = neighbor_y - y
                 distance = math.sqrt(dx * dx + dy * dy)
-                if distance <= neighbor_reach and is_path_clear(x, y, dx, dy, wall_distances[robot]):
+                if distance <= neighbor_range and is_path_clear(x, y, dx, dy, wall_distances[robot]):
                     undetected[robot, ray, k] *= 1.0 - math.exp(-decay * distance)
     return undetected

@@ -74,7 +74,7 @@ class ConvexChart:
         self._to_region = _PiecewiseAffineMap.build(image_corners, corners)
 
         mass = _compute_areas(corners)
-        # Walls are enlarged by a margin, which still has mass.
+        # Obstacles are enlarged by the clearance. The free space in this margin still has mass.
         mass[is_obstacle] = shapely.area(
             shapely.intersection(environment.free, shapely.polygons(corners[is_obstacle]))
         )
@@ -99,7 +99,16 @@ class ConvexChart:
         return self._to_chart.evaluate(find_nearest_inside(self.configuration_space, positions))
 
     def map_to_region(self, images: Array) -> Array:
-        """Compute the points with given images, F⁻¹, (n, 2) m."""
+        """Compute the points of the region that F maps to the given images.
+
+        Parameters
+        ----------
+        images : (n, 2) array, m
+
+        Returns
+        -------
+        (n, 2) array, m
+        """
         points, _ = self._to_region.evaluate(images)
         return points
 
@@ -149,9 +158,10 @@ class _PiecewiseAffineMap(NamedTuple):
 
 @kernel
 def _find_triangles(points: Array, inverses: Array, origins: Array) -> IntArray:
-    """Return the triangle that contains each of (n, 2) points, (n,), or else the nearest one.
+    """Return the index of the triangle that contains each of (n, 2) points, (n,).
 
-    The nearest triangle is the one whose smallest barycentric coordinate is the largest.
+    A point inside a triangle has no negative barycentric coordinate. For a point outside all triangles, it is
+    the triangle in which the smallest barycentric coordinate of the point is largest.
     """
     triangles = np.zeros(len(points), dtype=np.intp)
     for i in range(len(points)):
@@ -232,8 +242,8 @@ def _find_edges(points: Array, triangles: IntArray, starts: Array, ends: Array) 
 
 def _find_indices(points: Array, selected: Array) -> IntArray:
     """Return the indices of selected points, (m, 2) m, among (k, 2) m sorted ones."""
-    # Rounded, the selected points are among the others, so that the unique points are `points` again, and
-    # the inverse indices of the selected points refer to these.
+    # After rounding, each selected point equals one of `points`. The unique rows of both together are
+    # therefore `points` again, and the inverse indices of the selected points are their indices in `points`.
     rounded = np.round(selected / _ROUNDING_M) * _ROUNDING_M
     _, indices = np.unique(np.concatenate([points, rounded]), axis=0, return_inverse=True)
     return np.asarray(indices.ravel()[len(points) :])
@@ -254,7 +264,8 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     right_side = weights[inner][:, fixed] @ mesh.points[fixed]
     laplacian = diags_array(weights.sum(axis=1)) - weights
     system = laplacian.tocsr()[inner][:, inner].tocoo()
-    # Vertices are sorted: the indices of neighbors are close, and the matrix has a narrow band.
+    # Vertices are sorted, so that the indices of neighbors are close to each other, and all elements of the
+    # matrix that are not zero lie in a narrow band around the diagonal.
     bandwidth = int(np.abs(system.row - system.col).max(initial=0))
     band = np.zeros((len(inner), 2 * bandwidth + 1))
     band[system.row, system.col - system.row + bandwidth] = system.data

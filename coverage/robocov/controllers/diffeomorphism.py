@@ -26,8 +26,8 @@ from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_sam
 _MIN_DETERMINANT = 1e-300
 """Lower limit of determinants in divisions."""
 
-# Charts are slow to build, and must not be copied with the memories of robots.
-_get_chart = lru_cache(maxsize=8)(ConvexChart)
+# Charts take long to build, and must not be copied with the memories of robots.
+_build_cached_chart = lru_cache(maxsize=8)(ConvexChart)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +58,8 @@ class Diffeomorphism(WholeMapController):
     The motion minimizes the cost of the images: its distances are those in the chart, not path lengths in the
     map. A room at the end of a long corridor is small in the chart, and barely attracts robots.
 
-    Any diffeomorphism will do; this one is a `ConvexChart`. For a `shrink` of 1 and without obstacles it is
-    the identity, and the controller is `Lloyd`.
+    Any diffeomorphism can be used; this one is a `ConvexChart`. For a `shrink` of 1, or without obstacles, it
+    is the identity, and the controller is `Lloyd`.
 
     Obstacles are enlarged by the radius of the robot and `clearance`; the image of a robot within that margin
     is the image of the nearest point outside. Robots avoid collisions by slowing down. Cells are sampled by
@@ -113,7 +113,7 @@ class Diffeomorphism(WholeMapController):
     def _get_chart(self, team: Team) -> ConvexChart:
         """Return the chart of the map for the largest robot of the team."""
         clearance = float(team.radius.max()) + self.clearance
-        return _get_chart(self.get_environment(), clearance, int(self.lattice), self.shrink)
+        return _build_cached_chart(self.get_environment(), clearance, int(self.lattice), self.shrink)
 
 
 def _compute_centroids(seen: Observations, chart: ConvexChart, images: Array) -> Array:

@@ -27,18 +27,18 @@ _MIN_RATE = 1e-9
 _RELATIVE_SLACK = 1e-12
 """Tolerance of constraints for rounding errors, relative to the radius of the disc."""
 _MIN_SLOPE = 1e-12
-"""Sine of the largest angle between two constraint lines that count as parallel."""
+"""Sine of the maximum angle between two constraint lines that count as parallel."""
 
 
 class Margins(NamedTuple):
-    """Distances that `avoid_collisions` keeps, and how fast robots may approach them."""
+    """Minimum distances that `avoid_collisions` keeps, and the limits of the speed of approach."""
 
     clearance: Array
-    """(n,) m, from the center of each robot to obstacle points."""
+    """(n,) m, minimum distance from the center of each robot to obstacle points."""
     separation: Array
-    """(n,) m, between the centers of robots."""
+    """(n,) m, minimum distance from the center of each robot to those of others."""
     rate: float
-    """1/s, rate of the exponential decrease of the remaining distance."""
+    """1/s, maximum rate of the exponential decrease of the remaining distance."""
     braking: float
     """Fraction of the maximum acceleration that is assumed to be available for braking."""
 
@@ -145,7 +145,19 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
 
 
 def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
-    """Return the closest obstacle point of each robot and those in its last scan, (n, k, 2) m, or nan."""
+    """Collect the closest obstacle point of each robot, and the obstacle points in its last scan.
+
+    Parameters
+    ----------
+    seen : Observations
+    returns : (n, rays, 2) array or None, m
+        Obstacle points in the last scans, from `update_returns`.
+
+    Returns
+    -------
+    (n, k, 2) array, m
+        nan for none.
+    """
     nearest = seen.obstacle_points[:, None]
     if returns is None:
         return nearest
@@ -169,7 +181,7 @@ def avoid_collisions(
     Returns
     -------
     (n, 2) array, m/s
-        See `limit_approach_speed`.
+        These velocities satisfy the limits in the notes of `limit_approach_speed`.
     """
     wall_braking = margins.braking * team.max_acceleration
     # Two robots that meet brake on half of the distance each.
@@ -178,8 +190,8 @@ def avoid_collisions(
     stopping_distance = np.maximum(
         team.max_speed / max(margins.rate, _MIN_RATE), team.max_speed**2 / (2.0 * robot_braking)
     )
-    reach = float((margins.separation + stopping_distance).max())
-    robot_offsets = list_neighbor_offsets(seen, reach)
+    max_distance = float((margins.separation + stopping_distance).max())
+    robot_offsets = list_neighbor_offsets(seen, max_distance)
     wall_offsets = seen.positions[:, None] - obstacle_points
     max_neighbors = robot_offsets.shape[1]
     is_robot = np.arange(max_neighbors + wall_offsets.shape[1]) < max_neighbors
@@ -264,10 +276,10 @@ def find_nearest_allowed(
 
     Notes
     -----
-    Minimize |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Constraints are
-    added one by one: if the optimum so far violates the next one, the new optimum lies on its line, in the
-    interval that the earlier ones allow (de Berg et al., *Computational Geometry*, section 4.3, incremental
-    linear programming, with this objective).
+    Minimize |u - p|² subject to normals[k] · u <= offsets[k] for all k and |u| <= radius. Half planes are
+    added one by one: if the optimum so far violates the next one, the new optimum lies on the edge of this
+    half plane, in the interval that the earlier ones and the disc allow. This is incremental linear
+    programming (de Berg et al., *Computational Geometry*, section 4.3) with a quadratic objective.
     """
     nearest = np.empty(points.shape)
     is_feasible = np.ones(len(points), dtype=np.bool_)
@@ -285,14 +297,14 @@ def find_nearest_allowed(
             nx = normals[i, k, 0]
             ny = normals[i, k, 1]
             offset = offsets[i, k]
-            # Neither a half plane that contains the disc nor nan is a constraint.
+            # Skip half planes that contain the disc, that already contain the optimum, or that are nan.
             if not (offset < r and nx * x + ny * y - offset > slack):
                 continue
             low, high = _find_allowed_interval(normals[i], offsets[i], k, r, slack)
             if low > high + slack:
                 is_feasible[i] = False
                 break
-            # The point of the line that is nearest to the desired one, moved into the interval.
+            # The point of the edge that is nearest to the desired one, moved into the interval.
             t = min(max(points[i, 1] * nx - points[i, 0] * ny, min(low, high)), high)
             x = offset * nx - t * ny
             y = offset * ny + t * nx
@@ -332,9 +344,21 @@ def _find_allowed_interval(
     return low, high
 
 
-def list_neighbor_offsets(seen: Observations, reach: float) -> Array:
-    """Return the offsets from each robot's neighbors within reach to itself, (n, k, 2) m, or nan."""
-    pairs = seen.find_near_neighbors(reach)
+def list_neighbor_offsets(seen: Observations, max_distance: float) -> Array:
+    """List the offsets from the near neighbors of each robot to the robot itself.
+
+    Parameters
+    ----------
+    seen : Observations
+    max_distance : float, m
+        Neighbors farther away are left out.
+
+    Returns
+    -------
+    (n, k, 2) array, m
+        Row i belongs to robot i; nan at the end of rows with fewer neighbors.
+    """
+    pairs = seen.find_near_neighbors(max_distance)
     return arrange_in_rows(pairs.robot, len(seen.positions), pairs.offset, np.nan)
 
 
@@ -372,7 +396,20 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
 
 
 def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
-    """Sum the vectors, (m, 2), of each robot, (n, 2); `robot`, (m,), is the robot of each vector."""
+    """Sum the vectors that belong to each robot.
+
+    Parameters
+    ----------
+    robot : (m,) int array
+        Robot to which each vector belongs.
+    vectors : (m, 2) array
+    n : int
+        Number of robots.
+
+    Returns
+    -------
+    (n, 2) array
+    """
     x = np.bincount(robot, vectors[:, 0], minlength=n)
     y = np.bincount(robot, vectors[:, 1], minlength=n)
     # Without any vectors, `bincount` returns integers.

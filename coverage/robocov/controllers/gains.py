@@ -57,14 +57,14 @@ class Gain:
     whole: bool = False
     """Whether only whole numbers are allowed."""
 
-    def validate(self, value: object, where: str) -> float | None:
+    def validate(self, value: object, controller_name: str) -> float | None:
         """Return a value as a float if the gain allows it.
 
         Parameters
         ----------
         value : object
-        where : str
-            Name of the controller, for the start of the message.
+        controller_name : str
+            For the start of the error message.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Gain:
         expected = f"a {kind} from {self.low:g} to {self.high:g} {self.unit}".rstrip()
         if self.optional:
             expected += ", or null for no limit"
-        raise ParameterError(f"{where}.{self.name}: expected {expected}, got {quote(value)}")
+        raise ParameterError(f"{controller_name}.{self.name}: expected {expected}, got {quote(value)}")
 
     def _is_in_range(self, number: Any) -> bool:
         if not self.low <= number <= min(self.high, sys.float_info.max):
@@ -99,14 +99,14 @@ class Option:
     unit: ClassVar[str] = ""
     optional: ClassVar[bool] = False
 
-    def validate(self, value: object, where: str) -> str:
+    def validate(self, value: object, controller_name: str) -> str:
         """Return a value unchanged if it is one of the choices.
 
         Parameters
         ----------
         value : object
-        where : str
-            Name of the controller, for the start of the message.
+        controller_name : str
+            For the start of the error message.
 
         Raises
         ------
@@ -115,10 +115,12 @@ class Option:
         """
         if not isinstance(value, str):
             expected = ", ".join(self.choices)
-            raise ParameterError(f"{where}.{self.name}: expected one of {expected}, got {quote(value)}")
+            raise ParameterError(
+                f"{controller_name}.{self.name}: expected one of {expected}, got {quote(value)}"
+            )
         if value not in self.choices:
             raise ParameterError(
-                f"{where}.{self.name}: {describe_unknown_name('choice', value, self.choices)}"
+                f"{controller_name}.{self.name}: {describe_unknown_name('choice', value, self.choices)}"
             )
         return value
 
@@ -308,9 +310,9 @@ def validate_gains(controller: Any) -> None:
     ParameterError
         If a value is not allowed.
     """
-    where = getattr(controller, "name", type(controller).__name__)
+    controller_name = getattr(controller, "name", type(controller).__name__)
     for name, declared in get_gains(controller).items():
-        value = declared.validate(getattr(controller, name), where)
+        value = declared.validate(getattr(controller, name), controller_name)
         object.__setattr__(controller, name, value)  # A frozen dataclass does not allow assignment.
 
 
@@ -334,17 +336,17 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
         a user's class raises an error.
     """
     gains = get_gains(kind)
-    where = getattr(kind, "name", kind.__name__)
+    controller_name = getattr(kind, "name", kind.__name__)
     checked_values = {}
     for name, value in values.items():
         if not gains:
-            raise ParameterError(f"{where}.{name}: controller {where!r} has no gains")
+            raise ParameterError(f"{controller_name}.{name}: controller {controller_name!r} has no gains")
         if name not in gains:
-            raise ParameterError(f"{where}: {describe_unknown_name('gain', name, gains)}")
-        checked_values[name] = gains[name].validate(value, where)
+            raise ParameterError(f"{controller_name}: {describe_unknown_name('gain', name, gains)}")
+        checked_values[name] = gains[name].validate(value, controller_name)
     try:
         return kind(**checked_values)
     except (RobocovError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise explain_fault(f"controller {where!r} cannot be created", error) from error
+        raise explain_fault(f"controller {controller_name!r} cannot be created", error) from error

@@ -35,7 +35,7 @@ class GeodesicPlan(NamedTuple):
     waypoints: Array
     """(n, 2) m, the first waypoint of each path."""
     remaining_lengths: Array
-    """(n,) m, lengths of the paths from there to the goals."""
+    """(n,) m, length of each path from its first waypoint to the goal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +111,7 @@ class GeodesicLloyd(WholeMapController):
     def _get_planner(self, team: Team) -> GeodesicPlanner:
         """Return the planner for a team. Its paths fit the largest robot."""
         clearance = float(team.radius.max()) + self.clearance
-        return _get_planner(self.get_environment(), clearance, int(self.lattice), team.min_radius)
+        return _build_cached_planner(self.get_environment(), clearance, int(self.lattice), team.min_radius)
 
 
 class GeodesicPlanner:
@@ -158,6 +158,10 @@ class GeodesicPlanner:
         seen : Observations
         exponent : float
             s in f = d^s.
+
+        Returns
+        -------
+        GeodesicPlan
         """
         positions = find_nearest_inside(self.configuration_space, seen.positions)
         if seen.neighbors.is_complete:
@@ -215,5 +219,5 @@ def _build_obstacle(polygon: Polygon) -> PolygonObstacle:
     return PolygonObstacle(outer, tuple(holes))
 
 
-# Planners are slow to build, and must not be copied with the memories of robots.
-_get_planner = lru_cache(maxsize=8)(GeodesicPlanner)
+# Planners take long to build, and must not be copied with the memories of robots.
+_build_cached_planner = lru_cache(maxsize=8)(GeodesicPlanner)

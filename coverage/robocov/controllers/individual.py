@@ -341,7 +341,7 @@ def require_controller(value: Any) -> Controller:
 
 
 def unwrap_controller(controller: Controller) -> Controller | IndividualController:
-    """Return the individual controller in an adapter, which has the gains; return others unchanged."""
+    """Return the individual controller in an adapter, which has the gains; return any other one unchanged."""
     if isinstance(controller, IndividualControllerAdapter):
         return controller.controller
     return controller

@@ -37,11 +37,15 @@ _MIN_DISTANCE_M = 1e-9
 _MIN_LENGTH = 1e-300
 """Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _MIN_CHARGE_DISTANCE_M = 0.05
-"""Howard's forces stop growing below this distance; robots in contact are farther apart."""
+"""Distance below which the forces of `Howard` are constant; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
-"""Force of all rays that hit a straight wall, relative to that of a point charge at the same distance."""
+"""Force of all rays that hit a straight wall, relative to that of a point charge at the same distance.
+
+A ray at the angle θ hits a wall at the distance r / cos θ, so that its force across the wall is cos³ θ / r².
+The factor is the integral of cos³ θ over half a turn, divided by the angle of a full turn.
+"""
 _MAX_LINK_STRETCH = 0.999
-"""The force that maintains a link stops growing beyond this fraction of the range."""
+"""Fraction of the range of a link beyond which the force that maintains the link is constant."""
 _MIN_EXPLORING_SPEED = 0.01
 """Speed in m/s below which a robot has no well-defined direction of motion."""
 _BRAKING_FRACTION = 0.5
@@ -51,7 +55,7 @@ _BRAKING_FRACTION = 0.5
 def _compute_potential_forces(
     seen: Observations, goals: Array, gains: PotentialGains, *, includes_robots: bool = True
 ) -> PotentialForces:
-    """Return the forces of the potentials on all robots."""
+    """Return the forces of the potentials on all robots, if desired without those of other robots."""
     if includes_robots:
         neighbors = NeighborPositions.from_graph(seen.neighbors, seen.reported_positions)
     else:
@@ -59,9 +63,9 @@ def _compute_potential_forces(
     return compute_potential_forces(seen.positions, neighbors, seen.obstacle_points, goals, gains)
 
 
-def _find_separated_neighbors(seen: Observations, reach: float) -> NearNeighbors:
-    """Return near neighbors; robots at the same position get a direction as well."""
-    pairs = seen.find_near_neighbors(reach)
+def _find_separated_neighbors(seen: Observations, max_distance: float) -> NearNeighbors:
+    """Find near neighbors, and give robots at the same position a small offset from each other."""
+    pairs = seen.find_near_neighbors(max_distance)
     is_same = pairs.distance < _MIN_DISTANCE_M
     directions = compute_separations(pairs.robot[is_same], pairs.neighbor[is_same])
     pairs.offset[is_same] = _MIN_DISTANCE_M * directions
@@ -281,21 +285,25 @@ class Howard(BaseController):
         """Compute the forces F - ν q', less the viscosity, which the simulation adds itself."""
         returns = update_returns(seen, memory.returns)
         pairs = _find_separated_neighbors(seen, 2.0 * seen.region.diameter)
-        robots = sum_by_robot(
+        robot_forces = sum_by_robot(
             pairs.robot, self.k_robots * _compute_inverse_squares(pairs.offset), len(seen.positions)
         )
         if returns is None:
             offsets = np.nan_to_num(seen.positions - seen.obstacle_points)
-            obstacle = self.k_obs * _WALL_FACTOR * _compute_inverse_squares(offsets)
+            obstacle_forces = self.k_obs * _WALL_FACTOR * _compute_inverse_squares(offsets)
         else:
             # A ray that hits nothing has the offset nan, and exerts no force.
             offsets = np.nan_to_num(seen.positions[:, None] - returns)
             k_ray = self.k_obs / returns.shape[1]
-            obstacle = k_ray * _compute_inverse_squares(offsets).sum(axis=1)
+            obstacle_forces = k_ray * _compute_inverse_squares(offsets).sum(axis=1)
         friction = seen.velocities * (memory.team.viscosity - self.friction)[:, None]
         return Decision(
-            forces=robots + obstacle + friction,
-            terms={"repulsion_robots": robots, "repulsion_obstacle": obstacle, "friction": friction},
+            forces=robot_forces + obstacle_forces + friction,
+            terms={
+                "repulsion_robots": robot_forces,
+                "repulsion_obstacle": obstacle_forces,
+                "friction": friction,
+            },
             memory=replace(memory, returns=returns),
         )
 
@@ -392,7 +400,7 @@ class Poduri(BaseController):
         return links, link_ranges[is_linked]
 
     def _find_critical_links(self, seen: Observations, links: NearNeighbors, link_ranges: Array) -> BoolArray:
-        """Return a mask of the links critical for the robot or, to its knowledge, for the neighbor."""
+        """Return a mask of the links that are critical for the robot or, as far as it knows, the neighbor."""
         n = len(seen.positions)
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges

@@ -28,9 +28,9 @@ from robocov.team import Team
 _SQUARE_SIDE_M = 0.1
 """Side of the squares that store the obstacle points a robot has detected."""
 _MIN_IMPROVEMENT_M = 0.2
-"""Minimum difference for a point to count as nearer to the goal; smaller values let modes alternate."""
+"""Minimum difference for a point to count as nearer to the goal; otherwise, modes would alternate."""
 _RETURN_RADIUS_M = 0.3
-"""A robot closer to a point than this has returned to it."""
+"""Distance from a point at which a robot has returned to it."""
 _ARRIVAL_RADIUS_M = 0.05
 """Distance from a point at which a robot has arrived."""
 _MIN_BOUNDARY_LENGTH_M = 1.0
@@ -38,13 +38,13 @@ _MIN_BOUNDARY_LENGTH_M = 1.0
 _MAX_LENGTH_DECAY = 0.9
 """Factor by which the maximum length of a followed boundary shrinks with each fixed goal."""
 _CONTACT_FRACTION = 0.95
-"""A robot within the clearance of a point may approach it to this fraction of the current distance."""
+"""Fraction of the present distance to which a robot within the clearance may approach a point."""
 _MIN_LENGTH = 1e-300
 """Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
 _ROUNDING_M = 1e-9
 """Tolerance of free distances for rounding errors."""
 _MAX_RETURN_FACTOR = 3.0
-"""A robot gives up its return after the maximum length of its boundary, times this factor."""
+"""Path length after which a robot gives up its return, relative to the maximum length of its boundary."""
 
 COUNTERCLOCKWISE = 1
 CLOCKWISE = -1
@@ -124,7 +124,7 @@ class NavigationState:
         return centroid if self.fixed_goal is None else self.fixed_goal.position
 
     def release_goal(self, position: Array, centroid: Array, min_move: float) -> NavigationState:
-        """Return the state without the fixed goal if that is reached, or given up and out of date.
+        """Return the state without its fixed goal if the robot has reached it, or should try a new one.
 
         Parameters
         ----------
@@ -259,13 +259,13 @@ class TangentBug(BaseController):
             state = state.release_goal(position, centroids[i], self.moved)
             points = obstacle_points[i] - position
             clearance = float(team.radius[i]) + self.clearance
-            reach = min(float(team.sensing_range[i]), seen.region.diameter)
+            sensing_range = min(float(team.sensing_range[i]), seen.region.diameter)
             view = ObstacleView(
                 points=points,
                 directions=directions,
-                free_distances=compute_free_distances(points, directions, clearance, reach),
+                free_distances=compute_free_distances(points, directions, clearance, sensing_range),
                 clearance=clearance,
-                reach=reach,
+                sensing_range=sensing_range,
             )
             navigator = Navigator(
                 controller=self,
@@ -297,7 +297,7 @@ class TangentBug(BaseController):
 
 
 def _add_squares(squares: Squares, points: Array) -> Squares:
-    """Return the squares and those that contain the given obstacle points, (k, 2) m; nan for none."""
+    """Return the squares together with those that contain obstacle points, (k, 2) m; nan for none."""
     detected = points[~np.isnan(points[:, 0])]
     indices = np.floor(detected / _SQUARE_SIDE_M).astype(np.intp)
     return squares | {(column, row) for column, row in indices.tolist()}
@@ -324,7 +324,7 @@ class ObstacleView:
     """(k,) Distance that the robot can move straight along each ray."""
     clearance: float
     """Distance that its center keeps from obstacles."""
-    reach: float
+    sensing_range: float
     """Range of its sensor."""
 
     def contains(self, point: Array) -> bool:
@@ -335,7 +335,9 @@ class ObstacleView:
     def compute_free_distance(self, point: Array) -> float:
         """Return the distance that the robot can move straight toward a point, which it may pass."""
         direction = point / max(math.hypot(*point), _MIN_LENGTH)
-        return float(compute_free_distances(self.points, direction[None], self.clearance, self.reach)[0])
+        return float(
+            compute_free_distances(self.points, direction[None], self.clearance, self.sensing_range)[0]
+        )
 
     def find_nearest_point(self) -> Array | None:
         """Return the nearest obstacle point, (2,), or None if the robot sees no obstacle."""
@@ -367,7 +369,7 @@ class ObstacleView:
             rays = (first_ray + turn * np.arange(len(self.directions))) % len(self.directions)
             distances = self.free_distances[rays]
             previous = np.append(blocked_distance, distances[:-1])
-            is_past_end = (distances > previous + jump) | (distances >= self.reach)
+            is_past_end = (distances > previous + jump) | (distances >= self.sensing_range)
             if is_past_end.any():
                 k = int(is_past_end.argmax())
                 # The robot moves to a free point close to the contour, not to the far end of the free ray.
@@ -411,7 +413,7 @@ class Navigator:
 
     def _is_free_ahead(self) -> bool:
         """Return whether the sensor sees no obstacle on the straight path to the goal."""
-        return self.view.compute_free_distance(self.goal) >= self.view.reach - _ROUNDING_M
+        return self.view.compute_free_distance(self.goal) >= self.view.sensing_range - _ROUNDING_M
 
     def _must_approach_waypoint(self, state: NavigationState) -> bool:
         """Return whether the waypoint is in view, and the robot has not yet reached it."""
@@ -572,7 +574,7 @@ class Navigator:
 
 
 @kernel
-def compute_free_distances(points: Array, directions: Array, clearance: float, reach: float) -> Array:
+def compute_free_distances(points: Array, directions: Array, clearance: float, max_distance: float) -> Array:
     """Compute the distance that a disc can move straight in each direction.
 
     Parameters
@@ -584,8 +586,8 @@ def compute_free_distances(points: Array, directions: Array, clearance: float, r
     clearance : float, m
         Distance that the center keeps from the points. Points that are already nearer may be approached to
         95 % of their distance.
-    reach : float, m
-        Maximum result.
+    max_distance : float, m
+        Upper limit of the distances.
 
     Returns
     -------
@@ -599,13 +601,15 @@ def compute_free_distances(points: Array, directions: Array, clearance: float, r
     free_distances = np.empty(len(directions))
     for k in range(len(directions)):
         direction_x, direction_y = directions[k]
-        free_distances[k] = reach
+        free_distances[k] = max_distance
         for x, y in points:
+            # The coordinates of the point along the direction and across it. The disc meets the clearance of
+            # the point at the distance along - sqrt(min_distance² - across²).
             along = direction_x * x + direction_y * y
             across = direction_x * y - direction_y * x
             min_distance = min(clearance, _CONTACT_FRACTION * math.sqrt(x * x + y * y))
             squared_depth = min_distance * min_distance - across * across
-            # Comparisons with nan are false: there is no point.
+            # For nan, which stands for no point, both comparisons are false.
             if along > 0.0 and squared_depth > 0.0:
                 free_distance = max(along - math.sqrt(squared_depth), 0.0)
                 free_distances[k] = min(free_distances[k], free_distance)

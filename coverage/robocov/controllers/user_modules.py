@@ -25,6 +25,7 @@ from robocov.errors import ControllerEndedError, ParameterError, RobocovError, d
 MODULE_PREFIX = "robocov_user_"
 """Prefix of the names of modules that are loaded from users' files."""
 _LIBRARY_FOLDER = str(Path(__file__).parents[1])
+"""Folder of robocov itself."""
 _PACKAGE_FOLDERS = frozenset(("site-packages", "dist-packages"))
 """Names of folders of installed packages."""
 
@@ -55,16 +56,16 @@ class _Call(NamedTuple):
     line: int
 
 
-def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovError:
+def explain_fault(context: str, error: BaseException, ending: str = "") -> RobocovError:
     """Return an error with a one-line explanation of an exception in code outside robocov.
 
     Parameters
     ----------
-    where : str
+    context : str
         Beginning of the message, which names the controller.
     error : BaseException
         The exception that the code raised. Notes such as "robot 3" are added to the message.
-    when : str
+    ending : str
         End of the message, such as " at 0.117 s".
 
     Returns
@@ -76,15 +77,15 @@ def explain_fault(where: str, error: BaseException, when: str = "") -> RobocovEr
     """
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
     location = _format_fault_location(error)
-    suffix = location + "".join(f" for {note}" for note in notes) + when
+    suffix = location + "".join(f" for {note}" for note in notes) + ending
     try:
         message = str(error)
     except Exception:  # The class of the exception may be the user's own.
         message = "it has no message"
     fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
     if isinstance(error, Exception):
-        return ParameterError(f"{where}: {fault}{suffix}")
-    return ControllerEndedError(f"{where}: it ended Python with {fault}{suffix}")
+        return ParameterError(f"{context}: {fault}{suffix}")
+    return ControllerEndedError(f"{context}: it ended Python with {fault}{suffix}")
 
 
 def explain_user_fault(error: BaseException) -> RobocovError | None:
@@ -346,7 +347,7 @@ class _TextFinder(importlib.abc.MetaPathFinder):
 
 @contextmanager
 def provide_modules(modules: Mapping[str, ModuleText]) -> Iterator[None]:
-    """Within the context, import modules from their texts instead of others of the same names.
+    """Within the context, import modules from their stored texts instead of their files.
 
     Parameters
     ----------

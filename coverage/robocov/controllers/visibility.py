@@ -95,11 +95,11 @@ class Visibility(BaseController):
         team = memory.team
         gradient = memory.gradient
         speed_fraction = memory.speed_fraction
-        reach = np.minimum(team.sensing_range, seen.region.diameter)
-        view = compute_view(seen, memory.view, self.scanning, reach)
+        max_distances = np.minimum(team.sensing_range, seen.region.diameter)
+        view = compute_view(seen, memory.view, self.scanning, max_distances)
         # Robots follow the same gradient until the next scan.
         if gradient is None or speed_fraction is None or seen.scans is not None:
-            gradient = self.compute_gradient(seen, view, reach)
+            gradient = self.compute_gradient(seen, view, max_distances)
             speed_fraction = compute_speed_fractions(gradient, memory.gradient, speed_fraction)
         returns = update_returns(seen, memory.returns)
         velocities = (
@@ -117,14 +117,14 @@ class Visibility(BaseController):
             ),
         )
 
-    def compute_gradient(self, seen: Observations, view: View, reach: Array) -> Array:
+    def compute_gradient(self, seen: Observations, view: View, max_distances: Array) -> Array:
         """Compute the gradient of the area of each robot's cell.
 
         Parameters
         ----------
         seen : Observations
         view : View
-        reach : (n,) array, m
+        max_distances : (n,) array, m
             Maximum distance of each robot's view.
 
         Returns
@@ -136,12 +136,13 @@ class Visibility(BaseController):
         directions = compute_ray_directions(ray_count)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         wall_distances = np.where(view.hit, view.distances, np.inf)
-        pairs = seen.find_near_neighbors(2.0 * float(reach.max()))
+        pairs = seen.find_near_neighbors(2.0 * float(max_distances.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
-        weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, reach)
-        arcs = ~view.hit * weight[..., -1] * reach[:, None] * (2.0 * np.pi / ray_count)
-        windows = find_windows(view, directions, reach, self.jump)
+        weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, max_distances)
+        # The weight at the sensing range, times the length of the arc there, for rays that hit no obstacle.
+        arcs = ~view.hit * weight[..., -1] * max_distances[:, None] * (2.0 * np.pi / ray_count)
+        windows = find_windows(view, directions, max_distances, self.jump)
         # The last sample is the end of the ray, which only the arcs need.
         growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
         window_terms = sum_by_robot(windows.robot, growth, robot_count)
@@ -150,7 +151,7 @@ class Visibility(BaseController):
 
 @kernel
 def find_cells_in_view(
-    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, reach: Array
+    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, max_distances: Array
 ) -> BoolArray:
     """Find the points of each robot's view that belong to its cell.
 
@@ -164,7 +165,7 @@ def find_cells_in_view(
         Unit vectors along the rays.
     pairs : NearNeighbors
         The neighbors that may see points of the view.
-    reach : (n,) array, m
+    max_distances : (n,) array, m
         Maximum distance of each robot's view.
 
     Returns
@@ -178,7 +179,7 @@ def find_cells_in_view(
         # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
         neighbor_x = -pairs.offset[pair, 0]
         neighbor_y = -pairs.offset[pair, 1]
-        neighbor_reach = reach[pairs.neighbor[pair]]
+        neighbor_range = max_distances[pairs.neighbor[pair]]
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):
@@ -187,9 +188,9 @@ def find_cells_in_view(
                 y = depths[robot, ray, k] * directions[ray, 1]
                 dx = neighbor_x - x
                 dy = neighbor_y - y
-                # The neighbor can only see points with a power of at most 0, which are within its reach.
-                power = dx * dx + dy * dy - neighbor_reach * neighbor_reach
-                own_power = depths[robot, ray, k] ** 2 - reach[robot] ** 2
+                # The neighbor can only see points within its sensing range, where the power is at most 0.
+                power = dx * dx + dy * dy - neighbor_range * neighbor_range
+                own_power = depths[robot, ray, k] ** 2 - max_distances[robot] ** 2
                 if power <= 0.0 and power < own_power and is_own[robot, ray, k]:
                     is_own[robot, ray, k] = not is_path_clear(x, y, dx, dy, wall_distances[robot])
     return is_own

@@ -247,7 +247,7 @@ class GridPlanner(MapWindow):
         return self._search(np.concatenate(first_nodes), np.concatenate(lengths))
 
     def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
-        """Compute the distance from each node to the nearest of `nodes`, where paths start with offsets, m."""
+        """Compute the distance from each node to the nearest of `nodes`, at which paths have offsets, m."""
         return compute_distances(
             self._edges,
             self.spacing,

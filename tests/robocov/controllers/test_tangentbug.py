@@ -123,7 +123,7 @@ def test_a_disc_that_is_too_near_may_move_away_and_along() -> None:
 def view_obstacles(points: np.ndarray) -> ObstacleView:
     directions = compute_ray_directions(360)
     free_distances = compute_free_distances(points, directions, 0.1, 3.0)
-    return ObstacleView(points, directions, free_distances, clearance=0.1, reach=3.0)
+    return ObstacleView(points, directions, free_distances, clearance=0.1, sensing_range=3.0)
 
 
 def test_the_ends_of_a_wall_are_found() -> None:
