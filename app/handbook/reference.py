@@ -26,7 +26,7 @@ from robocov.metrics.run_metrics import COLUMNS
 from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
 from robocov_app.editor.ui.launch import EditorLauncher
-from robocov_app.sweep.study_file import list_study_keys
+from robocov_app.sweep.study.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
 from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.window.input import format_key, split_key_name

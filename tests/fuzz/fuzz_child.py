@@ -124,7 +124,7 @@ def _map(path: Path, job: dict[str, Any]) -> str:
 
 
 def _study(path: Path, job: dict[str, Any]) -> str:
-    from robocov_app.sweep.study_file import read_study
+    from robocov_app.sweep.study.study_file import read_study
 
     study = read_study(path)
     return f"{len(study.maps)} maps, {len(study.controllers)} controllers"
@@ -185,7 +185,7 @@ def _load() -> None:
     """Import the modules that readers need, so that their time and memory are not counted."""
     import robocov_app.commands.maps.check
     import robocov_app.formats
-    import robocov_app.sweep.study_file  # noqa: F401
+    import robocov_app.sweep.study.study_file  # noqa: F401
 
 
 def _limit() -> None:

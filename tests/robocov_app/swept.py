@@ -7,7 +7,7 @@ from typing import Any
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart
 from robocov_app.sweep.executor import Executor, Result
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import perform
 

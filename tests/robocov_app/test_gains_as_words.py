@@ -20,9 +20,9 @@ from robocov_app.report.analysis.groups import find_varying_gains, format_gains
 from robocov_app.report.plots.parameter_plots import build_parameter_plots
 from robocov_app.report.results.loading import load_result
 from robocov_app.report.tables.controllers import build_controllers_table
-from robocov_app.sweep.gains import build_gains
-from robocov_app.sweep.sampling import Range, Sampling
-from robocov_app.sweep.study_file import read_study
+from robocov_app.sweep.study.gains import build_gains
+from robocov_app.sweep.study.sampling import Range, Sampling
+from robocov_app.sweep.study.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 

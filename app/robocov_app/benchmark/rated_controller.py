@@ -14,7 +14,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.results import find_reference
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 
 ORACLE = "oracle"
 """Name of the controller that knows the reference placements; see `robocov_app.benchmark.oracle`."""

@@ -18,7 +18,7 @@ from robocov_app.benchmark.results import (
     identify_suite,
 )
 from robocov_app.sweep.ledger import Ledger
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import EFFORT_FILE, list_result_versions

@@ -19,7 +19,7 @@ from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.evaluation.hot_spots import add_hot_spots
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 
 VERSION = "v1"
 """Version of the suite."""

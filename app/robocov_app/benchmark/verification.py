@@ -35,7 +35,7 @@ from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_res
 from robocov_app.evaluation.reference_search import ReferenceQuery, answer_queries
 from robocov_app.sweep.ledger import describe_version_differences
 from robocov_app.sweep.progress import SweepProgress, report_progress
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption

@@ -17,7 +17,7 @@ from robocov_app.terminal.output import print_answer
 
 if TYPE_CHECKING:
     from robocov_app.sweep.estimate import SweepEstimate
-    from robocov_app.sweep.study import Study
+    from robocov_app.sweep.study.study import Study
     from robocov_app.sweep.sweeping import Totals
 
 FAILED = 1
@@ -75,7 +75,7 @@ def command(options: Arguments) -> int:
     """Run `robocov sweep`, and return its exit status."""
     if options.parquet:
         import_optional("pyarrow", "parquet")
-    from robocov_app.sweep.study_file import read_study
+    from robocov_app.sweep.study.study_file import read_study
 
     study = read_study(options.study)
     out = options.out or Path(options.study.stem)

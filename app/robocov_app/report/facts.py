@@ -7,7 +7,7 @@ from robocov.errors import format_count
 from robocov_app.render.density_text import describe_density
 from robocov_app.report.analysis.groups import format_gains, format_setting
 from robocov_app.report.results.result import ReportedResult, ReportedRun, replace_unprintable
-from robocov_app.sweep.parameters import UNITS, format_parameter
+from robocov_app.sweep.study.parameters import UNITS, format_parameter
 
 _MAX_LISTED_NAMES = 4
 _MAX_LISTED_SEEDS = 12

@@ -10,7 +10,7 @@ from itertools import count
 
 from robocov.mapfile import load_map
 from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
 YARDSTICK = "import numpy"

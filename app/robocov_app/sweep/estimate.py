@@ -8,7 +8,7 @@ from itertools import compress
 from pathlib import Path
 
 from robocov_app.sweep.ledger import Ledger
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform, prepare_cost
 

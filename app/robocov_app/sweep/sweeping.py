@@ -18,7 +18,7 @@ from robocov_app.sweep.executor import Executor
 from robocov_app.sweep.ledger import Ledger, Survey, describe_version_differences, open_ledger
 from robocov_app.sweep.local_pool import LocalPool, count_processors
 from robocov_app.sweep.progress import ProgressReporter, SweepProgress, report_progress
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.table import Table, build_columns, build_row
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import Outcome

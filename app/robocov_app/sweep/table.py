@@ -18,8 +18,8 @@ from robocov.files.writing import flush_to_disk, resolve_target
 from robocov.metrics.results import read_rows
 from robocov.optional_imports import import_optional
 from robocov_app.sweep.ledger import Entry, count_rows, has_all_rows
-from robocov_app.sweep.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import FIGURES, MEAN_TIME
 from robocov_app.terminal.output import format_csv_line

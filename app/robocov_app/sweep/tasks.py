@@ -16,8 +16,8 @@ from robocov.controllers.user_modules import ControllerSource
 from robocov.environment import Environment
 from robocov.mapfile import from_json, to_json
 from robocov.scenario import Scenario
-from robocov_app.sweep.parameters import ParameterValue, build_conditions, build_swept_team
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.parameters import ParameterValue, build_conditions, build_swept_team
+from robocov_app.sweep.study.study import Study
 
 MAX_CACHED_MAPS = 4
 """Maximum number of maps that a process keeps in memory; a few are enough, as tasks are sorted by map."""

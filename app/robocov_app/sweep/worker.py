@@ -25,8 +25,8 @@ from robocov.record import Record, list_versions
 from robocov.simulation import Simulation
 from robocov_app.jobs.messages import Channel
 from robocov_app.runs.cost_table import build_cost_table
-from robocov_app.sweep.controller_files import source_to_json
-from robocov_app.sweep.parameters import build_swept_team
+from robocov_app.sweep.study.controller_files import source_to_json
+from robocov_app.sweep.study.parameters import build_swept_team
 from robocov_app.sweep.tasks import MAX_CACHED_MAPS, Task, parse_map
 from robocov_app.terminal.output import format_csv, format_json, replace_non_finite
 

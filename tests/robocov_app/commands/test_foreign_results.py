@@ -16,7 +16,7 @@ from robocov_app.notebook import render_record_html, render_record_png
 from robocov_app.replication.design.contenders import Contender
 from robocov_app.replication.design.studies import Contest
 from robocov_app.replication.results.outcome_tables import read_outcomes
-from robocov_app.sweep.study_file import read_study
+from robocov_app.sweep.study.study_file import read_study
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.missing_controller import MissingController
 from robocov_app.viewer.window.window import ViewerWindow

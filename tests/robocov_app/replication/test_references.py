@@ -13,7 +13,7 @@ from robocov_app.evaluation.reference_search import ReferencePlacement, Referenc
 from robocov_app.replication.design.plan import QUICK
 from robocov_app.replication.results import references
 from robocov_app.replication.results.references import find_references
-from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.study.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 
 HALL = Environment("hall", ((0, 0), (9, 0), (9, 3), (0, 3)), (), {"spread": UniformStart()})

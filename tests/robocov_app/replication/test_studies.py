@@ -35,7 +35,7 @@ from robocov_app.replication.design.plan import (
     UNSEEN,
 )
 from robocov_app.replication.evidence import load_profile
-from robocov_app.sweep.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
+from robocov_app.sweep.study.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
 from robocov_app.sweep.tasks import generate_tasks
 
 BEST = {

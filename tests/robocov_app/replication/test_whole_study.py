@@ -41,7 +41,7 @@ from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_fig
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.pages import study_pages
 from robocov_app.replication.results import controller_speed
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]

@@ -14,7 +14,7 @@ from robocov.controllers import CONTROLLERS, get_gains
 from robocov.errors import InputError
 from robocov_app.report.results.loading import load_result
 from robocov_app.report.results.result import FIGURE_NAMES, replace_unprintable
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
 FAILING = """

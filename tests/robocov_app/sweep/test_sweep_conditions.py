@@ -8,8 +8,8 @@ from swept import build_small_study
 from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.parameters import CONDITIONS, build_conditions, parse_condition_axes
-from robocov_app.sweep.study_file import build_study
+from robocov_app.sweep.study.parameters import CONDITIONS, build_conditions, parse_condition_axes
+from robocov_app.sweep.study.study_file import build_study
 from robocov_app.sweep.table import build_columns, build_row
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform

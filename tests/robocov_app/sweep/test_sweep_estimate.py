@@ -8,7 +8,7 @@ from swept import HALL, ROOM, build_small_study
 from robocov_app.sweep import estimate as estimate_module
 from robocov_app.sweep.estimate import count_axes, estimate_sweep
 from robocov_app.sweep.ledger import open_ledger
-from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.study.study import StudyMap
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 

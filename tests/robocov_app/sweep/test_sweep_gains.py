@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Rapf, Rpf, get_gain_values, get_gains
 from robocov.errors import ParameterError
-from robocov_app.sweep.gains import build_gains
-from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod
+from robocov_app.sweep.study.gains import build_gains
+from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod
 
 METHODS = ("sobol", "halton", "latin-hypercube")
 

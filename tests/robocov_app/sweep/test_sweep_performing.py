@@ -17,7 +17,7 @@ from robocov.cost import CoverageCost
 from robocov.metrics import compute_cost_history, summarize
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.table import build_columns
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepare_cost, simulate

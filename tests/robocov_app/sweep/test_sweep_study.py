@@ -8,9 +8,9 @@ import pytest
 from swept import HALL, ROOM, build_small_study, write_controller
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.sweep.parameters import build_swept_team
-from robocov_app.sweep.sampling import Range, Sampling
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.parameters import build_swept_team
+from robocov_app.sweep.study.sampling import Range, Sampling
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.tasks import generate_tasks
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))

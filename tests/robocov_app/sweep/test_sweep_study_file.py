@@ -9,8 +9,8 @@ from swept import HALL, write_controller
 
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, save_map
-from robocov_app.sweep.parameters import build_swept_team
-from robocov_app.sweep.study_file import read_study
+from robocov_app.sweep.study.parameters import build_swept_team
+from robocov_app.sweep.study.study_file import read_study
 
 STUDY = """
 maps = ["rooms", "plans/hall.json"]

@@ -23,7 +23,7 @@ from robocov_app.cli import main
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.executor import Executor, Result
 from robocov_app.sweep.ledger import open_ledger
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import list_result_versions, perform

@@ -20,7 +20,7 @@ from robocov.metrics.results import read_results
 from robocov_app.cli import main
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.table import Table, build_columns, build_row, get_gain_column
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import FIGURES

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from swept import HALL, ROOM, build_small_study, write_controller
 
 from robocov.mapfile import load_map
-from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.study.study import StudyMap
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import simulate
 

@@ -28,7 +28,7 @@ from robocov_app.terminal.output import check_output_file, echo, print_answer
 from robocov_app.terminal.progress import show_progress
 
 if TYPE_CHECKING:
-    from robocov_app.sweep.study import StudyMap
+    from robocov_app.sweep.study.study import StudyMap
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
 """Kinds of generated maps."""

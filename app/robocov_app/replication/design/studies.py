@@ -31,8 +31,8 @@ from robocov_app.replication.design.study_maps import (
     build_unseen_maps,
     load_study_map,
 )
-from robocov_app.sweep.parameters import TEAM_PARAMETERS
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.parameters import TEAM_PARAMETERS
+from robocov_app.sweep.study.study import Study, StudyMap
 
 
 class FigureCase(NamedTuple):

@@ -14,7 +14,7 @@ from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, KINDS, UNSEEN, Plan
-from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.study.study import StudyMap
 
 START_RADII_M = (0.8, 0.6, 0.45)
 """Radii of the discs of clustered starts; the first that fits is used."""

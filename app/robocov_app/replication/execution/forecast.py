@@ -13,7 +13,7 @@ from robocov_app.replication.design.contenders import UNTUNED, Contender, build_
 from robocov_app.replication.design.plan import Plan
 from robocov_app.replication.execution.runner import get_study_folder
 from robocov_app.sweep import worker
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
 

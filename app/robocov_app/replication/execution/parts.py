@@ -58,7 +58,7 @@ from robocov_app.replication.results.study_results import (
     ShownRuns,
 )
 from robocov_app.sweep import worker
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
 _WORST_RUNS = 4

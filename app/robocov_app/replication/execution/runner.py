@@ -16,7 +16,7 @@ from robocov_app.sweep import worker
 from robocov_app.sweep.ledger import Ledger, open_ledger
 from robocov_app.sweep.local_pool import LocalPool
 from robocov_app.sweep.progress import SweepProgress, report_progress
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import execute_tasks, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.terminal.interruption import Interruption

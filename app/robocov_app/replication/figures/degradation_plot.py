@@ -15,7 +15,7 @@ from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.figures.paper_figures import CAPTIONS
 from robocov_app.replication.results.study_results import Degradation
-from robocov_app.sweep.parameters import UNITS
+from robocov_app.sweep.study.parameters import UNITS
 
 _SIZE_PX = (1180, 720)
 _MAX_COLUMNS = 3

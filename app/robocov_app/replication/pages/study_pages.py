@@ -46,7 +46,7 @@ from robocov_app.report.replay import (
     wrap_script,
 )
 from robocov_app.report.theme_css import build_theme_rules
-from robocov_app.sweep.parameters import UNITS
+from robocov_app.sweep.study.parameters import UNITS
 from robocov_app.terminal.output import replace_non_finite
 
 PAGE_FILE = "index.html"

@@ -17,7 +17,7 @@ from robocov.record import list_versions
 from robocov.scenario import Scenario
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.design.plan import TEAM, Plan
-from robocov_app.sweep.parameters import build_swept_team
+from robocov_app.sweep.study.parameters import build_swept_team
 
 BASELINE = "rapf"
 """Reference controller for the step times of all others."""

@@ -12,7 +12,7 @@ from robocov_app.replication.design.contenders import RAPF_SHARED
 from robocov_app.replication.design.plan import Plan
 from robocov_app.replication.results.controller_speed import UNKNOWN
 from robocov_app.replication.results.study_results import IDEAL, Degradation
-from robocov_app.sweep.parameters import name_parameter_column
+from robocov_app.sweep.study.parameters import name_parameter_column
 
 Costs: TypeAlias = dict[tuple[str, int], float]
 """Final costs, m, by map and seed."""

@@ -17,7 +17,7 @@ from robocov_app.replication.results.outcomes import (
     compute_mean_until,
 )
 from robocov_app.replication.results.references import References
-from robocov_app.sweep.study import Study
+from robocov_app.sweep.study.study import Study
 
 EARLY_S = 20.0
 """Time in which a team spreads over a convex region of ten meters; Lloyd's algorithm has settled by then."""

@@ -16,7 +16,7 @@ from robocov_app.evaluation.reference_search import (
     answer_queries,
 )
 from robocov_app.replication.design.plan import ROBOTS, TEAM, Plan
-from robocov_app.sweep.study import StudyMap
+from robocov_app.sweep.study.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import show_progress
 

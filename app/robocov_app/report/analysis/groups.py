@@ -10,7 +10,7 @@ from robocov.controllers.gains import Value, format_value
 from robocov_app.figures.statistics import group_by
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.report.results.result import Gains, ReportedResult, ReportedRun, Setting
-from robocov_app.sweep.parameters import format_parameter
+from robocov_app.sweep.study.parameters import format_parameter
 
 MAX_VARIANTS = 8
 """Maximum number of variants that are shown separately. If there are more, each controller is one group."""

@@ -21,7 +21,7 @@ from robocov_app.report.plots.plot import (
 )
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 from robocov_app.report.svg import inline_svg
-from robocov_app.sweep.parameters import TEXT_PARAMETERS, UNITS
+from robocov_app.sweep.study.parameters import TEXT_PARAMETERS, UNITS
 
 _MAX_MISSING_FRACTION = 0.5
 """If more combinations of two gains are missing, they do not form a grid."""

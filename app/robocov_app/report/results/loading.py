@@ -33,7 +33,7 @@ from robocov_app.report.results.result import (
     replace_unprintable,
 )
 from robocov_app.runs.saved_runs import ComparisonDocument, SavedRun, build_roster, load_saved_runs
-from robocov_app.sweep.parameters import UNITS, name_parameter_column
+from robocov_app.sweep.study.parameters import UNITS, name_parameter_column
 from robocov_app.sweep.table import get_gain_column
 
 

@@ -16,8 +16,8 @@ from robocov.errors import JsonPath, ParameterError, describe_unknown_name, form
 from robocov.team import KINEMATICS, Team
 from robocov.team import UNITS as TEAM_UNITS
 from robocov.team_files import build_team
-from robocov_app.sweep.gains import NO_LIMIT
-from robocov_app.sweep.paths import parse_values, validate_at
+from robocov_app.sweep.study.gains import NO_LIMIT
+from robocov_app.sweep.study.value_paths import parse_values, validate_at
 
 ParameterValue: TypeAlias = float | str | None
 """Value of a parameter of the team, or of a condition; None means no limit."""

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias, get_args
 from robocov.controllers import get_gain_values, get_gains
 from robocov.controllers.gains import Gain, Option, Value, instantiate_controller
 from robocov.errors import JsonPath, ParameterError, describe_unknown_name, format_path, quote
-from robocov_app.sweep.paths import parse_values, require_distinct, validate_at
-from robocov_app.sweep.sampling import Range, Sampling, Scale
+from robocov_app.sweep.study.sampling import Range, Sampling, Scale
+from robocov_app.sweep.study.value_paths import parse_values, require_distinct, validate_at
 
 NO_LIMIT = "null"
 """Represents None in study files, because TOML has no null."""

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robocov.errors import ParameterError
-from robocov_app.sweep.gains import Gains
-from robocov_app.sweep.sampling import Range, Sampling
+from robocov_app.sweep.study.gains import Gains
+from robocov_app.sweep.study.sampling import Range, Sampling
 
 DEFAULT_MAX_RUNS = 100_000
 """Maximum number of runs unless the study sets another one. This number takes some days on ten cores."""

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple, TypeAlias, get_args
 from robocov.errors import InputError, JsonPath, describe_unknown_name, format_path, quote, to_one_line
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
-from robocov_app.sweep.gains import NO_LIMIT
-from robocov_app.sweep.parameters import CONDITIONS, KINEMATIC_DEFAULTS, TEAM_PARAMETERS
-from robocov_app.sweep.paths import require_distinct
-from robocov_app.sweep.sampling import Range, Sampling, SamplingMethod, Scale
-from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.study.gains import NO_LIMIT
+from robocov_app.sweep.study.parameters import CONDITIONS, KINEMATIC_DEFAULTS, TEAM_PARAMETERS
+from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod, Scale
+from robocov_app.sweep.study.study import Study, StudyMap
+from robocov_app.sweep.study.value_paths import require_distinct
 
 ALL_MAPS = "*"
 """Name that selects all bundled maps."""

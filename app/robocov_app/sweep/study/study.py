@@ -39,9 +39,9 @@ from robocov.scenario import MAX_RECORD_ROWS
 from robocov.simulation import check_dt, check_joins
 from robocov.team_files import build_team
 from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
-from robocov_app.sweep.controller_files import load_study_controller, source_to_json
-from robocov_app.sweep.gains import Gains, GainsSpecification, build_gains
-from robocov_app.sweep.parameters import (
+from robocov_app.sweep.study.controller_files import load_study_controller, source_to_json
+from robocov_app.sweep.study.gains import Gains, GainsSpecification, build_gains
+from robocov_app.sweep.study.parameters import (
     GROUPS,
     KINEMATIC_DEFAULTS,
     TEAM_PARAMETERS,
@@ -51,9 +51,9 @@ from robocov_app.sweep.parameters import (
     parse_condition_axes,
     parse_parameter,
 )
-from robocov_app.sweep.paths import parse_values, require_distinct
-from robocov_app.sweep.sampling import MAX_SEED, Sampling
-from robocov_app.sweep.study_size import DEFAULT_MAX_RUNS, MAX_MAX_RUNS, count_values, require_few_runs
+from robocov_app.sweep.study.sampling import MAX_SEED, Sampling
+from robocov_app.sweep.study.study_size import DEFAULT_MAX_RUNS, MAX_MAX_RUNS, count_values, require_few_runs
+from robocov_app.sweep.study.value_paths import parse_values, require_distinct
 
 ALL_STARTS = "*"
 """Selects all starts of each map."""

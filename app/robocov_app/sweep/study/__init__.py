@@ -1,0 +1,1 @@
+"""Studies, which define sweeps: their files, parameters, gains and size."""
