@@ -91,6 +91,9 @@ class Scene:
     moving : sequence of MovingObstacle
     failed_radii : mapping of int to float, m
         Radii of failed robots, by their numbers.
+    memory_rows : (n,) int array or None
+        Rows of the robots in the memory of the controller, which may contain further robots; by default
+        0 to n - 1.
     """
 
     environment: Environment
@@ -116,6 +119,7 @@ class Scene:
     cell_owners: IntArray | None = None
     moving: Sequence[MovingObstacle] = ()
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
+    memory_rows: IntArray | None = None
 
     def get_failed_radius(self, number: int) -> float:
         """Return the radius of a failed robot, m; if it is unknown, that of the first working robot."""

@@ -81,7 +81,7 @@ def test_robots_fail_and_join_by_themselves() -> None:
     assert [event.text for event in session.timeline.events] == ["robot 2 failed"]
     advance_session(session, 6)
     assert session.displayed.numbers == (1, 3, 4)
-    position = session.timeline.panes[0].simulation.positions[1]
+    position = session.timeline.panes[0].positions[1]
     assert np.hypot(*(position - [4.5, 2.0])) < 0.2
 
 
@@ -101,7 +101,7 @@ def test_messages_of_the_past_are_recomputed() -> None:
     pane = session.timeline.panes[0]
     snapshots = []
     for _ in range(12):
-        snapshots.append(pane.simulation.observe_and_decide())
+        snapshots.append(pane.observe_and_decide())
         session.playback.step()
     session.show_time(8 * DT)
     snapshot = session.displayed.get_snapshot(pane)
@@ -164,7 +164,7 @@ def test_the_beliefs_of_the_selected_robot_are_drawn() -> None:
     session = start_session()
     advance_session(session, 12)
     pane = session.timeline.panes[0]
-    scene = Scene.from_snapshot(HALL, pane.setup.team, pane.simulation.observe_and_decide())
+    scene = Scene.from_snapshot(HALL, pane.setup.team, pane.observe_and_decide())
     painter = Painter(HALL, (400, 300), LIGHT, build_standard_layers(), 1.0)
     # The cells of all robots are the true ones, which neither overlap nor leave gaps.
     assert scene.cells is not None

@@ -17,6 +17,8 @@ TOLERANCE_M = 1e-6
 """Other processors may round the last digits differently."""
 NEW_KEYS = {'"touches":': '"edits":', '"words":': '"description":'}
 """Keys that have another name since; the files have the old names."""
+NEW_DIGESTS = {"f80cc6154428d973": "cba28802d2e3d19d"}
+"""Digests of maps, which no longer depend on the descriptions."""
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -28,6 +30,8 @@ def test_a_file_that_is_read_and_written_again_differs_only_in_its_keys(file: Pa
     for old_key, new_key in NEW_KEYS.items():
         assert old_key in expected
         expected = expected.replace(old_key, new_key)
+    for old_digest, new_digest in NEW_DIGESTS.items():
+        expected = expected.replace(old_digest, new_digest)
     assert format_session(content) == expected
 
 
@@ -41,4 +45,4 @@ def test_every_branch_of_an_old_file_ends_where_it_ended(file: Path) -> None:
         assert {str(pane.number) for pane in session.timeline.panes} == set(positions_by_pane)
         for pane in session.timeline.panes:
             expected = positions_by_pane[str(pane.number)]
-            np.testing.assert_allclose(pane.simulation.positions, expected, atol=TOLERANCE_M)
+            np.testing.assert_allclose(pane.positions, expected, atol=TOLERANCE_M)

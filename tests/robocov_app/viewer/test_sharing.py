@@ -176,6 +176,33 @@ def test_robots_that_fail_are_in_the_session_that_the_command_runs(tmp_path: Pat
     assert len(run_python(script)[0]) == 3
 
 
+@pytest.mark.parametrize("name", ["rapf", "frontier-median"])
+def test_the_script_repeats_robots_that_fail_and_join(name: str, tmp_path: Path) -> None:
+    """The window lost the maps of the robots, and the numbers of their noise, whenever the team changed."""
+    conditions = Conditions(failures=[(2, 0.2)], joins=[(3, 0.3)], position_noise=0.01, loss=0.1, seed=0)
+    controller = ControllerChoice(name)
+    with open_viewer(
+        tmp_path, controller, environment=ROOMS, map_name="rooms", robots=4, conditions=conditions
+    ) as driver:
+        advance_session(driver.session, STEPS)
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+        assert driver.session.displayed.numbers == (1, 3, 4)
+    assert "#" not in script
+    (found,) = run_python(script)
+    assert np.array_equal(found[[0, 2, 3]], expected)
+
+
+def test_the_window_lets_the_last_robot_work_and_the_script_says_so(tmp_path: Path) -> None:
+    conditions = Conditions(failures=[(1, 0.1), (2, 0.2)], seed=0)
+    with open_viewer(
+        tmp_path, environment=ROOMS, map_name="rooms", robots=2, conditions=conditions
+    ) as driver:
+        advance_session(driver.session, STEPS)
+        assert driver.session.displayed.numbers == (2,)
+        assert "positions differ from those in the window" in copy_text(driver, "share:python")
+
+
 def test_robots_that_differ_are_in_the_script(tmp_path: Path) -> None:
     properties = RobotProperties(values_by_robot={"max_speed": {2: 0.3}})
     with open_viewer(tmp_path, environment=ROOMS, map_name="rooms", properties=properties) as driver:

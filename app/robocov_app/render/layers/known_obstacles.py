@@ -122,9 +122,12 @@ def get_discovered_map(scene: Scene) -> DiscoveredMap | None:
         return None
     # Controllers of users define memories of their own, which need not have maps.
     maps = getattr(scene.snapshot.decision.memory, "maps", ())
-    if scene.selected >= len(maps):
+    row = scene.selected
+    if scene.memory_rows is not None:
+        row = int(scene.memory_rows[row])
+    if row >= len(maps):
         return None
-    known_map = maps[scene.selected]
+    known_map = maps[row]
     if not isinstance(known_map, DiscoveredMap):
         return None
     return known_map

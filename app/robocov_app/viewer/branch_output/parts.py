@@ -135,7 +135,7 @@ class BranchPart:
         """Record the current step of a run, and the robots that the user places or drags in it."""
         self.last_step = run.step
         for pane in run.panes:
-            self.recorders[pane.number].add(pane.simulation.observe_and_decide())
+            self.recorders[pane.number].add(pane.observe_and_decide())
         placed = {edit.robot for edit in node.edits if edit.step == run.step and isinstance(edit, PlaceRobot)}
         self.placed += [(run.step, robot) for robot in sorted(placed)]
         dragged = set() if run.drag is None else {run.drag.robot}
@@ -195,7 +195,7 @@ def _build_recorder(setup: PaneSetup, dt: float) -> Recorder:
         controller.build(),
         dt,
         name=controller.name,
-        conditions=setup.conditions,
+        conditions=setup.constant_conditions,
     )
 
 
@@ -266,7 +266,8 @@ def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
     """Return whether a simulation from the start of the record, without user actions, reproduces it."""
     has_known_memory = part.first_step == 0 or not has_memory(setup.controller.build())
     is_turned = record.steering is not None and bool(record.steering[0].any())
-    return has_known_memory and not part.handled and not is_turned
+    has_all_robots = setup.numbers == setup.simulated_numbers
+    return has_known_memory and has_all_robots and not part.handled and not is_turned
 
 
 def _describe_handled(time: HandledTime, first_step: int, dt: float) -> dict[str, Any]:
@@ -296,5 +297,5 @@ def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str 
     caption = ""
     if mean_distances:
         caption = format_cost(get_cost_name(pane.setup.environment), mean_distances[-1], None)
-    snapshot = pane.simulation.observe_and_decide()
+    snapshot = pane.observe_and_decide()
     return pane.build_scene(pane.setup, snapshot, pane.trail.get_until(pane.time), cost=caption)

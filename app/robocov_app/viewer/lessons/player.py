@@ -113,7 +113,7 @@ def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) 
     row = pane.get_row(robot)
     if row is None:
         return False
-    position = pane.simulation.positions[row]
+    position = pane.positions[row]
 
     def is_within(box: list[float]) -> bool:
         return bool((box[:2] <= position).all() and (position <= box[2:]).all())

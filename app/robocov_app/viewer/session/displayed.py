@@ -9,7 +9,7 @@ from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Snapshot
-from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.pane import Pane, resume_simulation, select_working
 from robocov_app.viewer.session.past.decision_replay import rebuild_snapshot
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ
@@ -55,15 +55,23 @@ class DisplayedState:
     def get_positions(self, pane: Pane) -> Array:
         """Return the positions of the robots of a pane, (n, 2) m."""
         if self._timeline.is_live:
-            return pane.simulation.positions
+            return pane.positions
         return self._get_state(pane).positions
 
     def get_snapshot(self, pane: Pane) -> Snapshot:
         """Return the observations and decision of a pane; the forces are zero if the controller raises."""
         if self._timeline.is_live:
             with suppress(RobocovError):
-                return pane.simulation.observe_and_decide()
-        return rebuild_snapshot(self._get_state(pane), self.time, self._timeline.scenario.dt)
+                return pane.observe_and_decide()
+        state = self._get_state(pane)
+        dt = self._timeline.scenario.dt
+        if state.setup.follows_schedule:
+            with suppress(RobocovError):
+                simulation = resume_simulation(state, dt, round(self.time / dt))
+                return select_working(simulation.observe_and_decide(), state.setup)
+            # The memory and the messages are those of all robots.
+            state = state._replace(memory=None, inbox=None)
+        return rebuild_snapshot(state, self.time, dt)
 
     def get_trail(self, pane: Pane) -> tuple[Array, Array]:
         """Return the trajectories of a pane up to the displayed time.

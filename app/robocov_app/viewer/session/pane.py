@@ -1,17 +1,23 @@
 """A pane of the window: a team under one controller."""
 
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
+from robocov.conditions import Conditions
 from robocov.controllers import has_memory
+from robocov.environment import Point
 from robocov.errors import StartError
 from robocov.observation import Snapshot
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation
+from robocov.simulation.team_state import TeamState
+from robocov.team import Team
 from robocov.world.free_positions import relocate_robots
+from robocov_app.render.record_scene import select_robots
 from robocov_app.render.scene import Scene
 from robocov_app.render.sensed_points import SensedPoints
 from robocov_app.viewer.session.past.curves import Curve
@@ -70,7 +76,7 @@ class Pane:
         self.setup = setup
         self.simulation = simulation
         self.trail = Trail(setup.tracked_numbers)
-        self.trail.add(simulation.time, simulation.positions)
+        self.trail.add(simulation.time, self.positions)
         self.curves = {"distance": Curve(), "time": Curve()}
         self.distance_curve = self.curves["distance"]
         self.sensed = SensedPoints()
@@ -85,6 +91,41 @@ class Pane:
     def numbers(self) -> tuple[int, ...]:
         """Numbers of the working robots."""
         return self.setup.numbers
+
+    @property
+    def positions(self) -> Array:
+        """Positions of the working robots, (n, 2) m."""
+        return self._select_working(self.simulation.positions)
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities of the working robots, (n, 2) m/s."""
+        return self._select_working(self.simulation.velocities)
+
+    @property
+    def steering(self) -> Array | None:
+        """Headings and turning rates of working unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        steering = self.simulation.steering
+        if steering is None:
+            return None
+        return self._select_working(steering)
+
+    @property
+    def team(self) -> Team:
+        """The working robots."""
+        if self.setup.follows_schedule:
+            return self.setup.team
+        return self.simulation.team
+
+    def _select_working(self, rows: Array) -> Array:
+        """Return the rows of the working robots."""
+        if self.setup.follows_schedule:
+            return rows[self.setup.simulated_rows]
+        return rows
+
+    def observe_and_decide(self) -> Snapshot:
+        """Return observations and decisions of the working robots; see `Simulation.observe_and_decide`."""
+        return select_working(self.simulation.observe_and_decide(), self.setup)
 
     @property
     def starts(self) -> Array:
@@ -111,11 +152,29 @@ class Pane:
             External forces on the robots.
         """
         if self._steps % STEPS_BETWEEN_SENSED_POINTS == 0:
-            seen = self.simulation.observe_and_decide().seen
+            seen = self.observe_and_decide().seen
             self.sensed.add(seen.time, self.numbers, seen.obstacle_points)
         self._steps += 1
         self.simulation.step(pushes)
-        self.trail.add(self.time, self.simulation.positions)
+        if not self.follow_schedule():
+            self.trail.add(self.time, self.positions)
+
+    def follow_schedule(self) -> bool:
+        """Adopt the robots that have failed or joined in the simulation; return whether there were any."""
+        setup = self.setup
+        if not setup.follows_schedule or setup.conditions is None:
+            return False
+        simulation = self.simulation
+        numbers = tuple((np.flatnonzero(simulation.working) + 1).tolist())
+        if numbers == setup.numbers:
+            return False
+        has_failed = setup.conditions.find_failed(simulation.time, setup.scheduled_robots)
+        failed: dict[int, Point] = {}
+        for row in np.flatnonzero(has_failed).tolist():
+            x, y = simulation.positions[row].tolist()
+            failed[row + 1] = (x, y)
+        self.adopt(replace(setup, numbers=numbers, failed=failed), simulation)
+        return True
 
     def build_scene(
         self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any
@@ -140,9 +199,10 @@ class Pane:
         positions, times = trail
         return Scene.from_snapshot(
             setup.environment,
-            self.simulation.team if setup is self.setup else setup.team,
+            self.team if setup is self.setup else setup.team,
             snapshot,
             numbers=setup.numbers,
+            memory_rows=setup.simulated_rows,
             failed=setup.failed,
             failed_radii={number: setup.properties.get_radius(number) for number in setup.failed},
             label=setup.controller.label,
@@ -159,13 +219,21 @@ class Pane:
         if has_memory(simulation.controller):
             # A user's controller may later change its memory in place.
             memory = deepcopy(simulation.memory)
+        all_robots: TeamState | None = None
+        if self.setup.follows_schedule:
+            all_robots = TeamState(
+                positions=simulation.positions,
+                velocities=simulation.velocities,
+                steering=simulation.steering,
+            )
         return PaneState(
             self.setup,
-            simulation.positions,
-            simulation.velocities,
+            self.positions,
+            self.velocities,
             memory,
             inbox=simulation.inbox,
-            steering=simulation.steering,
+            steering=self.steering,
+            all_robots=all_robots,
         )
 
     def build_changed_simulation(self, continuation: Continuation) -> Simulation:
@@ -191,16 +259,55 @@ class Pane:
         """
         old = self.simulation
         setup = continuation.setup
+        has_same_robots = setup.simulated_numbers == self.setup.simulated_numbers
         # An unchanged controller keeps its memory. Without memory, it is rebuilt, as on resuming.
         keeps_controller = setup.controller == self.controller and has_memory(old.controller)
-        controller = None if keeps_controller else setup.controller.build()
+        leaves_schedule = self.setup.follows_schedule and not setup.follows_schedule
+        controller = None if keeps_controller and not leaves_schedule else setup.controller.build()
         if self._differs_only_in_density(continuation):
-            return old.with_density(setup.sensed_environment)
-        rows = self._find_rows(setup.numbers)
-        changed = self._build_with_robots(continuation, controller, rows)
-        if old.inbox is not None and setup.numbers != self.numbers:
+            return old.with_density(setup.simulated_environment)
+        rows = self._find_rows(setup.simulated_numbers)
+        if setup.follows_schedule:
+            changed = self._build_on_schedule(continuation, controller)
+        else:
+            changed = self._build_with_robots(continuation, controller, rows)
+        if old.inbox is not None and not has_same_robots:
             changed = changed.with_memory(changed.memory, old.inbox.select_robots(rows))
         return changed
+
+    def _build_on_schedule(self, continuation: Continuation, controller: Any) -> Simulation:
+        """Build a changed simulation that contains all robots, as before, and keeps its conditions."""
+        old = self.simulation
+        setup = continuation.setup
+        rows = setup.simulated_rows
+        team = setup.simulated_team
+        positions = old.positions.copy()
+        velocities = old.velocities.copy()
+        if continuation.positions is not None:
+            positions[rows] = continuation.positions
+        if continuation.velocities is not None:
+            velocities[rows] = continuation.velocities
+        try:
+            return old.with_changes(
+                environment=setup.environment,
+                controller=controller,
+                team=team,
+                positions=positions,
+                velocities=velocities,
+            )
+        except StartError:
+            free_map = setup.sensed_environment.at(old.time)
+            placed = relocate_robots(free_map, positions[rows], setup.team)
+            is_moved = np.hypot(*(placed - positions[rows]).T) > _MOVED_M
+            positions[rows] = placed
+            velocities[rows[is_moved]] = 0.0
+            return old.with_changes(
+                environment=setup.environment,
+                controller=controller,
+                team=team,
+                positions=positions,
+                velocities=velocities,
+            )
 
     def _differs_only_in_density(self, continuation: Continuation) -> bool:
         """Return whether an edit changes nothing but the density of the map."""
@@ -216,8 +323,8 @@ class Pane:
         )
 
     def _find_rows(self, numbers: tuple[int, ...]) -> IntArray:
-        """Return the current rows of robots, given by their numbers, (n,); -1 for robots not yet working."""
-        row_by_number = {number: row for row, number in enumerate(self.numbers)}
+        """Return the rows of robots in the simulation, given by their numbers, (n,); -1 for other robots."""
+        row_by_number = {number: row for row, number in enumerate(self.setup.simulated_numbers)}
         return np.array([row_by_number.get(number, -1) for number in numbers], dtype=np.intp)
 
     def _build_with_robots(self, continuation: Continuation, controller: Any, rows: IntArray) -> Simulation:
@@ -242,8 +349,11 @@ class Pane:
         setup = continuation.setup
         environment = setup.sensed_environment
         team = setup.team
-        positions = old.positions if continuation.positions is None else continuation.positions
-        velocities = old.velocities if continuation.velocities is None else continuation.velocities
+        positions = self.positions if continuation.positions is None else continuation.positions
+        velocities = self.velocities if continuation.velocities is None else continuation.velocities
+        conditions: Conditions | None = None
+        if self.setup.follows_schedule:
+            conditions = setup.conditions or Conditions()
         steering = None
         if old.steering is not None:
             # Robots that have just joined (row -1) start with heading and turning rate 0.
@@ -257,6 +367,7 @@ class Pane:
                 steering=steering,
                 positions=positions,
                 velocities=velocities,
+                conditions=conditions,
             )
 
         try:
@@ -271,7 +382,14 @@ class Pane:
         self.simulation = simulation
         self.setup = setup
         self.trail.change_robots(setup.tracked_numbers)
-        self.trail.add(self.time, simulation.positions, always=True)
+        self.trail.add(self.time, self.positions, always=True)
+
+
+def select_working(snapshot: Snapshot, setup: PaneSetup) -> Snapshot:
+    """Return the observations and decisions of the working robots from those of the whole simulation."""
+    if not setup.follows_schedule:
+        return snapshot
+    return select_robots(snapshot, setup.simulated_rows)
 
 
 def start_simulation(
@@ -284,7 +402,7 @@ def start_simulation(
     setup : PaneSetup
         Map, controller and robots.
     positions : (n, 2) array, m
-        Starting positions.
+        Starting positions of the robots of the simulation.
     dt : float, s
         Control period.
     velocities : (n, 2) array or None, m/s
@@ -320,7 +438,10 @@ def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
     -------
     Simulation
     """
-    scenario = _build_pane_scenario(state.setup, state.positions, dt, state.velocities, state.steering)
+    robots = state.all_robots
+    if robots is None:
+        robots = TeamState(positions=state.positions, velocities=state.velocities, steering=state.steering)
+    scenario = _build_pane_scenario(state.setup, robots.positions, dt, robots.velocities, robots.steering)
     simulation = scenario.build_simulation(steps=step, is_computed=True)
     memory = simulation.memory if state.memory is None else state.memory
     return simulation.with_memory(memory, state.inbox)
@@ -335,9 +456,9 @@ def _build_pane_scenario(
 ) -> Scenario:
     """Build the scenario of a pane's setup that starts from a given state of the robots."""
     return Scenario(
-        setup.sensed_environment,
+        setup.simulated_environment,
         setup.controller.build(),
-        team=setup.team,
+        team=setup.simulated_team,
         starts=positions,
         velocities=velocities,
         steering=steering,

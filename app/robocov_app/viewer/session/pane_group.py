@@ -7,7 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.conditions import TIME_TOLERANCE_S
+from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
@@ -84,22 +84,36 @@ class PaneGroup:
         positions = scenario.starts
         conditions = scenario.conditions
         is_working = np.ones(len(positions), dtype=bool)
+        is_simulated = is_working
+        scheduled_robots = 0
         if conditions is not None:
             check_joins(scenario.environment, conditions)
             is_working = conditions.find_working(0.0, len(positions))
-            # Robots that join or fail later are handled by `advance`, not by the simulations.
-            conditions = conditions.drop_team_changes()
+            if keeps_a_robot(conditions, len(positions)):
+                scheduled_robots = len(positions)
+            else:
+                # `advance` adds and stops robots, and lets the last one work.
+                conditions = conditions.drop_team_changes()
+                is_simulated = is_working
         velocities = None
         if scenario.given_starts is not None and scenario.velocities is not None:
-            velocities = scenario.velocities[is_working]
+            velocities = scenario.velocities[is_simulated]
         numbers = tuple((np.flatnonzero(is_working) + 1).tolist())
         self.scenario = scenario
         self.step = 0
         self.drag: Drag | None = None
         self.panes: list[Pane] = []
         for number, controller in enumerate(scenario.controllers):
-            setup = PaneSetup(scenario.environment, controller, scenario.properties, numbers, {}, conditions)
-            simulation = start_simulation(setup, positions[is_working], scenario.dt, velocities)
+            setup = PaneSetup(
+                scenario.environment,
+                controller,
+                scenario.properties,
+                numbers,
+                {},
+                conditions,
+                scheduled_robots,
+            )
+            simulation = start_simulation(setup, positions[is_simulated], scenario.dt, velocities)
             self.panes.append(Pane(number, setup, simulation))
 
     @classmethod
@@ -140,10 +154,32 @@ class PaneGroup:
         # All controllers decide first: if one raises, no pane has moved yet.
         for pane in self.panes:
             pane.simulation.observe_and_decide()
+        before = self.panes[0].setup
         for pane in self.panes:
             pane.step(self._compute_pull(pane))
         self.step += 1
+        if before.follows_schedule:
+            return self._list_scheduled_events(before)
         return [*self._add_joining_robots(), *self._stop_failing_robots()]
+
+    def _list_scheduled_events(self, before: PaneSetup) -> list[AutomaticEvent]:
+        """Return the events of robots that have joined or failed in the simulations during the last step."""
+        now = self.panes[0].setup
+        events: list[AutomaticEvent] = []
+        for number in now.numbers:
+            if number not in before.all_numbers:
+                text = (
+                    f"robot {number} joined{self._describe_offset(number, self._find_join_position(number))}"
+                )
+                events.append(AutomaticEvent(self.step, "robot", text))
+        events += [
+            AutomaticEvent(self.step, "failure", f"robot {number} failed")
+            for number in before.numbers
+            if number not in now.numbers
+        ]
+        if self.drag is not None and self.drag.robot not in now.numbers:
+            self.drag = None
+        return events
 
     def apply(self, edit: RunEdit) -> None:
         """Apply an edit. If it raises, nothing changes.
@@ -217,7 +253,8 @@ class PaneGroup:
         row = pane.get_row(self.drag.robot)
         if row is None:
             return None
-        return compute_spring_forces(pane.simulation, row, self.drag.target)
+        simulated_row = int(pane.setup.simulated_rows[row])
+        return compute_spring_forces(pane.simulation, simulated_row, self.drag.target)
 
     def _find_changing_robots(self, change_times: Array) -> list[int]:
         """Return the numbers of the robots whose change times, (n,) s, lie within the last step."""
@@ -237,14 +274,21 @@ class PaneGroup:
         for number in self._find_changing_robots(join_times):
             if number in self.panes[0].setup.all_numbers:
                 continue
-            position = next(join.position for join in conditions.joins if join.robot == number)
-            if position is None:
-                x, y = self.scenario.starts[number - 1].tolist()
-                position = (x, y)
+            position = self._find_join_position(number)
             self.apply(AddRobot(number, position))
             text = f"robot {number} joined{self._describe_offset(number, position)}"
             events.append(AutomaticEvent(self.step, "robot", text))
         return events
+
+    def _find_join_position(self, number: int) -> Point:
+        """Return the position, m, at which the conditions let a robot join."""
+        conditions = self.scenario.conditions
+        joins = () if conditions is None else conditions.joins
+        position = next((join.position for join in joins if join.robot == number), None)
+        if position is not None:
+            return position
+        x, y = self.scenario.starts[number - 1].tolist()
+        return x, y
 
     def _stop_failing_robots(self) -> list[AutomaticEvent]:
         """Let robots with a failure time in the last step fail, and return their events."""
@@ -264,7 +308,28 @@ class PaneGroup:
         """Describe the offset of a new robot from the requested position; empty if it is tiny."""
         pane = self.panes[0]
         row = pane.get_row(number)
-        offset = 0.0 if row is None else float(np.hypot(*(pane.simulation.positions[row] - requested)))
+        offset = 0.0 if row is None else float(np.hypot(*(pane.positions[row] - requested)))
         if offset < MIN_REPORTED_OFFSET_M:
             return ""
         return f" {offset:.2f} m from [{requested[0]:g}, {requested[1]:g}]"
+
+
+def keeps_a_robot(conditions: Conditions, robot_count: int) -> bool:
+    """Return whether conditions let robots fail or join, and at least one robot always works.
+
+    Parameters
+    ----------
+    conditions : Conditions
+    robot_count : int
+        Number of all robots.
+
+    Returns
+    -------
+    bool
+    """
+    if not conditions.has_team_changes:
+        return False
+    starts, stops = conditions.compute_working_periods(robot_count)
+    times = np.concatenate([[0.0], starts, stops])
+    working = conditions.find_working(times[np.isfinite(times)], robot_count)
+    return bool(working.any(axis=1).all())

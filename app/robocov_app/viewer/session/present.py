@@ -82,7 +82,7 @@ class Present:
             state = before.states[pane.number]
             if state.setup is not pane.setup:
                 return False
-            if not is_team_at_rest(state.positions, pane.simulation.positions):
+            if not is_team_at_rest(state.positions, pane.positions):
                 return False
         return True
 

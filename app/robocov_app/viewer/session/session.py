@@ -364,7 +364,7 @@ class Session:
         for pane in self.timeline.panes:
             # An edit in the past may bring back a pane that was removed later.
             if pane.number in before:
-                displacements = pane.simulation.positions - before[pane.number]
+                displacements = pane.positions - before[pane.number]
                 counts.append(int((np.hypot(*displacements.T) > MIN_PUSH_M).sum()))
         return max(counts)
 

@@ -32,8 +32,8 @@ def build_python(run: SharedRun) -> str:
     if run.later_edits:
         lines.append("# Edits in the window that are not repeated here:")
         lines += [f"# {description}" for description in run.later_edits]
-    if run.has_team_changes:
-        lines.append("# After a robot fails or joins, positions differ slightly from those in the window.")
+    if not run.is_exact:
+        lines.append("# When all robots have failed, positions differ from those in the window.")
     scenario = run.scenario
     if scenario.properties.values_by_robot:
         lines += _list_team_lines(scenario)

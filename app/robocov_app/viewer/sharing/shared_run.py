@@ -15,6 +15,7 @@ from robocov_app.viewer.session.editing.edits import (
     SetController,
     SetRobotProperties,
 )
+from robocov_app.viewer.session.pane_group import keeps_a_robot
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.session.setup.scenario import SessionScenario
@@ -44,13 +45,20 @@ class SharedRun:
 
     @property
     def has_team_changes(self) -> bool:
-        """Whether the conditions let robots fail or join.
-
-        The window then continues with another team, whose controllers and random numbers start again. A
-        `robocov.Simulation` keeps them, so its positions differ slightly.
-        """
+        """Whether the conditions let robots fail or join."""
         conditions = self.scenario.conditions
         return conditions is not None and conditions.has_team_changes
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether a simulation of the scenario gives the positions in the window.
+
+        It does not if all robots fail: the window lets the last one work.
+        """
+        scenario = self.scenario
+        if scenario.conditions is None or not self.has_team_changes:
+            return True
+        return keeps_a_robot(scenario.conditions, scenario.robots)
 
     @property
     def has_own_map(self) -> bool:

@@ -184,7 +184,7 @@ class FailRobot(RobotEdit):
         if row is None:
             raise ParameterError(f"robot {self.robot} has failed already")
         _require_another_robot(pane, self.robot)
-        x, y = pane.simulation.positions[row].tolist()
+        x, y = pane.positions[row].tolist()
         return _change_robot(pane, self.robot, failed_at=(x, y))
 
 
@@ -381,15 +381,14 @@ def _require_another_robot(pane: Pane, number: int) -> None:
 def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
     """Return the position nearest to a point at which a robot overlaps no obstacle and no other robot."""
     setup = pane.setup
-    simulation = pane.simulation
     other_rows = [row for row, other in enumerate(pane.numbers) if other != number]
     other_failed = {other: position for other, position in setup.failed.items() if other != number}
     return find_free_position(
         replace(setup, failed=other_failed).sensed_environment,
         setup.properties.get_radius(number),
-        simulation.positions[other_rows],
+        pane.positions[other_rows],
         point,
-        simulation.team.radius[other_rows],
+        pane.team.radius[other_rows],
     )
 
 
@@ -414,8 +413,8 @@ def _change_robot(
     Continuation
     """
     setup = pane.setup
-    positions = dict(zip(pane.numbers, pane.simulation.positions, strict=True))
-    velocities = dict(zip(pane.numbers, pane.simulation.velocities, strict=True))
+    positions = dict(zip(pane.numbers, pane.positions, strict=True))
+    velocities = dict(zip(pane.numbers, pane.velocities, strict=True))
     positions.pop(number, None)
     velocities.pop(number, None)
     if working_at is not None:
@@ -427,7 +426,7 @@ def _change_robot(
         failed[number] = failed_at
     numbers = tuple(sorted(positions))
     if numbers != setup.numbers or failed != setup.failed:
-        setup = replace(setup, numbers=numbers, failed=failed)
+        setup = setup.with_robots(numbers, failed)
     # If the working robots are the same and none was placed, positions and velocities do not change.
     if numbers == pane.numbers and working_at is None:
         return Continuation(setup)

@@ -5,11 +5,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from robocov.arrays import Array
+import numpy as np
+
+from robocov.arrays import Array, IntArray
 from robocov.conditions import Conditions
 from robocov.conditions.communication import Inbox
 from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
+from robocov.simulation.team_state import TeamState
 from robocov.team import Team
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
@@ -33,7 +36,10 @@ class PaneSetup:
     failed : mapping of int to tuple
         Positions of failed robots by number, (x, y) m.
     conditions : Conditions or None
-        Noise and message loss, without robots that fail or join.
+        Conditions of the simulation. Robots fail and join by them only if the setup follows a schedule.
+    scheduled_robots : int
+        If the simulation lets robots fail and join by its conditions: number of all robots, from 1 on, which
+        are the rows of the simulation. 0 if the simulation contains the working robots alone.
     """
 
     environment: Environment
@@ -42,6 +48,55 @@ class PaneSetup:
     numbers: tuple[int, ...]
     failed: Mapping[int, Point]
     conditions: Conditions | None = None
+    scheduled_robots: int = 0
+
+    @property
+    def follows_schedule(self) -> bool:
+        """Whether the simulation lets robots fail and join by its conditions."""
+        return self.scheduled_robots > 0
+
+    @property
+    def simulated_numbers(self) -> tuple[int, ...]:
+        """Numbers of the robots of the simulation, in the order of its rows."""
+        if self.follows_schedule:
+            return tuple(range(1, self.scheduled_robots + 1))
+        return self.numbers
+
+    @property
+    def simulated_rows(self) -> IntArray:
+        """Rows of the working robots in the simulation, (n,)."""
+        if self.follows_schedule:
+            return np.array(self.numbers, dtype=np.intp) - 1
+        return np.arange(len(self.numbers))
+
+    @property
+    def simulated_environment(self) -> Environment:
+        """The map of the simulation. On a schedule, the simulation adds robots that fail by itself."""
+        if self.follows_schedule:
+            return self.environment
+        return self.sensed_environment
+
+    @property
+    def simulated_team(self) -> Team:
+        """The robots of the simulation."""
+        return self.properties.build_team(self.simulated_numbers)
+
+    @property
+    def constant_conditions(self) -> Conditions | None:
+        """Noise and message loss, without robots that fail or join."""
+        if self.conditions is None:
+            return None
+        return self.conditions.drop_team_changes()
+
+    def with_robots(self, numbers: tuple[int, ...], failed: Mapping[int, Point]) -> "PaneSetup":
+        """Return the setup with other robots, chosen by the user; it follows no schedule any more."""
+        return replace(
+            self,
+            numbers=numbers,
+            failed=failed,
+            conditions=self.constant_conditions,
+            scheduled_robots=0,
+        )
 
     @property
     def sensed_environment(self) -> Environment:
@@ -100,6 +155,8 @@ class PaneState(NamedTuple):
         Messages that robots have received, and those in flight or waiting; None if there are none.
     steering : (n, 2) array or None, rad and rad/s
         Headings and turning rates of unicycles.
+    all_robots : TeamState or None
+        State of all robots of the simulation, if the setup follows a schedule.
     """
 
     setup: PaneSetup
@@ -109,6 +166,7 @@ class PaneState(NamedTuple):
     recorded: Decision | None = None
     inbox: Inbox | None = None
     steering: Array | None = None
+    all_robots: TeamState | None = None
 
 
 class Drag(NamedTuple):
