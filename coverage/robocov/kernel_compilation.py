@@ -151,7 +151,7 @@ def call_planning_kernels() -> None:
     state[:34, 30] = WALL
     state[37:, 30] = WALL
     middle = np.array([3.0, 3.0])
-    window = Window.build_around(raster, middle, reach=math.inf, max_nodes=16)
+    window = Window.build_around(raster, middle, half_width=math.inf, max_nodes=16)
     planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)
     planner.find_route(np.array([1.0, 1.0]), np.array([5.0, 1.0]))
 

@@ -122,7 +122,7 @@ class GridPlanner(MapWindow):
         rows, columns = np.indices((self.window.rows, self.window.columns)).reshape(2, -1)
         stride = self.window.stride
         return find_portals(
-            is_passable=self.is_free & ~self.is_tight,
+            is_passable=self.is_free & ~self.is_near_wall,
             node_cells=np.column_stack([rows, columns]) * stride + stride // 2,
             graph=_build_graph(self._moves),
         )
