@@ -116,7 +116,7 @@ def _list_help_commands(actions: ViewerWindowActions) -> list[Command]:
     help_group = CommandGroup("Help")
     help_group.add("help", "Keys", actions.toggle_help, "f1", "shift+/")
     help_group.add("palette", "Commands by name", actions.open_palette, "ctrl+k", "/")
-    help_group.add("tour", "The lesson, or just play", actions.toggle_lesson, "f2")
+    help_group.add("tour", "Show or leave the lesson", actions.toggle_lesson, "f2")
     help_group.add("quit", "Quit", actions.quit, "ctrl+q")
     time_group = CommandGroup("Time")
     time_group.add("branches", "List of branches", actions.list_branches, "ctrl+b")

@@ -117,7 +117,7 @@ _FUTURE_DOT_STRENGTH = 0.25
 _CLOSED_ANSWER_STRENGTH = 0.25
 _BUTTON_EDGE_STRENGTH = 0.28
 
-_PAGE_HINT = "Space holds · F2 just play · Esc ends"
+_PAGE_HINT = "Space: stay · F2: play freely · Esc: end"
 _CLOSING_TITLE = "What you found out"
 _NEXT_TITLE = "Try next"
 _DEFAULT_NEXT_STEPS = (
