@@ -55,7 +55,7 @@ def test_a_route_leads_through_the_door_at_a_distance_from_walls(planner):
     np.testing.assert_array_equal(route[-1], RIGHT)
     points = np.vstack([LEFT, route])
     for start, end in pairwise(points):
-        assert planner.find_clear_lines(start, end[None], planner.is_tight)[0]
+        assert planner.find_clear_lines(start, end[None], planner.is_near_wall)[0]
 
 
 def test_a_door_that_has_not_been_seen_is_no_portal():
@@ -86,7 +86,7 @@ def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_node
             walls.append((slice(row, row + length), slice(column, column + 1)))
     window = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, max_nodes)
     planner = GridPlanner(build_map(*walls), window, 0.15)
-    is_passable = planner.is_free & ~planner.is_tight
+    is_passable = planner.is_free & ~planner.is_near_wall
     node_rows, node_columns = np.divmod(np.arange(len(planner.nodes)), window.columns)
     cells = np.column_stack([node_rows, node_columns]) * window.stride + window.stride // 2
     check_portals(planner, cells, is_passable)
