@@ -159,6 +159,8 @@ def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_p
         projector = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
         set_size(browser, 390, 844, 2.0)
+        touch = {"enabled": True, "maxTouchPoints": 2}
+        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
         browser.driver.get(link)
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
