@@ -96,6 +96,47 @@ def test_a_branch_observes_the_same_bit_for_bit() -> None:
         assert advance_session(session, 35 - step) == expected[2 * (step - 10) :]
 
 
+def test_edits_before_an_event_leave_it_on_schedule() -> None:
+    session = start_session()
+    advance_session(session, 5)
+    session.set_properties(replace(PROPERTIES, max_speed=0.5))
+    session.place_robot(4, (5.0, 3.0))
+    session.edit_map(replace(HALL, obstacles=()), "obstacle deleted")
+    pane = session.timeline.panes[0]
+    session.set_controller(pane, ControllerChoice("rapf", {"k_rep": 0.2}))
+    session.paint(((2.0, 2.0),), 0.5, lowers=False, stroke=object())
+    assert pane.setup.follows_schedule
+    assert pane.positions[2].tolist() == [5.0, 3.0]
+    advance_session(session, 20)
+    assert session.displayed.numbers == (1, 3, 4)
+    assert sorted(session.timeline.panes[0].setup.failed) == [2]
+
+
+def test_a_robot_that_the_user_lets_fail_ends_the_schedule_of_the_simulation_only() -> None:
+    session = start_session()
+    advance_session(session, 5)
+    session.fail_robot(1)
+    assert session.displayed.numbers == (2, 4)
+    assert not session.timeline.panes[0].setup.follows_schedule
+    advance_session(session, 20)
+    assert session.displayed.numbers == (3, 4)
+    session.undo()
+    assert session.displayed.numbers == (1, 2, 4)
+    assert session.timeline.panes[0].setup.follows_schedule
+    advance_session(session, 20)
+    assert session.displayed.numbers == (1, 3, 4)
+
+
+def test_a_failed_robot_that_is_dragged_is_released() -> None:
+    session = start_session()
+    advance_session(session, 10)
+    session.playback.is_playing = True
+    session.drag_robot(2, (3.0, 3.0))
+    assert session.timeline.run.drag is not None
+    advance_session(session, 8)
+    assert session.timeline.run.drag is None
+
+
 def test_messages_of_the_past_are_recomputed() -> None:
     session = start_session()
     pane = session.timeline.panes[0]
