@@ -100,7 +100,7 @@ class DensityTool(EditorTool):
             context.show_message("type its weight, then Enter; Backspace removes it")
 
     def finish(self, context: EditorContext) -> None:
-        """Drop the choice of a feature."""
+        """Deselect the feature whose weight would be typed."""
         self.chosen = None
 
     def remove_last(self, context: EditorContext) -> bool:

@@ -158,14 +158,14 @@ class _ScenarioDraft:
         self._controllers[pane] = controller
 
     def _set_properties(self, properties: RobotProperties) -> None:
-        self._replace_if_starts_stay(replace(self.scenario, properties=properties))
+        self._replace_scenario(replace(self.scenario, properties=properties))
 
     def _edit_map(self, edit: MapEdit) -> None:
         environment = edit.build_environment(self.scenario.environment)
-        self._replace_if_starts_stay(replace(self.scenario, environment=environment))
+        self._replace_scenario(replace(self.scenario, environment=environment))
 
-    def _replace_if_starts_stay(self, scenario: SessionScenario) -> None:
-        """Adopt a scenario, unless robots would be sampled elsewhere than they started in the window."""
+    def _replace_scenario(self, scenario: SessionScenario) -> None:
+        """Replace the scenario; raise an error unless its robots start where those in the window did."""
         try:
             is_same = np.array_equal(scenario.starts, self.scenario.starts)
         except InputError:

@@ -30,6 +30,10 @@ _GRID_STEPS = 12
 # Lengths in pixels at scale 1.
 _WALL_PX = 4.0
 _PENCIL_PX = 26.0
+_PENCIL_WIDTH_FRACTION = 0.22
+"""Width of the pencil, as a fraction of its length along x and y."""
+_PENCIL_TIP_FRACTION = 0.28
+"""Length of its tip, as the same fraction."""
 
 
 def draw_sketch(screen: Surface, box: Rect, theme: Theme, scale: float, *, seconds: float) -> None:
@@ -56,7 +60,7 @@ def draw_sketch(screen: Surface, box: Rect, theme: Theme, scale: float, *, secon
     remaining = fraction * sum(_measure(wall) for wall in walls)
     tip = walls[0][0]
     for wall in walls:
-        drawn = _cut(wall, remaining)
+        drawn = _cut_to_length(wall, remaining)
         remaining -= _measure(wall)
         if len(drawn) > 1:
             sketch.draw_path(drawn, theme.obstacle, _WALL_PX * scale)
@@ -89,8 +93,8 @@ def _measure(wall: list[Point]) -> float:
     return sum(math.dist(first, second) for first, second in itertools.pairwise(wall))
 
 
-def _cut(wall: list[Point], length: float) -> list[Point]:
-    """Return the first part of a wall, of a length in px."""
+def _cut_to_length(wall: list[Point], length: float) -> list[Point]:
+    """Return the points of a wall from its start up to a length along it, px."""
     part = [wall[0]]
     for first, second in itertools.pairwise(wall):
         distance = math.dist(first, second)
@@ -108,8 +112,9 @@ def _draw_pencil(sketch: Sketch, tip: Point, theme: Theme, scale: float) -> None
     """Draw a pencil whose tip is at a pixel."""
     x, y = tip
     length = _PENCIL_PX * scale
-    width = 0.22 * length
-    shoulder = (x + 0.28 * length, y - 0.28 * length)
+    width = _PENCIL_WIDTH_FRACTION * length
+    tip_length = _PENCIL_TIP_FRACTION * length
+    shoulder = (x + tip_length, y - tip_length)
     end = (x + length, y - length)
     corners = [
         (shoulder[0] - width / 2, shoulder[1] - width / 2),
