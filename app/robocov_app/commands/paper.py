@@ -178,7 +178,7 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
     beyond_claims: list[Claim] = []
     if options.includes_claims:
         paper = parts.run_paper(out, plan, runner)
-        paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.gains)
+        paper_claims = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
         study_pages.write_claims(out, paper_claims)
         figure_runs = paper.figures
     else:
@@ -201,7 +201,7 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
     return _Outcome(
         paper=paper,
         beyond=beyond,
-        figure_runs=len(figure_runs),
+        figure_runs=sum(len(variant) for variant in figure_runs.values()),
         claims=[*paper_claims, *beyond_claims],
     )
 

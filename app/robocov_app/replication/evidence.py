@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time, group_by
@@ -52,8 +53,9 @@ class ContenderSummary:
         Quartiles of the gap.
     contact_fraction : float
         Fraction of runs with contact.
-    stuck_fraction : float
-        Fraction of runs that end with a robot stuck; nan if the controller has no goals.
+    blocked_fraction : float
+        Fraction of robots that have a wall between them and their goals at the end; nan if the controller has
+        no goals.
     rest_fraction : float
         Fraction of runs that come to rest.
     rest_time : float
@@ -68,7 +70,7 @@ class ContenderSummary:
     gap: Interval
     quartiles: tuple[float, float]
     contact_fraction: float
-    stuck_fraction: float
+    blocked_fraction: float
     rest_fraction: float
     rest_time: float
     medians: Mapping[str, float]
@@ -163,13 +165,19 @@ def summarize_contenders(
                 gap=bootstrap(gaps, clusters=known.maps),
                 quartiles=(low, high),
                 contact_fraction=compute_positive_fraction(known.get_values(contender.key, "contacts")),
-                stuck_fraction=compute_positive_fraction(known.get_values(contender.key, "stuck")),
+                blocked_fraction=_compute_mean(known.get_values(contender.key, "blocked")),
                 rest_fraction=len(rest_times) / len(settled),
                 rest_time=estimate_median_time(rest_times, censored),
                 medians=medians,
             )
         )
     return summaries
+
+
+def _compute_mean(values: Array) -> float:
+    """Return the mean of the finite values, (m,); nan if there are none."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else float("nan")
 
 
 def rank_contenders(results: BeyondResults) -> list[ContenderSummary]:
@@ -258,14 +266,14 @@ def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
 def _list_failures(summary: ContenderSummary) -> str:
     """Return a sentence with the failures that are frequent enough to report; empty if there are none."""
     failures = (
-        (summary.contact_fraction, "robots touch a wall or each other"),
-        (summary.stuck_fraction, "a robot is stuck away from its goal"),
-        (1.0 - summary.rest_fraction, "the team is not at rest at the end"),
+        (summary.contact_fraction, "robots touch a wall or each other in {} of the runs"),
+        (summary.blocked_fraction, "a wall is between {} of the robots and their goals at the end"),
+        (1.0 - summary.rest_fraction, "the team is not at rest at the end in {} of the runs"),
     )
     texts = []
     for fraction, description in failures:
         if fraction > _MIN_REPORTED_FRACTION:
-            texts.append(f"{description} in {format_amount(fraction, '%')} of the runs")
+            texts.append(description.format(format_amount(fraction, "%")))
     if texts:
         return f"{capitalize('; '.join(texts))}."
     return "No contact in any run." if summary.contact_fraction == 0.0 else ""

@@ -34,7 +34,7 @@ OURS = build_contender("howard", {})
 """A contender in place of ours: goals can be judged for any."""
 
 RAPF = UNTUNED[1]
-LLOYD = UNTUNED[3]
+LLOYD = UNTUNED[4]
 LARGE = FULL.beyond.large
 HUGE = FULL.beyond.huge
 

@@ -8,11 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.claims import Claim, Criterion, judge_paper_claims, summarize_verdicts
+from robocov_app.replication.claims import (
+    Claim,
+    Criterion,
+    judge_paper_claims,
+    summarize_verdicts,
+    thresholds,
+)
 from robocov_app.replication.claims.convex_claims import judge_convex_final, judge_convex_spreading
 from robocov_app.replication.claims.gain_claims import (
     compute_regrets,
     judge_gains_choice,
+    judge_gains_every,
     judge_gains_result,
     select_common_instances,
 )
@@ -20,10 +27,10 @@ from robocov_app.replication.claims.nonconvex_claims import (
     judge_against_lloyd,
     judge_against_rpf,
     judge_gap,
-    judge_lloyd_stuck,
+    judge_lloyd_unusable,
 )
+from robocov_app.replication.claims.registration import load_registration
 from robocov_app.replication.claims.start_claims import judge_starts_cost, judge_starts_placement
-from robocov_app.replication.claims.thresholds import REGISTERED
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.results.outcomes import (
     GainOutcomes,
@@ -101,7 +108,7 @@ class TestVerdicts:
         assert Claim("k", 1, "c", "", criteria, runs=50, maps=11).verdict == "undecided"
 
     @pytest.mark.parametrize(("adjusted", "verdict"), [(None, "holds"), (0.05, "holds"), (0.06, "undecided")])
-    def test_a_registered_claim_holds_by_its_adjusted_p_value(self, adjusted, verdict):
+    def test_a_claim_holds_by_its_adjusted_p_value(self, adjusted, verdict):
         criteria = tuple(
             Criterion("x", Interval(0.5, 0.4, 0.6, np.array(drawn)), high=1.0)
             for drawn in ([0.5, 0.5, 0.5], [0.5, 2.0, 0.5])
@@ -110,15 +117,33 @@ class TestVerdicts:
         assert (claim.verdict, claim.p_value) == (verdict, 0.5)
         assert claim.p_value_text == ("p = 0.5" if adjusted is None else f"p = 0.5, Holm-adjusted {adjusted}")
 
-    def test_registered_claims_are_adjusted_together(self):
-        convex = build_outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)
+    @pytest.mark.parametrize(
+        ("family_size", "verdicts"),
+        [(1, ("holds partly", "does not hold")), (40, ("undecided", "undecided"))],
+    )
+    def test_single_criteria_are_adjusted_for_the_number_of_claims(self, family_size, verdicts):
+        samples = np.full(100, 0.5)  # the p-values are 1/101
+        met = Criterion("x", Interval(0.5, 0.4, 0.6, samples), high=1.0)
+        refuted = Criterion("x", Interval(0.5, 0.4, 0.6, samples), low=1.0)
+        assert refuted.refutation_p_value == met.p_value == pytest.approx(1 / 101)
+        for criteria, verdict in zip(((met, refuted), (refuted,)), verdicts, strict=True):
+            claim = Claim("k", 1, "c", "", criteria, 50, 20, adjusted_p_value=1.0, family_size=family_size)
+            assert claim.verdict == verdict
+
+    def test_all_claims_of_the_paper_are_registered_and_adjusted_together(self):
+        outcomes = build_outcomes(rapf_shared=0.7, rpf_shared=1.0, lloyd=1.0)
         gains = {"rapf": build_gain_outcomes(0.02), "rpf": build_gain_outcomes(0.9)}
-        found = {claim.key: claim for claim in judge_paper_claims(convex, convex, gains)}
-        assert {key for key, claim in found.items() if claim.adjusted_p_value is not None} == set(REGISTERED)
-        # two p-values are the least there are of 200 samples, the others 1
+        found = {claim.key: claim for claim in judge_paper_claims(outcomes, outcomes, outcomes, gains)}
+        assert tuple(found) == load_registration().claims
+        assert {claim.family_size for claim in found.values()} == {len(found)}
+        # the p-value is the smallest of 200 samples; only that of a binomial test is smaller
         assert found["gains-result"].p_value == pytest.approx(1 / 201)
-        assert found["gains-result"].adjusted_p_value == pytest.approx(7 / 201)
+        assert found["gains-result"].adjusted_p_value == pytest.approx((len(found) - 1) / 201)
         assert found["nonconvex-final-best"].adjusted_p_value == 1.0  # without a run
+
+    def test_the_registered_thresholds_are_those_of_the_code(self):
+        for name, value in load_registration().thresholds.items():
+            assert getattr(thresholds, name) == pytest.approx(value, abs=1e-12), name
 
     def test_json_has_the_promised_keys(self):
         criterion = Criterion("ratio", Interval(0.9, 0.8, 0.95), high=1.0)
@@ -256,38 +281,59 @@ class TestStarts:
 
 class TestStuckAndGap:
     @pytest.mark.parametrize(
-        ("share", "gap", "verdict"),
-        [(1.0, 0.5, "holds"), (1.0, 0.05, "holds partly"), (0.1, 0.05, "does not hold")],
-    )
-    def test_stuck(self, share, gap, verdict):
-        where = build_instances(MANY, 4)
-        count = (np.arange(len(where)) % 10 < 10 * share) * 2.0
-        values = {("lloyd", "stuck"): count, ("lloyd", "gap"): np.full(len(where), gap)}
-        claim = judge_lloyd_stuck(Outcomes(where, values))
-        assert claim.verdict == verdict
-        assert f"{format_amount(float(count.mean()))} robots" in claim.explanation
-
-    @pytest.mark.parametrize(
-        ("law", "gap", "verdict"),
+        ("clearance", "blocked", "gap", "verdict"),
         [
-            ("rapf-shared", 0.05, "holds"),
-            ("rapf-shared", 0.2, "does not hold"),
-            ("rpf-shared", 0.7, "holds"),
-            ("rpf-shared", 0.1, "does not hold"),
-            ("lloyd", 0.08, "holds"),
+            (0.0, 0.5, 0.5, "holds"),
+            (0.0, 0.05, 0.05, "holds partly"),
+            (0.2, 0.5, 0.05, "holds partly"),
+            (0.2, 0.05, 0.05, "does not hold"),
         ],
     )
-    def test_gap(self, law, gap, verdict):
+    def test_lloyd_is_unusable_if_it_touches_walls_and_is_blocked(self, clearance, blocked, gap, verdict):
+        where = build_instances(MANY, 4)
+        values = {
+            ("lloyd", "clearance"): np.full(len(where), clearance),
+            ("lloyd", "blocked"): np.full(len(where), blocked),
+            ("lloyd", "gap"): np.full(len(where), gap),
+            ("rapf-shared", "clearance"): np.full(len(where), 0.2),
+            ("rapf-shared", "blocked"): np.full(len(where), 0.25),
+        }
+        claim = judge_lloyd_unusable(Outcomes(where, values))
+        assert claim.verdict == verdict
+        assert "RAPF, shared gains: walls touched in 0 %, 25 % of the robots blocked." in claim.explanation
+
+    @pytest.mark.parametrize(
+        ("controller", "gains", "gap", "verdict"),
+        [
+            ("rapf", "shared", 0.05, "holds"),
+            ("rapf", "best", 0.2, "does not hold"),
+            ("rpf", "shared", 0.7, "holds"),
+            ("rpf", "default", 0.1, "does not hold"),
+            ("lloyd", None, 0.08, "holds"),
+        ],
+    )
+    def test_gap(self, controller, gains, gap, verdict):
         where = build_instances(MANY)
         rng = np.random.default_rng(0)
-        values = {(law, "gap"): gap + 0.01 * rng.standard_normal(len(where))}
-        assert judge_gap(Outcomes(where, values), law).verdict == verdict
+        key = f"{controller}-{gains}" if gains else controller
+        values = {(key, "gap"): gap + 0.01 * rng.standard_normal(len(where))}
+        claim = judge_gap(Outcomes(where, values), controller, gains)
+        assert (claim.verdict, claim.key) == (verdict, f"gap-{key}")
+
+    def test_claims_at_limited_ranges_have_keys_and_texts_of_their_own(self):
+        claim = judge_against_rpf(
+            build_outcomes(rapf_shared=0.5, rpf_shared=1.0), "shared", "final", limited=True
+        )
+        assert claim.key == "limited-nonconvex-final-shared"
+        assert (
+            claim.text == "At limited ranges, in a non-convex environment RAPF ends at a lower cost than RPF."
+        )
 
 
 def build_gain_outcomes(spread: float, maps: int = MANY, is_map_dependent: bool = False) -> GainOutcomes:
     """Build outcomes of nine sets of gains; the fifth is the best everywhere, or another one on each map."""
     where = build_instances(maps, 1)
-    gains = tuple({"k_rep": a, "k_att": b} for a in (0.1, 1.0, 10.0) for b in (1.0, 3.0, 30.0))
+    gains = tuple({"k_rep": a, "rho_0": b, "k_att": b} for a in (0.1, 1.0, 10.0) for b in (1.0, 3.0, 30.0))
     rng = np.random.default_rng(2)
     best = [int(s.map.split()[1]) % 9 if is_map_dependent else 4 for s in where]
     worse = np.abs(np.arange(9)[:, None] - np.array(best)[None]) / 8.0
@@ -295,6 +341,21 @@ def build_gain_outcomes(spread: float, maps: int = MANY, is_map_dependent: bool 
 
 
 class TestGains:
+    @pytest.mark.parametrize(
+        ("worst_ratio", "verdict"), [(0.9, "holds"), (1.0, "undecided"), (1.1, "does not hold")]
+    )
+    def test_every_set_of_the_grid_counts(self, worst_ratio, verdict):
+        where = build_instances(MANY, 1)
+        potentials = [{"k_rep": k_rep, "rho_0": 2.0} for k_rep in (0.1, 1.0)]
+        rapf_gains = tuple(potential | {"k_att": k_att} for k_att in (1.0, 3.0) for potential in potentials)
+        noise = 1.0 + 0.01 * np.random.default_rng(3).standard_normal((4, len(where)))
+        ratios = np.array([0.5, 0.6, worst_ratio, 0.7])[:, None] * noise
+        rpf = GainOutcomes(where, tuple(potentials), np.full((2, len(where)), 2.0))
+        claim = judge_gains_every(GainOutcomes(where, rapf_gains, 2.0 * ratios), rpf)
+        assert claim.verdict == verdict
+        assert claim.criteria[0].interval.estimate == pytest.approx(worst_ratio, rel=0.01)
+        assert "(k_rep 0.1, rho_0 2, k_att 3)" in claim.explanation
+
     @pytest.mark.parametrize(
         ("rapf", "rpf", "verdict"),
         [
@@ -348,7 +409,7 @@ class TestGains:
         judge_against_lloyd,
         judge_starts_cost,
         judge_starts_placement,
-        judge_lloyd_stuck,
+        judge_lloyd_unusable,
         lambda o: judge_gap(o, "lloyd"),
     ],
 )
@@ -359,6 +420,7 @@ def test_without_any_run_claims_are_undecided(claim):
     assert (
         judge_gains_result(nothing, nothing).verdict
         == judge_gains_choice(nothing, nothing).verdict
+        == judge_gains_every(nothing, nothing).verdict
         == "undecided"
     )
 

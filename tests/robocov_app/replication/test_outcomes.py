@@ -69,8 +69,7 @@ def test_every_value_is_that_of_its_run(study, folder):
         assert outcomes.get_values(law, "gap")[k] == pytest.approx(final / 1.5 - 1.0)
         assert outcomes.get_values(law, "contacts")[k] == float(row["contacts"])
         assert outcomes.get_values(law, "work")[k] == float(row["work_J"]) > 0.0
-        stuck = outcomes.get_values(law, "stuck")[k]
-        assert np.isnan(stuck) if row["stuck_robots"] == "" else stuck == float(row["stuck_robots"])
+        assert outcomes.get_values(law, "clearance")[k] == float(row["min_clearance_m"])
         with np.load(folder / "runs" / row["run"] / "record.npz") as record:
             assert outcomes.values[law, "placement"][k] == pytest.approx(record["positions"][-1])
         # a run of a second is averaged over all of it

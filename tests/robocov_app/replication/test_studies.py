@@ -10,7 +10,8 @@ from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonO
 from robocov.errors import StartError
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.figures.statistics import estimate_fraction
-from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS, NEARLY_ALWAYS, REGISTERED
+from robocov_app.replication.claims.registration import load_registration
+from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS, NEARLY_ALWAYS
 from robocov_app.replication.design import studies, study_maps
 from robocov_app.replication.design.contenders import (
     GAIN_GRIDS,
@@ -119,30 +120,36 @@ class TestMaps:
     @both
     def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):
         assert not set(plan.tuning) & set(plan.generated)
-        assert plan.tuning_seed not in plan.seeds
-        tuning_maps = study_maps.build_generated_maps(plan.tuning)
+        assert not set(plan.tuning_families) & {*plan.families, *plan.beyond.unseen}
+        assert not set(plan.families) & set(plan.beyond.unseen)
+        assert plan.tuning_seed not in (*plan.seeds, *plan.limited_seeds)
+        tuning_maps = study_maps.build_tuning_maps(plan)
         tuning_obstacles = {study_map.environment.obstacles for study_map in tuning_maps}
         claim_maps = study_maps.build_claim_maps(plan)
         claim_obstacles = {study_map.environment.obstacles for study_map in claim_maps}
         assert not tuning_obstacles & claim_obstacles
         # a claim on gains is judged on these maps; regrets need two starts
-        assert len(plan.tuning) >= MIN_MAPS and len(plan.tuning_starts) >= 2
+        assert len(tuning_maps) >= MIN_MAPS and len(plan.tuning_starts) >= 2
 
     @both
     def test_every_claim_of_the_paper_has_maps_enough(self, plan):
-        assert len(study_maps.build_claim_maps(plan)) >= MIN_MAPS
+        claim_maps = study_maps.build_claim_maps(plan)
+        assert len(claim_maps) >= MIN_MAPS
+        kinds = {study_maps.get_map_kind(study_map.name) for study_map in claim_maps}
+        assert kinds == {"bundled", "polygons", "blocks", "rooms", "caves"}
         assert len(study_maps.build_convex_maps(plan)) >= MIN_MAPS
 
     def test_nearly_always_can_be_shown_on_the_maps_of_the_full_study(self):
-        for count in (len(FULL.bundled + FULL.generated), len(CONVEX) + len(FULL.convex_generated)):
+        claims = len(load_registration().claims)
+        for count in (len(study_maps.build_claim_maps(FULL)), len(CONVEX) + len(FULL.convex_generated)):
             lows = []
             p_values = []
             for others in range(6):
                 there = estimate_fraction(np.arange(count) >= others, range(count))
                 lows.append(there.low)
-                p_values.append(len(REGISTERED) * there.compute_p_value(NEARLY_ALWAYS, np.inf))
+                p_values.append(claims * there.compute_p_value(NEARLY_ALWAYS, np.inf))
             assert [low >= NEARLY_ALWAYS for low in lows] == [True] * 5 + [False]
-            assert [p <= ALPHA for p in p_values] == [True] * 3 + [False] * 3
+            assert [p <= ALPHA for p in p_values] == [True] * 2 + [False] * 4
 
     @pytest.mark.slow
     def test_unseen_maps_are_of_other_families(self):
@@ -166,7 +173,9 @@ class TestPaper:
         assert len(study_maps.build_claim_maps(FULL)) == len(study_maps.build_convex_maps(FULL)) == 100
         study = studies.build_claims_contest(FULL, PAPERS).study
         assert study.starts == KINDS
-        assert len(study) == 100 * 3 * 4 * 6
+        assert len(study) == 100 * 3 * 4 * 7
+        limited = studies.build_limited_contest(FULL, PAPERS).study
+        assert len(limited) == 100 * 3 * 7 and limited.maps == study.maps
         assert len(studies.build_gains_study(FULL)) == 12 * 2 * (20 + 80)
 
     def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
@@ -175,7 +184,7 @@ class TestPaper:
         scenarios = {(task.map, task.start, task.seed) for task in tasks}
         for scenario in scenarios:
             laws = [task for task in tasks if (task.map, task.start, task.seed) == scenario]
-            assert len(laws) == 6
+            assert len(laws) == 7
             assert len({task.document for task in laws}) == 1
 
     def test_shared_gains_are_shared_and_the_papers_formula_is_not_limited(self):
@@ -193,7 +202,7 @@ class TestPaper:
 
     def test_best_gains_that_are_the_shared_ones_are_run_once(self):
         same = build_paper_contenders({"rapf": RAPF_SHARED.gains, "rpf": RPF_SHARED.gains})
-        assert len(studies.build_claims_contest(TINY, same).study) == 2 * 3 * 4
+        assert len(studies.build_claims_contest(TINY, same).study) == 2 * 3 * 5
         assert {
             name: len(sets) for name, sets in collect_gain_sets((RAPF_SHARED, LLOYD, same[1])).items()
         } == {
@@ -210,9 +219,16 @@ class TestPaper:
         assert found["figures-b"].starts == ("paper", "other")
         assert {len(study) for study in found.values()} == {2, 4}
 
+    def test_figures_are_repeated_at_limited_ranges_and_with_half_the_control_period(self):
+        found = studies.build_figure_studies(TINY)
+        limited = next(iter(generate_tasks(found["figures-b-limited"])))
+        assert (limited.team["communication_range"], limited.team["sensing_range"]) == (4.0, 2.0)
+        (half,) = {task.dt for task in generate_tasks(found["figures-a-half-step"])}
+        assert half == TINY.dt / 2.0
+
     def test_figures_4_to_8_are_run_at_the_best_gains_from_the_same_places(self):
         shared = studies.build_figure_studies(TINY)
-        best = studies.build_figure_studies(TINY, PAPERS)
+        best = studies.build_best_figure_studies(TINY, PAPERS)
         assert list(best) == ["figures-a-best", "figures-b-best"]
         for name, study in best.items():
             tasks = list(generate_tasks(study))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
-from robocov_app.figures.statistics import Interval
+from robocov_app.figures.statistics import Interval, adjust_p_values
 from robocov_app.replication.claims.thresholds import ALPHA, MIN_MAPS
 from robocov_app.replication.formatting import format_amount, format_interval
 from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison
@@ -22,10 +22,12 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
 }
 """Predicates of each verdict, for one claim and for several."""
 
-GOALS = 7
-RIVALS = 8
-EXTENSIONS = 9
-"""Numbers of the questions beyond the paper; the paper's questions are 1 to 6."""
+LIMITED = 7
+"""Number of the question about limited ranges, the last one on the paper's claims, which begin with 1."""
+GOALS = 8
+RIVALS = 9
+EXTENSIONS = 10
+"""Numbers of the questions beyond the paper."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,14 @@ class Criterion:
     def p_value(self) -> float:
         """The p-value of the hypothesis that the true value is outside the range."""
         return self.interval.compute_p_value(self.low, self.high)
+
+    @property
+    def refutation_p_value(self) -> float:
+        """The p-value of the hypothesis that the true value is in the range."""
+        bounds = [(-math.inf, self.low), (self.high, math.inf)]
+        finite_bounds = [ends for ends in bounds if math.isfinite(ends[0]) or math.isfinite(ends[1])]
+        p_values = [self.interval.compute_p_value(*ends) for ends in finite_bounds]
+        return min([1.0, *(len(p_values) * p_value for p_value in p_values)])
 
     @property
     def range_text(self) -> str:
@@ -108,6 +118,8 @@ class Claim:
         The claim in our words.
     source : str
         Where the paper makes the claim; empty if the question is ours.
+    gains : str
+        Gains with which the claim is tested; empty if there is no choice.
     criteria : tuple of Criterion
         The first is the main criterion, whose estimate represents the claim.
     runs, maps : int
@@ -116,7 +128,9 @@ class Claim:
     min_maps : int
         Minimum number of maps for a verdict other than "undecided".
     adjusted_p_value : float or None
-        The p-value adjusted by Holm, if the claim is registered.
+        The p-value adjusted by Holm for all claims that are tested together; None for a claim alone.
+    family_size : int
+        Number of claims that are tested together.
     """
 
     key: str
@@ -129,6 +143,8 @@ class Claim:
     explanation: str = "No run can decide it."
     min_maps: int = MIN_MAPS
     adjusted_p_value: float | None = None
+    family_size: int = 1
+    gains: str = ""
 
     def judge(
         self,
@@ -173,24 +189,33 @@ class Claim:
     def verdict(self) -> Verdict:
         """The verdict: it holds if all criteria are met, and holds partly if some are.
 
-        It is undecided on too few maps, or if no criterion is met or refuted. A registered claim must also be
-        significant to hold.
+        It is undecided on too few maps, or if no criterion is met or refuted. If claims are tested together,
+        p-values are adjusted for their number: by Holm for a claim that holds, and by Bonferroni for
+        single criteria that are met or refuted.
         """
         if self.maps < self.min_maps or not self.criteria:
             return "undecided"
-        met = [criterion.is_met for criterion in self.criteria]
-        if all(met):
+        met = [criterion for criterion in self.criteria if criterion.is_met]
+        if len(met) == len(self.criteria):
             is_significant = self.adjusted_p_value is None or self.adjusted_p_value <= ALPHA
             return "holds" if is_significant else "undecided"
-        if any(met):
+        if any(self._is_significant(criterion.p_value) for criterion in met):
             return "holds partly"
-        return "does not hold" if False in met else "undecided"
+        refuted = [criterion for criterion in self.criteria if criterion.is_met is False]
+        if not met and any(self._is_significant(criterion.refutation_p_value) for criterion in refuted):
+            return "does not hold"
+        return "undecided"
+
+    def _is_significant(self, p_value: float) -> bool:
+        """Return whether the p-value of a criterion is significant; always for a claim alone."""
+        return self.family_size == 1 or self.family_size * p_value <= ALPHA
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of the claim in ``claims.json``."""
         main = self.criteria[0].to_json() if self.criteria else {}
         return {
             "claim": self.text,
+            "gains": self.gains,
             "verdict": self.verdict,
             "estimate": main.get("estimate"),
             "interval": main.get("interval"),
@@ -205,6 +230,15 @@ class Claim:
             "explanation": self.explanation,
             "criteria": [criterion.to_json() for criterion in self.criteria],
         }
+
+
+def adjust_claims(claims: Sequence[Claim]) -> list[Claim]:
+    """Adjust the p-values of claims that are tested together by Holm's method.
+
+    Claims without criteria count, too: their p-value is 1.
+    """
+    adjusted = adjust_p_values({claim.key: claim.p_value for claim in claims})
+    return [replace(claim, adjusted_p_value=adjusted[claim.key], family_size=len(claims)) for claim in claims]
 
 
 def summarize_verdicts(claims: Sequence[Claim]) -> str:

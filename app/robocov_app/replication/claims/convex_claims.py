@@ -6,21 +6,22 @@ from robocov_app.figures.statistics import estimate_fraction
 from robocov_app.replication.claims.claim import Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import list_ratios_by_start
 from robocov_app.replication.claims.thresholds import CLUSTERED, NEARLY_ALWAYS, NEARLY_SAME, SAME_COST
-from robocov_app.replication.design.contenders import LABELS
-from robocov_app.replication.formatting import format_amount, format_interval
+from robocov_app.replication.design.contenders import GAIN_CHOICES, GainChoice
+from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.results.outcome_tables import EARLY_S
 from robocov_app.replication.results.outcomes import Outcomes
 
 
-def judge_convex_final(outcomes: Outcomes) -> Claim:
+def judge_convex_final(outcomes: Outcomes, gains: GainChoice = "shared") -> Claim:
     """Judge whether RAPF ends at the same cost as Lloyd's algorithm in convex regions."""
     claim = Claim(
-        "convex-final",
+        f"convex-final-{gains}",
         1,
         "In a convex region RAPF ends at the same cost as Lloyd's algorithm.",
         "VI-A, figures 2 and 3",
+        gains=GAIN_CHOICES[gains],
     )
-    pairs = outcomes.compare("rapf-shared", "lloyd")
+    pairs = outcomes.compare(f"rapf-{gains}", "lloyd")
     if pairs is None:
         return claim
     nearly_same = estimate_fraction(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.outcomes.maps)
@@ -40,24 +41,26 @@ def judge_convex_final(outcomes: Outcomes) -> Claim:
     )
     lowest = format_amount(pairs.ratios.min())
     highest = format_amount(pairs.ratios.max())
+    wins = format_amount(pairs.wins.estimate, "%")
     explanation = (
-        f"The ratio lies between {lowest} and {highest}; Lloyd ends in "
-        f"one of several centroidal tessellations of the region. {describe_other_gains(outcomes)}"
+        f"The ratio lies between {lowest} and {highest}, and is below 1 in {wins} of the runs; Lloyd ends in "
+        f"one of several centroidal tessellations of the region."
     )
     return claim.judge(criteria, explanation, pairs.outcomes, runs_per_instance=2)
 
 
-def judge_convex_spreading(outcomes: Outcomes) -> Claim:
+def judge_convex_spreading(outcomes: Outcomes, gains: GainChoice = "shared") -> Claim:
     """Judge whether RAPF spreads faster than Lloyd's algorithm from starts close together."""
     measure = f"mean distance over the first {EARLY_S:g} s"
     return judge_pairs(
         Claim(
-            "convex-spreading",
+            f"convex-spreading-{gains}",
             1,
             "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm.",
             "VI-A",
+            gains=GAIN_CHOICES[gains],
         ),
-        outcomes.select_starts(*CLUSTERED).compare("rapf-shared", "lloyd", "early"),
+        outcomes.select_starts(*CLUSTERED).compare(f"rapf-{gains}", "lloyd", "early"),
         ratio_measure=f"median ratio, RAPF to Lloyd, of the {measure}",
         wins_measure=f"runs in which RAPF's {measure} is lower",
         explain=lambda pairs: (
@@ -65,15 +68,3 @@ def judge_convex_spreading(outcomes: Outcomes) -> Claim:
             f"RAPF is negligible” in convex regions, after having called it “quite better” from close starts."
         ),
     )
-
-
-def describe_other_gains(outcomes: Outcomes) -> str:
-    """Return a sentence on how RAPF with other gains compares with Lloyd's algorithm; empty without runs."""
-    texts = []
-    for key in ("rapf-best", "rapf-default"):
-        pairs = outcomes.compare(key, "lloyd")
-        if pairs is not None:
-            wins = format_amount(pairs.wins.estimate, "%")
-            ratio = format_interval(pairs.ratio)
-            texts.append(f"{LABELS[key]}: ratio {ratio}, lower in {wins} of the runs")
-    return f"{'; '.join(texts)}." if texts else ""

@@ -1,8 +1,11 @@
 """Sentences that several claims share."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from robocov.arrays import Array
+from robocov_app.replication.design.study_maps import get_map_kind
 from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import PairedComparison
 
@@ -24,9 +27,19 @@ def describe_losses(pairs: PairedComparison, name: str) -> str:
 
 def list_ratios_by_start(pairs: PairedComparison) -> str:
     """Return the median ratio for each kind of starts: "corner 0.6, center 0.7"."""
-    starts = np.array(pairs.outcomes.starts)
-    kinds = dict.fromkeys(pairs.outcomes.starts)
-    return ", ".join(f"{kind} {format_median(pairs.ratios[starts == kind])}" for kind in kinds)
+    return _list_ratios(pairs, pairs.outcomes.starts)
+
+
+def list_ratios_by_map_kind(pairs: PairedComparison) -> str:
+    """Return the median ratio for each kind of map: "bundled 0.6, polygons 0.7"."""
+    return _list_ratios(pairs, [get_map_kind(name) for name in pairs.outcomes.maps])
+
+
+def _list_ratios(pairs: PairedComparison, kinds: Sequence[str]) -> str:
+    """Return the median ratio for each kind, given the kind of each pair."""
+    kind_array = np.array(kinds)
+    medians = [(kind, pairs.ratios[kind_array == kind]) for kind in dict.fromkeys(kinds)]
+    return ", ".join(f"{kind} {format_median(ratios)}" for kind, ratios in medians)
 
 
 def compute_positive_fraction(counts: Array) -> float:

@@ -2,8 +2,13 @@
 
 import numpy as np
 
-from robocov.arrays import Array
-from robocov_app.figures.statistics import bootstrap, compute_coefficient_of_variation
+from robocov.arrays import Array, IntArray
+from robocov_app.figures.statistics import (
+    RESAMPLES,
+    bootstrap,
+    bootstrap_statistic,
+    compute_coefficient_of_variation,
+)
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.thresholds import BARELY, REGRET
 from robocov_app.replication.design.contenders import format_potential
@@ -60,6 +65,50 @@ def _describe_attractions(rapf: GainOutcomes) -> str:
             worst = format_median(compute_worst_by_best(part))
             texts.append(f"k_att = {level:g}: {variation}, worst/best {worst}")
     return "; ".join(texts)
+
+
+def judge_gains_every(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
+    """Judge whether RAPF ends below RPF with the same potential parameters, whichever they are.
+
+    The claims with the shared gains compare one set of parameters, which the study chose. Here, every set of
+    the grid counts.
+
+    Parameters
+    ----------
+    rapf, rpf : GainOutcomes
+        Outcomes on the same problem instances, without failed runs.
+    """
+    claim = Claim(
+        "gains-every",
+        2,
+        "In a non-convex environment RAPF ends at a lower cost than RPF with the same potential parameters, "
+        "whichever of the grid they are.",
+        "VI, “the same values for the parameters of the potentials”",
+        gains="every set of the grid",
+    )
+    if not rapf.instances:
+        return claim
+    ratios = compute_ratios_by_set(rapf, rpf)
+
+    def compute_highest_median(rows: IntArray) -> float:
+        return float(np.median(ratios[:, rows], axis=1).max())
+
+    highest = bootstrap_statistic(compute_highest_median, rapf.maps, resamples=RESAMPLES)
+    criterion = Criterion("highest median ratio of a set, RAPF to RPF", highest, high=1.0)
+    medians = np.median(ratios, axis=1)
+    explanation = (
+        f"{len(medians)} sets with the same k_rep and rho_0 for both. Their median ratios lie between "
+        f"{format_amount(medians.min())} and {format_amount(medians.max())}. The highest is that of "
+        f"{format_potential(rapf.gains[int(np.argmax(medians))])}."
+    )
+    return claim.judge((criterion,), explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
+
+
+def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> Array:
+    """Return the ratio of RAPF's cost to RPF's with the same potential, (g, m), for each set of RAPF."""
+    rows = {(gains["k_rep"], gains["rho_0"]): row for row, gains in enumerate(rpf.gains)}
+    matching_rows = [rows[gains["k_rep"], gains["rho_0"]] for gains in rapf.gains]
+    return np.asarray(rapf.excess / rpf.excess[matching_rows])
 
 
 def build_variation_criteria(

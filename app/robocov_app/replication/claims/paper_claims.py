@@ -1,13 +1,12 @@
-"""All claims of the paper, with Holm-adjusted p-values of the registered ones."""
+"""All claims of the paper, with p-values that are adjusted for their number."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
-from robocov_app.figures.statistics import adjust_p_values
-from robocov_app.replication.claims.claim import Claim
+from robocov_app.replication.claims.claim import Claim, adjust_claims
 from robocov_app.replication.claims.convex_claims import judge_convex_final, judge_convex_spreading
 from robocov_app.replication.claims.gain_claims import (
     judge_gains_choice,
+    judge_gains_every,
     judge_gains_result,
     select_common_instances,
 )
@@ -15,22 +14,22 @@ from robocov_app.replication.claims.nonconvex_claims import (
     judge_against_lloyd,
     judge_against_rpf,
     judge_gap,
-    judge_lloyd_stuck,
+    judge_lloyd_unusable,
 )
 from robocov_app.replication.claims.start_claims import judge_starts_cost, judge_starts_placement
-from robocov_app.replication.claims.thresholds import REGISTERED
+from robocov_app.replication.design.contenders import GAIN_CHOICES
 from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes
 
 
 def judge_paper_claims(
-    convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, GainOutcomes]
+    convex: Outcomes, nonconvex: Outcomes, limited: Outcomes, gains: Mapping[str, GainOutcomes]
 ) -> list[Claim]:
-    """Judge all claims of the paper.
+    """Judge all claims of the paper, each with every choice of gains.
 
     Parameters
     ----------
-    convex, nonconvex : Outcomes
-        Outcomes in convex regions, and on non-convex maps.
+    convex, nonconvex, limited : Outcomes
+        Outcomes in convex regions, on non-convex maps, and on non-convex maps at limited ranges.
     gains : Mapping
         Outcomes of the gain grids of "rapf" and "rpf".
 
@@ -38,23 +37,39 @@ def judge_paper_claims(
     -------
     list of Claim
     """
-    rapf, rpf = select_common_instances(gains["rapf"], gains["rpf"])
     claims = [
-        judge_convex_final(convex),
-        judge_convex_spreading(convex),
-        judge_against_rpf(nonconvex, "shared", "final"),
-        judge_against_rpf(nonconvex, "best", "final"),
-        judge_against_rpf(nonconvex, "shared", "motion"),
-        judge_against_rpf(nonconvex, "best", "motion"),
+        *(judge_convex_final(convex, choice) for choice in GAIN_CHOICES),
+        *(judge_convex_spreading(convex, choice) for choice in GAIN_CHOICES),
+        *_judge_nonconvex_claims(nonconvex, gains),
+        *_judge_limited_claims(limited),
+    ]
+    return adjust_claims(claims)
+
+
+def _judge_nonconvex_claims(outcomes: Outcomes, gains: Mapping[str, GainOutcomes]) -> list[Claim]:
+    """Judge the claims on non-convex maps."""
+    rapf, rpf = select_common_instances(gains["rapf"], gains["rpf"])
+    return [
+        *(judge_against_rpf(outcomes, choice, "final") for choice in GAIN_CHOICES),
+        judge_gains_every(rapf, rpf),
+        *(judge_against_rpf(outcomes, choice, "motion") for choice in GAIN_CHOICES),
         judge_gains_result(rapf, rpf),
         judge_gains_choice(rapf, rpf),
-        judge_starts_cost(nonconvex),
-        judge_starts_placement(nonconvex),
-        judge_lloyd_stuck(nonconvex),
-        judge_against_lloyd(nonconvex),
-        judge_gap(nonconvex, "rapf-shared"),
-        judge_gap(nonconvex, "rpf-shared"),
-        judge_gap(nonconvex, "lloyd"),
+        *(judge_starts_cost(outcomes, choice) for choice in GAIN_CHOICES),
+        *(judge_starts_placement(outcomes, choice) for choice in GAIN_CHOICES),
+        judge_lloyd_unusable(outcomes),
+        *(judge_against_lloyd(outcomes, choice) for choice in GAIN_CHOICES),
+        *(judge_gap(outcomes, "rapf", choice) for choice in GAIN_CHOICES),
+        *(judge_gap(outcomes, "rpf", choice) for choice in GAIN_CHOICES),
+        judge_gap(outcomes, "lloyd"),
     ]
-    adjusted = adjust_p_values({claim.key: claim.p_value for claim in claims if claim.key in REGISTERED})
-    return [replace(claim, adjusted_p_value=adjusted.get(claim.key)) for claim in claims]
+
+
+def _judge_limited_claims(outcomes: Outcomes) -> list[Claim]:
+    """Judge the main claims on non-convex maps at limited ranges."""
+    return [
+        *(judge_against_rpf(outcomes, choice, "final", limited=True) for choice in GAIN_CHOICES),
+        *(judge_against_rpf(outcomes, choice, "motion", limited=True) for choice in GAIN_CHOICES),
+        *(judge_against_lloyd(outcomes, choice, limited=True) for choice in GAIN_CHOICES),
+        *(judge_gap(outcomes, "rapf", choice, limited=True) for choice in GAIN_CHOICES),
+    ]

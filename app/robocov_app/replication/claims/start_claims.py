@@ -7,6 +7,7 @@ from robocov_app.figures.statistics import bootstrap, compute_coefficient_of_var
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.gain_claims import build_variation_criteria
 from robocov_app.replication.claims.thresholds import BARELY_BY_START, SAME_PLACEMENT
+from robocov_app.replication.design.contenders import GAIN_CHOICES, GainChoice
 from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import Outcomes
 
@@ -14,45 +15,45 @@ _MIN_VARIATION = 1e-12
 """Lower bound of a denominator, to avoid a division by zero."""
 
 
-def judge_starts_cost(outcomes: Outcomes) -> Claim:
+def judge_starts_cost(outcomes: Outcomes, gains: GainChoice = "shared") -> Claim:
     """Judge whether RAPF's final cost depends less on the starts than RPF's."""
     claim = Claim(
-        "starts-cost",
+        f"starts-cost-{gains}",
         4,
         "RAPF's final cost barely depends on where the robots start, RPF's does.",
         "VI-B, figures 6 and 8",
+        gains=GAIN_CHOICES[gains],
     )
-    finished = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
-    rapf, maps = _compute_start_variation(finished, "rapf-shared")
-    rpf, _ = _compute_start_variation(finished, "rpf-shared")
+    keys = (f"rapf-{gains}", f"rpf-{gains}")
+    finished = outcomes.select_finite("final", *keys)
+    rapf, maps = _compute_start_variation(finished, keys[0])
+    rpf, _ = _compute_start_variation(finished, keys[1])
     if not maps:
         return claim
     measure = "median standard deviation of the final cost over the starts, relative to its mean"
     criteria = build_variation_criteria(measure, rapf, rpf, maps, BARELY_BY_START)
     ratio = np.median(rpf) / max(np.median(rapf), _MIN_VARIATION)
-    others = {}
-    for key in ("rapf-best", "rpf-best", "lloyd"):
-        variation, _ = _compute_start_variation(outcomes.select_finite("final", key), key)
-        others[key] = format_median(variation, "%")
+    lloyd, _ = _compute_start_variation(outcomes.select_finite("final", "lloyd"), "lloyd")
     explanation = (
         f"Over the same map and seed, from {len(set(finished.starts))} kinds of starts. RPF's varies "
-        f"{format_amount(ratio)} times as much as RAPF's. With their "
-        f"best gains: RAPF {others['rapf-best']}, RPF {others['rpf-best']}; Lloyd {others['lloyd']}."
+        f"{format_amount(ratio)} times as much as RAPF's. Lloyd's varies by {format_median(lloyd, '%')}."
     )
     return claim.judge(criteria, explanation, finished, runs_per_instance=2)
 
 
-def judge_starts_placement(outcomes: Outcomes) -> Claim:
+def judge_starts_placement(outcomes: Outcomes, gains: GainChoice = "shared") -> Claim:
     """Judge whether RAPF's final placement depends less on the starts than RPF's."""
     claim = Claim(
-        "starts-placement",
+        f"starts-placement-{gains}",
         4,
         "RAPF's final placement varies little with where the robots start, RPF's strongly.",
         "VI-B, figures 6 and 8",
+        gains=GAIN_CHOICES[gains],
     )
-    finished = outcomes.select_finite("final", "rapf-shared", "rpf-shared")
-    rapf_spreads = finished.compute_placement_spreads("rapf-shared")
-    rpf_spreads = finished.compute_placement_spreads("rpf-shared")
+    keys = (f"rapf-{gains}", f"rpf-{gains}")
+    finished = outcomes.select_finite("final", *keys)
+    rapf_spreads = finished.compute_placement_spreads(keys[0])
+    rpf_spreads = finished.compute_placement_spreads(keys[1])
     maps = [name for name in rapf_spreads if name in rpf_spreads]
     if not maps:
         return claim

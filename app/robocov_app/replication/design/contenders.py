@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from robocov.controllers import CONTROLLERS, get_gain_values, make_controller
 from robocov.controllers.gains import Value, format_value
@@ -23,10 +23,19 @@ BestGains: TypeAlias = Mapping[str, Mapping[str, Value]]
 SHARED: Mapping[str, Value] = {"k_rep": 1.0, "rho_0": 2.0}
 """Potential parameters that RAPF and RPF share, as in the paper, which does not state its values.
 
-With these, the repulsion holds a robot that is pulled with 1 N about 0.83 m away from a wall.
+With these, the repulsion holds a robot that is pulled with 1 N about 0.84 m away from a wall.
 """
 SHARED_ATTRACTION = 3.0
 """RAPF's k_att: at a distance of 1 m from its goal a robot is pulled with 3 N, enough for full speed."""
+
+GainChoice: TypeAlias = Literal["shared", "best", "default"]
+"""The gains with which a claim is tested."""
+GAIN_CHOICES: Mapping[GainChoice, str] = {
+    "shared": "shared gains",
+    "best": "best gains of each",
+    "default": "robocov's default gains",
+}
+"""The choices of gains with their names: the gains that RAPF and RPF share, the best ones, the defaults."""
 
 LABELS = {
     "rapf-shared": "RAPF, shared gains",
@@ -35,6 +44,7 @@ LABELS = {
     "lloyd": "Lloyd",
     "rpf-shared": "RPF, shared gains",
     "rpf-best": "RPF, its best gains",
+    "rpf-default": "RPF, robocov's default",
 }
 """Labels of the contenders of the paper's claims, in the order of tables."""
 
@@ -86,7 +96,8 @@ RAPF_SHARED = build_paper_contender(
 RPF_SHARED = build_paper_contender("rpf-shared", SHARED)
 LLOYD = build_paper_contender("lloyd", {})
 RAPF_DEFAULT = build_paper_contender("rapf-default", {})
-UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
+RPF_DEFAULT = build_paper_contender("rpf-default", {})
+UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, RPF_DEFAULT, LLOYD)
 """Contenders of the paper's claims whose gains are not tuned."""
 
 TARGETS = (
@@ -165,7 +176,7 @@ def build_paper_contenders(best: BestGains) -> tuple[Contender, ...]:
         return UNTUNED
     rapf = build_paper_contender("rapf-best", best["rapf"])
     rpf = build_paper_contender("rpf-best", best["rpf"])
-    return (RAPF_SHARED, rapf, RAPF_DEFAULT, RPF_SHARED, rpf, LLOYD)
+    return (RAPF_SHARED, rapf, RAPF_DEFAULT, RPF_SHARED, rpf, RPF_DEFAULT, LLOYD)
 
 
 def select_strongest(contenders: Sequence[Contender]) -> list[Contender]:

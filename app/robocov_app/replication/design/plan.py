@@ -39,8 +39,10 @@ NON_CONVEX = (
 at 1 m/s would not arrive before the run ends."""
 CONVEX = ("square", "pentagon")
 """Bundled maps of the convex case."""
+FAMILIES = ("blocks", "rooms", "caves")
+"""Kinds of generated maps of the claims, in addition to maps with polygons. Each has its own generator."""
 UNSEEN = ("blocks", "rooms", "caves", "mazes")
-"""Kinds of generated maps on which the paper's claims are not tested."""
+"""Kinds of generated maps on which the goals of our own controller are judged again."""
 
 TEAM: Mapping[str, Any] = {
     "radius": 0.1,
@@ -54,6 +56,13 @@ TEAM: Mapping[str, Any] = {
 
 The sensing range equals the longest repulsion in the gain grids, so that only `rho_0` limits the distance at
 which obstacles act. Communication is unlimited.
+"""
+LIMITED_RANGES: Mapping[str, float] = {"communication_range": 4.0, "sensing_range": 2.0}
+"""Ranges of the runs at limited ranges, m. The paper limits both ranges, but does not give their values.
+
+On a square with a side of ten meters, the share of each of six robots is a square with a side of 4.1 m. So a
+robot hears its neighbors in a spread team, but not the others. The sensing range is that of the shared
+repulsion.
 """
 
 
@@ -140,12 +149,15 @@ class Plan:
         Control period, s.
     lattice : int
         Sites along a side of the lattice of the coverage cost.
-    bundled, generated, seeds : tuple
-        Bundled maps, seeds of generated maps, and seeds of starts for the claims. For the reason of their
-        number see `NEARLY_ALWAYS` in `robocov_app.replication.claims.thresholds`.
-    tuning, tuning_starts, tuning_seed : tuple, tuple and int
-        Seeds of the generated maps for the gain grids, which must not be in `generated`, kinds of starts, and
-        a seed of starts that no claim uses.
+    bundled, generated, families, seeds : tuple
+        Bundled maps, seeds of generated maps with polygons, seeds of generated maps of each of the kinds in
+        `FAMILIES`, and seeds of starts for the claims. For the reason of their number see `NEARLY_ALWAYS` in
+        `robocov_app.replication.claims.thresholds`.
+    limited_starts, limited_seeds : tuple
+        Kinds and seeds of starts for the claims at limited ranges, on the same maps.
+    tuning, tuning_families, tuning_starts, tuning_seed : tuple, tuple, tuple and int
+        Seeds of the generated maps for the gain grids, with polygons and of each kind in `FAMILIES`, which no
+        claim uses, kinds of starts, and a seed of starts that no claim uses.
     k_rep, rho_0, k_att : tuple of float
         Values of the gains in the grids.
     convex_generated, convex_seeds : tuple of int
@@ -160,9 +172,13 @@ class Plan:
     dt: float = 0.02
     lattice: int = 128
     bundled: tuple[str, ...] = NON_CONVEX
-    generated: tuple[int, ...] = tuple(range(1, 88))
+    generated: tuple[int, ...] = tuple(range(1, 61))
+    families: tuple[int, ...] = tuple(range(401, 410))
     seeds: tuple[int, ...] = (0, 1, 2, 3)
-    tuning: tuple[int, ...] = tuple(range(101, 113))
+    limited_starts: tuple[str, ...] = KINDS
+    limited_seeds: tuple[int, ...] = (0,)
+    tuning: tuple[int, ...] = tuple(range(101, 107))
+    tuning_families: tuple[int, ...] = (201, 202)
     tuning_starts: tuple[str, ...] = ("corner", "uniform")
     tuning_seed: int = 1000
     k_rep: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)
@@ -181,8 +197,10 @@ QUICK = Plan(
     duration=60.0,
     lattice=64,
     bundled=("blocks-a", "blocks-b", "rooms"),
-    generated=tuple(range(1, 10)),
+    generated=tuple(range(1, 7)),
+    families=(401,),
     seeds=(0,),
+    limited_starts=("corner", "uniform"),
     k_rep=(0.3, 3.0),
     rho_0=(2.0, 6.0),
     k_att=(3.0, 30.0),

@@ -1,8 +1,9 @@
 """The sweeps of the study, each with the name of its folder.
 
 ``gains`` and ``rival-gains`` are gain grids on separate maps, from which the best gains are chosen.
-``claims`` contains the runs of the paper's contenders, ``rivals`` and ``ours-…`` those of all others on the
-same maps and from the same starts. In ``density`` RAPF knows the density, in ``density-ignored`` it does not.
+``claims`` contains the runs of the paper's contenders, ``limited`` those at limited ranges, ``rivals`` and
+``ours-…`` those of all others on the same maps and from the same starts. In ``density`` RAPF knows the
+density, in ``density-ignored`` it does not.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,13 +22,21 @@ from robocov_app.replication.design.contenders import (
     RPF_SHARED,
     Contender,
 )
-from robocov_app.replication.design.plan import CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
+from robocov_app.replication.design.plan import (
+    CONVEX_KINDS,
+    KINDS,
+    LIMITED_RANGES,
+    ROBOTS,
+    TEAM,
+    Plan,
+)
 from robocov_app.replication.design.study_maps import (
     build_baseline_maps,
     build_claim_maps,
     build_convex_maps,
     build_density_maps,
     build_generated_maps,
+    build_tuning_maps,
     build_unseen_maps,
     load_study_map,
 )
@@ -49,6 +58,9 @@ FIGURE_CASES = {
     "figures-b": FigureCase("blocks-b", ("paper", "other"), (RAPF_SHARED, RPF_SHARED)),
 }
 """Runs of the figures by sweep; "paper" is the same start on both maps, "other" the start of figure 8."""
+
+FIGURE_CHANGES = {"limited": ("figures-a", "figures-b"), "half-step": ("figures-a",)}
+"""Sweeps of figures that are repeated at limited ranges, and with half the control period."""
 
 DENSITY_MAP = "hospital"
 DENSITY_START = "reception"
@@ -150,15 +162,29 @@ def _build_common_options(plan: Plan) -> dict[str, Any]:
     }
 
 
-def build_figure_studies(plan: Plan, paper_contenders: Sequence[Contender] = ()) -> dict[str, Study]:
-    """Build the sweeps whose runs are shown in figures; trajectories and costs are recorded in fine steps.
+def build_figure_studies(plan: Plan) -> dict[str, Study]:
+    """Build the sweeps of the figures, with the shared gains.
 
-    Parameters
-    ----------
-    plan : Plan
-    paper_contenders : sequence of Contender
-        The paper's contenders. If some of them have their best gains, only the sweeps of figures 4 to 8 with
-        these gains are built.
+    In addition to the sweeps of `FIGURE_CASES`, there are those of `FIGURE_CHANGES`.
+
+    Returns
+    -------
+    dict
+        Sweeps by name.
+    """
+    studies = {}
+    for name, case in FIGURE_CASES.items():
+        studies[name] = _build_figure_study(plan, case, case.contenders)
+    for variant, names in FIGURE_CHANGES.items():
+        changes = LIMITED_RANGES if variant == "limited" else {"dt": plan.dt / 2.0}
+        for name in names:
+            case = FIGURE_CASES[name]
+            studies[f"{name}-{variant}"] = _build_figure_study(plan, case, case.contenders, **changes)
+    return studies
+
+
+def build_best_figure_studies(plan: Plan, paper_contenders: Sequence[Contender]) -> dict[str, Study]:
+    """Build the sweeps of figures 4 to 8 with the best gains; none if these are unknown.
 
     Returns
     -------
@@ -169,20 +195,27 @@ def build_figure_studies(plan: Plan, paper_contenders: Sequence[Contender] = ())
     studies = {}
     for name, case in FIGURE_CASES.items():
         # Figures that compare with Lloyd's algorithm are not drawn for the best gains.
-        if best and LLOYD in case.contenders:
-            continue
-        contest = build_contest(
-            plan,
-            maps=(StudyMap(case.map, load_map(case.map)),),
-            participants=best or case.contenders,
-            starts=case.starts,
-            seeds=(0,),
-            lattice=2 * plan.lattice,
-            cost_hz=5.0,
-            record_hz=10.0,
-        )
-        studies[f"{name}-best" if best else name] = contest.study
+        if best and LLOYD not in case.contenders:
+            studies[f"{name}-best"] = _build_figure_study(plan, case, best)
     return studies
+
+
+def _build_figure_study(
+    plan: Plan, case: FigureCase, participants: Sequence[Contender], **changes: float
+) -> Study:
+    """Build the sweep of a case; trajectories and costs are recorded in fine steps."""
+    contest = build_contest(
+        plan,
+        maps=(StudyMap(case.map, load_map(case.map)),),
+        participants=participants,
+        starts=case.starts,
+        seeds=(0,),
+        lattice=2 * plan.lattice,
+        cost_hz=5.0,
+        record_hz=10.0,
+        **changes,
+    )
+    return contest.study
 
 
 def list_gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
@@ -196,7 +229,7 @@ def list_gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
 def build_gains_study(plan: Plan) -> Study:
     """Build the sweep of the gain grids of RAPF and RPF."""
     return Study(
-        build_generated_maps(plan.tuning),
+        build_tuning_maps(plan),
         ("rapf", "rpf"),
         list_gain_sets(plan),
         starts=plan.tuning_starts,
@@ -214,6 +247,14 @@ def build_convex_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> C
 def build_claims_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
     """Build the sweep of the paper's contenders on non-convex maps."""
     return build_contest(plan, build_claim_maps(plan), paper_contenders, KINDS, plan.seeds)
+
+
+def build_limited_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
+    """Build the sweep of the paper's contenders on non-convex maps at limited ranges."""
+    maps = build_claim_maps(plan)
+    return build_contest(
+        plan, maps, paper_contenders, plan.limited_starts, plan.limited_seeds, **LIMITED_RANGES
+    )
 
 
 def build_baseline_gains_study(plan: Plan) -> Study | None:

@@ -13,7 +13,7 @@ from robocov.errors import StartError
 from robocov.generator import generate_map
 from robocov.mapfile import load_map
 from robocov_app.evaluation.hot_spots import add_hot_spots
-from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, KINDS, UNSEEN, Plan
+from robocov_app.replication.design.plan import CONVEX, CONVEX_KINDS, FAMILIES, KINDS, UNSEEN, Plan
 from robocov_app.sweep.study.study import StudyMap
 
 START_RADII_M = (0.8, 0.6, 0.45)
@@ -105,9 +105,40 @@ def build_generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
 
 
 @cache
+def build_family_maps(kinds: tuple[str, ...], seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
+    """Return generated maps of given kinds, for each seed, with the study's starts."""
+    maps = []
+    for kind, seed in product(kinds, seeds):
+        environment = generate_map(seed, kind=kind)
+        maps.append(StudyMap(f"{kind}-{seed}", replace_starts(environment)))
+    return tuple(maps)
+
+
+@cache
 def build_claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the non-convex maps on which the claims are tested."""
-    return (*(load_study_map(name) for name in plan.bundled), *build_generated_maps(plan.generated))
+    bundled = (load_study_map(name) for name in plan.bundled)
+    families = build_family_maps(FAMILIES, plan.families)
+    return (*bundled, *build_generated_maps(plan.generated), *families)
+
+
+def build_tuning_maps(plan: Plan) -> tuple[StudyMap, ...]:
+    """Return the maps on which the gains of RAPF and RPF are tuned."""
+    return (*build_generated_maps(plan.tuning), *build_family_maps(FAMILIES, plan.tuning_families))
+
+
+def get_map_kind(name: str) -> str:
+    """Return the kind of a map of the study by its name: "bundled", "polygons", or a kind in `FAMILIES`.
+
+    Examples
+    --------
+    >>> get_map_kind("rooms"), get_map_kind("generated-3"), get_map_kind("rooms-401")
+    ('bundled', 'polygons', 'rooms')
+    """
+    kind, _, seed = name.rpartition("-")
+    if not seed.isdigit():
+        return "bundled"
+    return "polygons" if kind == "generated" else kind
 
 
 @cache
@@ -118,14 +149,9 @@ def build_convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
     return (*bundled, *generated)
 
 
-@cache
 def build_unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return generated maps of other kinds than those of the claims, with the study's starts."""
-    maps = []
-    for kind, seed in product(UNSEEN, plan.beyond.unseen):
-        environment = generate_map(seed, kind=kind)
-        maps.append(StudyMap(f"{kind}-{seed}", replace_starts(environment)))
-    return tuple(maps)
+    """Return the generated maps on which the goals of our own controller are judged again."""
+    return build_family_maps(UNSEEN, plan.beyond.unseen)
 
 
 def build_baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:

@@ -86,9 +86,10 @@ def _list_studies(folder: Path, plan: Plan, *, claims: bool, beyond: bool) -> di
     if claims or (beyond and is_gain_grid_finished(folder, plan)):
         paper_contenders = _guess_paper_contenders(plan)
     if claims:
-        sweeps |= studies.build_figure_studies(plan, paper_contenders)
+        sweeps |= studies.build_best_figure_studies(plan, paper_contenders)
         sweeps["gains"] = studies.build_gains_study(plan)
         sweeps["convex"] = studies.build_convex_contest(plan, paper_contenders).study
+        sweeps["limited"] = studies.build_limited_contest(plan, paper_contenders).study
     if claims or beyond:
         sweeps["claims"] = studies.build_claims_contest(plan, paper_contenders).study
     if beyond:

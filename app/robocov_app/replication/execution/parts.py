@@ -3,7 +3,7 @@
 They are executed in an order in which the results that each part depends on are available.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,7 @@ from robocov_app.replication.results.study_results import (
     BeyondResults,
     DensityResults,
     FigureRun,
+    FigureRuns,
     PaperResults,
     ShownRuns,
 )
@@ -74,34 +75,30 @@ def record_partition() -> Record:
     return robocov.Simulation(environment, robocov.Lloyd(), starts).run(_PARTITION_DURATION_S)
 
 
-def run_figures(
-    folder: Path, plan: Plan, options: RunnerOptions, paper_contenders: Sequence[Contender] = ()
-) -> dict[str, FigureRun]:
-    """Execute the runs that are shown in figures.
-
-    Parameters
-    ----------
-    folder : Path
-    plan : Plan
-    options : RunnerOptions
-    paper_contenders : sequence of Contender
-        The paper's contenders, for the figures with the best gains.
+def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> FigureRuns:
+    """Execute the runs that are shown in figures with the shared gains.
 
     Returns
     -------
-    dict
-        Runs by "case/controller".
+    FigureRuns
 
     Raises
     ------
     InputError
         If a run failed.
     """
-    runs: dict[str, FigureRun] = {}
-    for name, study in studies.build_figure_studies(plan, paper_contenders).items():
+    return _run_figure_studies(studies.build_figure_studies(plan), folder, options)
+
+
+def _run_figure_studies(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptions) -> FigureRuns:
+    """Execute the runs of sweeps whose names are "figures-case" or "figures-case-variant"."""
+    runs: FigureRuns = {}
+    for name, study in sweeps.items():
+        _, name_case, *words = name.split("-")
+        variant = runs.setdefault("-".join(words), {})
         for row, run in _read_figure_runs(run_study(study, folder, name, options)):
-            case = "other" if row["start"] == "other" else name.split("-")[1]
-            runs[f"{case}/{row['controller']}"] = run
+            case = "other" if row["start"] == "other" else name_case
+            variant[f"{case}/{row['controller']}"] = run
     return runs
 
 
@@ -122,7 +119,8 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     figures = run_figures(folder, plan, options)
     gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
     paper_contenders = build_paper_contenders(find_best_gains(gains))
-    best_figures = run_figures(folder, plan, options, paper_contenders)
+    best_studies = studies.build_best_figure_studies(plan, paper_contenders)
+    figures |= _run_figure_studies(best_studies, folder, options)
     convex = studies.build_convex_contest(plan, paper_contenders)
     claims = studies.build_claims_contest(plan, paper_contenders)
     maps = (*convex.study.maps, *claims.study.maps)
@@ -131,20 +129,17 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     convex_outcomes = read_outcomes(convex_folder, convex, references)
     claims_folder = run_study(claims.study, folder, "claims", options)
     claims_outcomes = read_outcomes(claims_folder, claims, references)
-    names = [
-        *studies.build_figure_studies(plan),
-        *studies.build_figure_studies(plan, paper_contenders),
-        "gains",
-        "convex",
-        "claims",
-    ]
+    limited = studies.build_limited_contest(plan, paper_contenders)
+    limited_folder = run_study(limited.study, folder, "limited", options)
+    limited_outcomes = read_outcomes(limited_folder, limited, references)
+    names = [*studies.build_figure_studies(plan), *best_studies, "gains", "convex", "claims", "limited"]
     runs, failed = _count_runs(folder, names)
     return PaperResults(
         figures=figures,
-        best_figures=best_figures,
         gains=gains,
         convex=convex_outcomes,
         claims=claims_outcomes,
+        limited=limited_outcomes,
         contenders=paper_contenders,
         references=references,
         worst=repeat_worst_runs(claims.study, claims_outcomes, RAPF_SHARED, _WORST_RUNS),

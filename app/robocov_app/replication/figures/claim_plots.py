@@ -4,7 +4,7 @@ from functools import partial
 
 from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.claims.thresholds import CLUSTERED
-from robocov_app.replication.design.contenders import LABELS
+from robocov_app.replication.design.contenders import GAIN_CHOICES, LABELS
 from robocov_app.replication.figures.comparison_plots import (
     CostRow,
     PairsRow,
@@ -45,13 +45,21 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
             "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
             "claim-4-starts": plan_costs_plot(by_start, theme),
             "claim-6-gap": plan_costs_plot([("", build_cost_samples(gap_rows))], theme),
+            "claim-7-limited": plan_pairs_plot(
+                _list_nonconvex_rows(results.limited),
+                "RAPF relative to the other controller, per pair (1: equal)",
+                theme,
+            ),
         }
     )
 
 
 def _list_convex_rows(outcomes: Outcomes) -> list[PairsRow]:
     """Compare RAPF with Lloyd's algorithm at the end, and early on from each kind of clustered starts."""
-    rows = [PairsRow("at the end", outcomes.compare("rapf-shared", "lloyd"), "rapf")]
+    rows = [
+        PairsRow(f"at the end, {gains} gains", outcomes.compare(f"rapf-{gains}", "lloyd"), "rapf")
+        for gains in GAIN_CHOICES
+    ]
     for start in CLUSTERED:
         pairs = outcomes.select_starts(start).compare("rapf-shared", "lloyd", "early")
         rows.append(PairsRow(f"first 20 s, start {start}", pairs, "rapf"))
@@ -61,13 +69,13 @@ def _list_convex_rows(outcomes: Outcomes) -> list[PairsRow]:
 def _list_nonconvex_rows(outcomes: Outcomes) -> list[PairsRow]:
     """Compare RAPF with RPF, at the end and in the first minute, and with Lloyd's algorithm at the end."""
     rows = []
-    for gains in ("shared", "best"):
+    for gains in GAIN_CHOICES:
         pairs = outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", "final")
         rows.append(PairsRow(f"RPF, at the end, {gains} gains", pairs, "rapf"))
-    for gains in ("shared", "best"):
+    for gains in GAIN_CHOICES:
         pairs = outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", "first_minute")
         rows.append(PairsRow(f"RPF, first 60 s, {gains} gains", pairs, "rapf"))
-    for gains in ("shared", "best"):
+    for gains in GAIN_CHOICES:
         pairs = outcomes.compare(f"rapf-{gains}", "lloyd", "final")
         rows.append(PairsRow(f"Lloyd, at the end, {gains} gains", pairs, "rapf"))
     return rows

@@ -12,13 +12,15 @@ from robocov_app.replication.figures.beyond_plots import plan_beyond_plots
 from robocov_app.replication.figures.claim_plots import plan_paper_plots
 from robocov_app.replication.figures.comparison_plots import Draw, Plots
 from robocov_app.replication.figures.paper_figures import (
-    BEST_FIGURES,
     CAPTIONS,
-    FIGURES,
+    FIGURES_OF_VARIANTS,
+    HALF_STEP,
     describe_figure,
+    describe_half_step,
     draw_figure,
+    name_figure,
 )
-from robocov_app.replication.results.study_results import BeyondResults, FigureRun, PaperResults
+from robocov_app.replication.results.study_results import BeyondResults, FigureRuns, PaperResults
 from robocov_app.terminal.progress import show_progress
 
 FIGURES_FOLDER = "figures"
@@ -42,7 +44,7 @@ class FigureFile(NamedTuple):
 
 def save_paper_figures(
     folder: Path,
-    runs: Mapping[str, FigureRun],
+    runs: FigureRuns,
     partition_run: Record,
     results: PaperResults | None,
     *,
@@ -54,12 +56,12 @@ def save_paper_figures(
     ----------
     folder : Path
         Folder of the study.
-    runs : Mapping
-        Runs of the figures by "case/controller".
+    runs : dict
+        Runs of the figures by variant and "case/controller".
     partition_run : Record
         The run whose first frame is figure 1.
     results : PaperResults or None
-        Without them, no plots and no figures with the best gains are written.
+        Without them, no plots are written.
     quiet : bool
         Whether to show no progress.
 
@@ -68,10 +70,10 @@ def save_paper_figures(
     dict
         Figures by name.
     """
-    runs_by_figure = {f"figure-{number}": (number, runs) for number in FIGURES}
-    if results is not None:
-        for number in BEST_FIGURES:
-            runs_by_figure[f"figure-{number}-best"] = (number, results.best_figures)
+    runs_by_figure = {}
+    for variant, variant_runs in runs.items():
+        for number in FIGURES_OF_VARIANTS[variant]:
+            runs_by_figure[name_figure(number, variant)] = (number, variant_runs)
 
     def plan_plots(theme: str) -> Plots:
         plots: dict[str, Draw] = {}
@@ -85,6 +87,8 @@ def save_paper_figures(
         name: describe_figure(number, figure_runs, partition_run)
         for name, (number, figure_runs) in runs_by_figure.items()
     }
+    if HALF_STEP in runs:
+        findings[name_figure(4, HALF_STEP)] += f" {describe_half_step(runs[''], runs[HALF_STEP])}"
     return _save_figures(folder, plan_plots, findings, quiet=quiet)
 
 

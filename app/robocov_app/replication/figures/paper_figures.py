@@ -46,13 +46,27 @@ _SAME_COST = 0.0005
 
 FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 """The case that each of the paper's figures shows, by its number."""
-BEST_FIGURES = (4, 5, 6, 7, 8)
-"""Figures that are also drawn with the best gains."""
+NON_CONVEX_FIGURES = (4, 5, 6, 7, 8)
+"""Figures of non-convex environments."""
+HALF_STEP = "half-step"
+"""Variant of figures with half the control period."""
+FIGURES_OF_VARIANTS: Mapping[str, Sequence[int]] = {
+    "": tuple(FIGURES),
+    "best": NON_CONVEX_FIGURES,
+    "limited": NON_CONVEX_FIGURES,
+    HALF_STEP: (4, 5),
+}
+"""The figures that are drawn in each variant, see `FigureRuns`."""
 COST_FIGURES = (3, 5, 7)
 """Figures of the cost against time; the others, except for the first, show trajectories."""
 
 CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
 """Captions of all figures by name."""
+
+
+def name_figure(number: int, variant: str = "") -> str:
+    """Return the name of the files of a figure, such as "figure-4" or "figure-4-best"."""
+    return f"figure-{number}-{variant}" if variant else f"figure-{number}"
 
 
 def draw_figure(
@@ -173,6 +187,22 @@ def _describe_other_starts(runs: Mapping[str, FigureRun]) -> str:
         f"Between the ends of figure 6 and these, robots are {distances[0]} apart with RAPF "
         f"and {distances[1]} with RPF (matched to minimize the sum of distances)."
     )
+
+
+def describe_half_step(runs: Mapping[str, FigureRun], half_step_runs: Mapping[str, FigureRun]) -> str:
+    """Return a sentence on how much half the control period changes the ends of figure 4."""
+    texts = []
+    for controller in ("rapf", "rpf"):
+        full = runs[f"a/{controller}"]
+        half = half_step_runs[f"a/{controller}"]
+        offsets = half.record.positions[-1] - full.record.positions[-1]
+        distance = format_amount(float(np.hypot(*offsets.T).max()), "m")
+        cost_ratio = float(half.history.mean_distance[-1] / full.history.mean_distance[-1])
+        change = _describe_difference(cost_ratio, 1.0)
+        texts.append(
+            f"{half.record.label}'s final positions move by at most {distance}, its cost is {change}"
+        )
+    return f"Compared with the full control period, {'; '.join(texts)}."
 
 
 def _describe_difference(cost: float, other_cost: float) -> str:

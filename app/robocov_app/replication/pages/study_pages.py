@@ -4,9 +4,11 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from markupsafe import Markup
 
 from robocov import __version__
@@ -18,9 +20,20 @@ from robocov_app.figures.statistics import RESAMPLES
 from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims import goals, judge_beyond_claims, summarize_verdicts, thresholds
 from robocov_app.replication.claims.claim import GOALS, RIVALS, Claim
+from robocov_app.replication.claims.registration import load_registration
 from robocov_app.replication.design import contenders, studies, study_maps
 from robocov_app.replication.design.contenders import LABELS, MAIN_CONTROLLER, OURS
-from robocov_app.replication.design.plan import FULL, NON_CONVEX, ROBOTS, TEAM, UNSEEN, Plan
+from robocov_app.replication.design.plan import (
+    FAMILIES,
+    FULL,
+    LIMITED_RANGES,
+    NON_CONVEX,
+    ROBOTS,
+    TEAM,
+    UNSEEN,
+    Plan,
+)
+from robocov_app.replication.design.study_maps import build_tuning_maps
 from robocov_app.replication.evidence import (
     ControllerEvidence,
     collect_degradations,
@@ -30,12 +43,17 @@ from robocov_app.replication.evidence import (
     summarize_contenders,
 )
 from robocov_app.replication.figures.figure_files import FigureFile
-from robocov_app.replication.figures.paper_figures import CAPTIONS, FIGURES
+from robocov_app.replication.figures.paper_figures import CAPTIONS, FIGURES, name_figure
 from robocov_app.replication.formatting import NO_VALUE, format_amount, format_interval
 from robocov_app.replication.pages.svg_marks import DotStrip, draw_interval_bar, draw_strips
 from robocov_app.replication.results import controller_speed
 from robocov_app.replication.results.outcomes import Outcomes, ProblemInstance
-from robocov_app.replication.results.study_results import BeyondResults, FigureRun, PaperResults
+from robocov_app.replication.results.study_results import (
+    BeyondResults,
+    FigureRun,
+    FigureRuns,
+    PaperResults,
+)
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import draw_run
 from robocov_app.report.replay import (
@@ -58,7 +76,16 @@ _MAX_REPLAY_BYTES = 400_000
 _REPLAY_PANES = ("b/rapf", "b/rpf")
 """Runs that the replay shows initially."""
 _FIGURES_OF_CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}
+FIGURE_VARIANTS = {
+    "": "",
+    "best": "With the best gains",
+    "limited": "At limited ranges",
+    "half-step": "With half the control period",
+}
+"""Titles of the variants of a figure, in the order of the page; see `FigureRuns`."""
 _PICTURE_SIZE_PX = (300, 240)
+_MAX_IMAGINARY_PART = 1e-9
+"""Imaginary part up to which a root counts as real, 1/m."""
 _REPORTED_GAPS = (0.25, 0.5, 1.0)
 """Gaps for which the page reports the fraction of runs that exceed them."""
 _SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N|J)(?![\w³²]))")
@@ -87,7 +114,7 @@ def write_claims(folder: Path, claims: Sequence[Claim]) -> None:
 def build_paper_page(
     plan: Plan,
     figure_files: Mapping[str, FigureFile],
-    runs: Mapping[str, FigureRun],
+    runs: FigureRuns,
     *,
     results: PaperResults | None,
     claims: Sequence[Claim],
@@ -100,8 +127,8 @@ def build_paper_page(
     plan : Plan
     figure_files : Mapping
         Figures by name.
-    runs : Mapping
-        Runs of the figures by "case/controller".
+    runs : dict
+        Runs of the figures by variant and "case/controller".
     results : PaperResults or None
         Results of the paper's claims; None if only the figures were drawn.
     claims : sequence of Claim
@@ -116,18 +143,21 @@ def build_paper_page(
     """
     numbered_figures = []
     for number in FIGURES:
-        name = f"figure-{number}"
-        numbered_figures.append(
-            (number, CAPTIONS[name], figure_files[name], figure_files.get(f"{name}-best"))
-        )
+        variants = []
+        for variant, title in FIGURE_VARIANTS.items():
+            image = figure_files.get(name_figure(number, variant))
+            if image is not None:
+                variants.append((title, image))
+        numbered_figures.append((number, CAPTIONS[name_figure(number)], variants))
     context: dict[str, Any] = {
         "results": results,
-        "runs": len(runs),
+        "runs": sum(len(variant) for variant in runs.values()),
         "claims": claims,
         "beyond": beyond,
         "images": figure_files,
         "figures": numbered_figures,
-        "replay": _build_replay(runs),
+        "replay": _build_replay(runs[""]),
+        "registration": load_registration(),
         "replay_script": Markup(wrap_script(f"{read_replay_js()}startReplays();")),
         "versions": list_versions(),
         "all_bundled": len(plan.bundled) == len(NON_CONVEX),
@@ -154,15 +184,47 @@ def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
     participants = [by_key[key] for key in LABELS if key in by_key]
     gaps = outcomes.select_finite("gap", "rapf-shared").get_values("rapf-shared", "gap")
     others = {"rapf-best": "with its best gains", "lloyd": "Lloyd", "rpf-shared": "RPF"}
-    map_count = len(set(outcomes.maps)) + len(set(results.convex.maps)) + len(plan.tuning)
+    map_count = len(set(outcomes.maps)) + len(set(results.convex.maps)) + len(build_tuning_maps(plan))
     return {
         "best": by_key,
+        "distances": compute_grid_distances(plan),
         "maps_in_all": map_count,
         "summaries": summarize_contenders(outcomes, participants, plan.duration),
         "maps": _tabulate_medians(outcomes),
         "failures": _show_failures(results.worst, outcomes, "rapf-shared", others),
         "above": [float((gaps > bound).mean()) for bound in _REPORTED_GAPS],
     }
+
+
+def compute_grid_distances(plan: Plan) -> tuple[float, float, float, float]:
+    """Compute distances that show what the ends of the gain grid mean.
+
+    Returns
+    -------
+    tuple of float, m
+        The smallest and largest distance from a wall at which the repulsion is 1 N, and the smallest and
+        largest distance from the goal at which the attraction drives a robot at full speed.
+    """
+    wall_distances = [
+        compute_balance_distance(k_rep, rho_0) for k_rep, rho_0 in product(plan.k_rep, plan.rho_0)
+    ]
+    full_speed_force = TEAM["viscosity"] * TEAM["max_speed"]
+    goal_distances = [(full_speed_force / k_att) ** (1.0 / 3.0) for k_att in plan.k_att]
+    return min(wall_distances), max(wall_distances), min(goal_distances), max(goal_distances)
+
+
+def compute_balance_distance(k_rep: float, rho_0: float, force: float = 1.0) -> float:
+    """Compute the distance, m, at which the repulsion (24) equals a force, N.
+
+    Examples
+    --------
+    >>> round(compute_balance_distance(1.0, 2.0), 2)
+    0.83
+    """
+    # In terms of 1 / distance, the equation is the cubic k_rep (s - 1 / rho_0) s² = force.
+    roots = np.roots([k_rep, -k_rep / rho_0, 0.0, -force])
+    real_roots = roots[np.abs(roots.imag) < _MAX_IMAGINARY_PART].real
+    return float(1.0 / real_roots.max())
 
 
 def _tabulate_medians(outcomes: Outcomes) -> dict[str, dict[str, float]]:
@@ -256,8 +318,8 @@ def _show_failures(
         compared = ", ".join(f"{label} {gaps[name]}" for name, label in others.items())
         description = f"{gaps[key]} above the reference ({compared})"
         if key not in OURS:
-            stuck = outcomes.get_values(key, "stuck")[k]
-            description += f"; {stuck:.0f} of {len(record.team)} robots rest away from their goals"
+            blocked = outcomes.get_values(key, "blocked")[k] * len(record.team)
+            description += f"; a wall is between {blocked:.0f} of {len(record.team)} robots and their goals"
         picture = Markup(draw_run(record, None, *_PICTURE_SIZE_PX, has_numbers=True))
         failures.append(ShownFailure(instance, picture, f"{description}."))
     return failures
@@ -294,6 +356,8 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         load_profile=load_profile,
         units=UNITS,
         team=TEAM,
+        limited_ranges=LIMITED_RANGES,
+        families=FAMILIES,
         robots=ROBOTS,
         settled=(SETTLED_DISTANCE_M, SETTLED_WINDOW_S),
         resamples=RESAMPLES,

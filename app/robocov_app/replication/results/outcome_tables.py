@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+import shapely
 
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.metrics.results import Results, read_results
+from robocov.record import Record
 from robocov_app.replication.design.plan import ROBOTS
 from robocov_app.replication.design.studies import Contest
 from robocov_app.replication.results.outcomes import (
@@ -27,7 +29,7 @@ FIRST_MINUTE_S = 60.0
 COLUMNS = {
     "final": "mean_distance_m",
     "contacts": "contacts",
-    "stuck": "stuck_robots",
+    "clearance": "min_clearance_m",
     "settled": "settled_at_s",
     "time": "mean_time_s",
     "path": "path_length_m",
@@ -63,7 +65,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
     }
     values = {}
     for key in controller_keys:
-        for measure in (*COLUMNS, "early", "first_minute", "gap"):
+        for measure in (*COLUMNS, "early", "first_minute", "gap", "blocked"):
             values[key, measure] = np.full(len(instances), np.nan)
         values[key, "placement"] = np.full((len(instances), ROBOTS, 2), np.nan)
     for instance_index, row in _read_rows(folder, instances):
@@ -87,7 +89,9 @@ def _measure_run(row: Mapping[str, Any], results: Results, references: Reference
     measured: dict[str, Any] = {
         measure: row[column] for measure, column in COLUMNS.items() if row.get(column) is not None
     }
-    measured["placement"] = results.record(row["run"]).positions[-1]
+    record = results.record(row["run"])
+    measured["placement"] = record.positions[-1]
+    measured["blocked"] = compute_blocked_fraction(record)
     history = results.history(row["run"])
     measured["early"] = compute_mean_until(history, EARLY_S)
     measured["first_minute"] = compute_mean_until(history, FIRST_MINUTE_S)
@@ -95,6 +99,26 @@ def _measure_run(row: Mapping[str, Any], results: Results, references: Reference
     if reference is not None and "final" in measured:
         measured["gap"] = measured["final"] / reference.mean_distance - 1.0
     return measured
+
+
+def compute_blocked_fraction(record: Record) -> float:
+    """Compute the fraction of robots that have a wall between them and their goals at the end of a run.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    float
+        nan if no robot has a goal.
+    """
+    goals = record.goals[-1]
+    has_goal = ~np.isnan(goals).any(axis=1)
+    if not has_goal.any():
+        return float("nan")
+    lines = shapely.linestrings(np.stack([record.positions[-1], goals], axis=1)[has_goal])
+    return float(np.mean(~shapely.covers(record.environment.free, lines)))
 
 
 def read_gain_outcomes(folder: Path, study: Study, references: References) -> dict[str, GainOutcomes]:

@@ -27,20 +27,26 @@ class FigureRun:
     history: CostHistory
 
 
+FigureRuns: TypeAlias = dict[str, dict[str, FigureRun]]
+"""Runs of the figures by variant, then by "case/controller".
+
+The variant "" has the shared gains, "best" the best gains; "limited" and "half-step" have the shared gains at
+limited ranges and with half the control period.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class PaperResults:
     """Results of the paper's claims.
 
     Parameters
     ----------
-    figures : Mapping
-        Runs of the figures by "case/controller".
-    best_figures : Mapping
-        Runs of figures 4 to 8 with the best gains.
+    figures : dict
+        Runs of the figures.
     gains : Mapping
         Outcomes of the gain grids by controller.
-    convex, claims : Outcomes
-        Outcomes in convex regions, and on non-convex maps.
+    convex, claims, limited : Outcomes
+        Outcomes in convex regions, on non-convex maps, and on non-convex maps at limited ranges.
     contenders : tuple of Contender
     references : dict
         Reference placements by map.
@@ -50,11 +56,11 @@ class PaperResults:
         Number of all runs, and of those that failed.
     """
 
-    figures: Mapping[str, FigureRun]
-    best_figures: Mapping[str, FigureRun]
+    figures: FigureRuns
     gains: Mapping[str, GainOutcomes]
     convex: Outcomes
     claims: Outcomes
+    limited: Outcomes
     contenders: tuple[Contender, ...]
     references: References
     worst: ShownRuns
