@@ -499,6 +499,8 @@ obstacle:
 robot: [{state: *state}, {<<: [*world], state: [2, 2, 0]}]
 """
 
+COVERAGE_WORLD = "CircularBND\n30 40 5 2\nBND\n60 20 4 8 0.5 3\nUniform\n3 0.5\n10 10\n50 10\n10 50\n"
+
 SEEDS: dict[str, list[Case]] = {
     "map": _build_cases(
         "map.json", json.dumps(MAP, indent=2), json.dumps({**MAP, "obstacles": [], "starts": {}})
@@ -526,6 +528,10 @@ SEEDS: dict[str, list[Case]] = {
     "ros": [
         Case({"map.yaml": ROS.format("map.pgm").encode(), "map.pgm": build_pgm(GRAY)}),
         Case({"map.yaml": (ROS.format("map.png") + "mode: scale\n").encode(), "map.png": build_png(GRAY)}),
+    ],
+    "coverage-control": [
+        Case({"world.env": COVERAGE_WORLD.encode(), "world.pos": b"10 20\n30 40\n"}),
+        Case({"world.env": COVERAGE_WORLD.encode()}),
     ],
     "houseexpo": _build_cases(
         "plan.json",
@@ -604,6 +610,7 @@ TOKENS: dict[str, list[str]] = {
         *("&a", "*a", "!!python/object/apply:os.system", "[", "]", "{", "}", "../", "/dev/zero", "|", ">",
             ".inf", "~"),
     ],
+    "coverage-control": ["CircularBND", "BND", "Uniform", "\n", "0", "-1", "1e308", "nan", "inf", "3 0.5"],
     "houseexpo": [*_JSON, '"verts"', '"id"', '"bbox"', '"room_num"'],
     "rings": [*_JSON, '"vertices"', '"holes"', '"dimensions"', "[0, 0]"],
     "wkt": [

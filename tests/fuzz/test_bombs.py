@@ -9,7 +9,7 @@ from fuzz_reading import Reader
 from importers import list_targets
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")]
-NOTHING_TO_REPEAT = {"map", "check", "movingai", "houseexpo", "rings"}
+NOTHING_TO_REPEAT = {"map", "check", "movingai", "coverage-control", "houseexpo", "rings"}
 """What reads files in which everything is written out."""
 
 

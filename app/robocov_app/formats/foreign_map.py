@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from robocov.density import Density
 from robocov.environment import CircleObstacle, WallObstacle
 from robocov_app.formats.colors import Color
 
@@ -80,6 +81,8 @@ class ForeignMap:
         does not change the map.
     robots : tuple of (x, y), m
         Positions of the robots in the file.
+    density : Density or None
+        Density of the file, in the coordinates of the map.
     repaired, dropped, notes : tuple of str
         Lines of the import report.
     page : Polygon or None, m
@@ -103,6 +106,7 @@ class ForeignMap:
     cut_corners: bool = False
     primitives: tuple[Primitive, ...] = ()
     robots: tuple[tuple[float, float], ...] = ()
+    density: Density | None = None
     repaired: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -88,7 +88,7 @@ class ReadOptions(Options):
     """Options for reading a map, in addition to its file; the format has its own defaults."""
 
     cell: float | None = None
-    """Side of a cell, pixel or tile, m (default: 1 for MovingAI and Tiled)."""
+    """Side of a cell, pixel or tile, m (default: 1 for MovingAI, Tiled and CoverageControl)."""
     unknown: Literal["obstacle", "free", "cut"] | None = None
     """Treatment of unknown or transparent cells; with cut the map ends at the known cells."""
     threshold: float | None = None

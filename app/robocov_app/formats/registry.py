@@ -14,7 +14,7 @@ from robocov_app.formats.interface import Exporter, Importer
 from robocov_app.formats.options import ReadOptions, WriteOptions
 from robocov_app.formats.raster import movingai, picture, ros, tmx
 from robocov_app.formats.reports import ExportReport, ImportReport
-from robocov_app.formats.simulators import argos, irsim, stage
+from robocov_app.formats.simulators import argos, coverage_control, irsim, stage
 from robocov_app.formats.unsupported import describe_head, describe_unsupported_file
 from robocov_app.formats.vector import dxf, houseexpo, rings, svg, wkt
 
@@ -64,6 +64,14 @@ _IMPORTERS = (
         sniff=argos.sniff,
         reader=argos.read,
         options=frozenset({"only", "skip"}),
+    ),
+    Importer(
+        name="coverage-control",
+        title="CoverageControl: density (.env) and robots (.pos) of a world",
+        suffixes=(),  # a .env is usually something else, so it is detected by its content only
+        sniff=coverage_control.sniff,
+        reader=coverage_control.read,
+        options=frozenset({"cell"}),
     ),
     Importer(
         name="tmx",

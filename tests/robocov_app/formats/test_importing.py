@@ -18,7 +18,8 @@ def test_every_format_has_a_name_and_a_title() -> None:
         assert one.title
         assert all(suffix.startswith(".") and suffix.islower() for suffix in one.suffixes)
         # a YAML is of IR-SIM by its content only: what is missing in others, the reader of ROS says
-        assert one.suffixes or one.name == "irsim"
+        # a file .env is of CoverageControl by its content only
+        assert one.suffixes or one.name in ("irsim", "coverage-control")
         assert one.options <= known, name
         assert get_importer(name) is one
     assert {"ros", "movingai", "picture"} <= IMPORTERS.keys()

@@ -28,6 +28,8 @@ class Arguments(JsonOption):
                  --invert --unknown --min-stroke --free-color --solid-color --ignore-color
       stage, argos, irsim
                  worlds of these simulators, robots become a start: --only --skip --anywhere
+      coverage-control
+                 density (.env) and robots (.pos of the same name) of CoverageControl: --cell
       tmx        map of Tiled, --only LAYER selects the solid tiles: --cell --scale --skip --thickness
       houseexpo  JSON with "verts" in meters
       osm        buildings, water and barriers of OpenStreetMap, XML or JSON of Overpass: --water

@@ -233,6 +233,7 @@ def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversio
         boundary=normalize_ring(layout.boundary.exterior, conversion.digits),
         obstacles=(*build_polygon_obstacles(layout.solid, conversion), *layout.primitives),
         starts=build_starts(free, conversion),
+        density=foreign.density,
         description=foreign.description[:_MAX_DESCRIPTION_CHARACTERS],
     )
     # Written and read again, so that the rules of map files hold and every imported map can be saved.
