@@ -92,10 +92,11 @@ def print_setting(setting: Setting, duration: float) -> None:
 def main() -> None:
     """Simulate all settings, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--maps", nargs="+", default=["blocks-a/paper", "blocks-b/paper"], help="map/start")
+    parser.add_argument("--maps", nargs="+", default=["blocks-a/paper"], help="maps with their starts")
     parser.add_argument(
         "--gains", nargs="+", choices=tuple(GAINS), default=tuple(GAINS), help="sets of gains"
     )
+    parser.add_argument("--limits", nargs="+", choices=("on", "off"), default=("on", "off"))
     parser.add_argument("--duration", type=float, default=30.0, help="duration of a run, s")
     arguments = parser.parse_args()
     print(
@@ -105,8 +106,9 @@ def main() -> None:
     for name in arguments.maps:
         map_name, _, start = name.partition("/")
         for gains in arguments.gains:
-            for has_limits in (True, False):
-                print_setting(Setting(map_name, start, gains, has_limits), arguments.duration)
+            for limits in arguments.limits:
+                setting = Setting(map_name, start, gains, has_limits=limits == "on")
+                print_setting(setting, arguments.duration)
 
 
 if __name__ == "__main__":

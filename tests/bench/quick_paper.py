@@ -34,7 +34,7 @@ def test_the_quick_study_confirms_the_clear_claims(tmp_path):
     for claim in claims.values():
         low, high = claim["interval"]
         assert low <= claim["estimate"] <= high
-        assert claim["maps"] == 12 and claim["runs"] >= 24
+        assert claim["maps"] == 12 and claim["runs"] >= 12
     for number in range(1, 9):
         for suffix in ("png", "svg", "pdf"):
             assert (out / "figures" / f"figure-{number}.{suffix}").is_file()

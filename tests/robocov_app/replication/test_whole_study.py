@@ -561,7 +561,7 @@ class TestPages:
             f"{kind}-301" for kind in planned.UNSEEN
         }
         assert np.isfinite(beyond.unseen.get_values("atlas", "gap")).all()
-        heading = "On maps of other families than those of the claims"
+        heading = "On maps of other families"
         assert (
             f"<caption>{heading}" in more
             and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in more

@@ -1,6 +1,6 @@
 """All claims beyond the paper."""
 
-from robocov_app.replication.claims.claim import Claim
+from robocov_app.replication.claims.claim import Claim, adjust_claims
 from robocov_app.replication.claims.extensions import (
     judge_conditions,
     judge_density,
@@ -16,6 +16,8 @@ from robocov_app.replication.results.study_results import BeyondResults
 def judge_beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
     """Judge all claims beyond the paper: our goals, comparisons with rivals, and extensions.
 
+    The p-values of the claims of each of these three questions are adjusted for their number.
+
     Parameters
     ----------
     results : BeyondResults
@@ -25,17 +27,17 @@ def judge_beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
     tuple of Claim
     """
     own = OWN[0]
-    claims = judge_goals(results.outcomes, own, results.contenders, results.steps, results.plan)
+    goals = judge_goals(results.outcomes, own, results.contenders, results.steps, results.plan)
     if results.unseen is not None:
         unseen = judge_unseen(results.unseen, own, results.contenders)
         if unseen is not None:
-            claims.append(unseen)
-    claims += judge_rivals(results.outcomes, own, results.contenders)
-    claims += [
+            goals.append(unseen)
+    rivals = judge_rivals(results.outcomes, own, results.contenders)
+    extensions = [
         judge_targets(results.targets),
         judge_density(results.density.outcomes),
         judge_teams(results.teams, "rapf"),
         judge_teams(results.teams, "lloyd"),
         judge_conditions(results.degradations, len(results.plan.beyond.conditions_maps)),
     ]
-    return tuple(claims)
+    return (*adjust_claims(goals), *adjust_claims(rivals), *adjust_claims(extensions))

@@ -299,7 +299,7 @@ def summarize_goals(goals: Sequence[Claim]) -> str:
 
 
 def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Judge our own controller on maps of other kinds than those of the claims; None without runs.
+    """Judge our own controller on maps of other kinds than those of its goals; None without runs.
 
     Parameters
     ----------
@@ -325,5 +325,5 @@ def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Conten
         f"{len(medians)} generated maps, {len(finished.instances)} runs of {own.label}. "
         f"Highest median of a map: {format_amount(medians[worst], '%')}, on {worst}."
     )
-    claim = Claim("goal-unseen", GOALS, "The same holds on maps of other families than those of the claims.")
+    claim = Claim("goal-unseen", GOALS, "The same holds on maps of other families.")
     return claim.judge(criteria, explanation, finished, runs_per_instance=1)

@@ -149,10 +149,10 @@ class Plan:
         Control period, s.
     lattice : int
         Sites along a side of the lattice of the coverage cost.
-    bundled, generated, families, seeds : tuple
+    bundled, generated, families, starts, seeds : tuple
         Bundled maps, seeds of generated maps with polygons, seeds of generated maps of each of the kinds in
-        `FAMILIES`, and seeds of starts for the claims. For the reason of their number see `NEARLY_ALWAYS` in
-        `robocov_app.replication.claims.thresholds`.
+        `FAMILIES`, and kinds and seeds of starts for the claims. For the reason of the number of maps see
+        `NEARLY_ALWAYS` in `robocov_app.replication.claims.thresholds`.
     limited_starts, limited_seeds : tuple
         Kinds and seeds of starts for the claims at limited ranges, on the same maps.
     tuning, tuning_families, tuning_starts, tuning_seed : tuple, tuple, tuple and int
@@ -160,8 +160,8 @@ class Plan:
         claim uses, kinds of starts, and a seed of starts that no claim uses.
     k_rep, rho_0, k_att : tuple of float
         Values of the gains in the grids.
-    convex_generated, convex_seeds : tuple of int
-        Seeds of the convex regions next to the bundled ones, and seeds of the starts there.
+    convex_generated, convex_starts, convex_seeds : tuple
+        Seeds of the convex regions next to the bundled ones, and kinds and seeds of the starts there.
     restarts : int
         Restarts of the search for the reference placement.
     """
@@ -174,6 +174,7 @@ class Plan:
     bundled: tuple[str, ...] = NON_CONVEX
     generated: tuple[int, ...] = tuple(range(1, 61))
     families: tuple[int, ...] = tuple(range(401, 410))
+    starts: tuple[str, ...] = KINDS
     seeds: tuple[int, ...] = (0, 1, 2, 3)
     limited_starts: tuple[str, ...] = KINDS
     limited_seeds: tuple[int, ...] = (0,)
@@ -185,6 +186,7 @@ class Plan:
     rho_0: tuple[float, ...] = (1.0, 2.0, 3.0, 6.0)
     k_att: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0)
     convex_generated: tuple[int, ...] = tuple(range(98))
+    convex_starts: tuple[str, ...] = CONVEX_KINDS
     convex_seeds: tuple[int, ...] = (0, 1)
     restarts: int = 24
 
@@ -199,12 +201,14 @@ QUICK = Plan(
     bundled=("blocks-a", "blocks-b", "rooms"),
     generated=tuple(range(1, 7)),
     families=(401,),
+    starts=("corner", "uniform"),
     seeds=(0,),
-    limited_starts=("corner", "uniform"),
+    limited_starts=("corner",),
     k_rep=(0.3, 3.0),
     rho_0=(2.0, 6.0),
     k_att=(3.0, 30.0),
     convex_generated=tuple(range(10)),
+    convex_starts=("corner", "uniform"),
     convex_seeds=(0,),
     restarts=8,
     beyond=BeyondPlan(

@@ -23,8 +23,6 @@ from robocov_app.replication.design.contenders import (
     Contender,
 )
 from robocov_app.replication.design.plan import (
-    CONVEX_KINDS,
-    KINDS,
     LIMITED_RANGES,
     ROBOTS,
     TEAM,
@@ -241,12 +239,12 @@ def build_gains_study(plan: Plan) -> Study:
 def build_convex_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
     """Build the sweep of the paper's contenders in convex regions, where RPF does not run."""
     participants = [contender for contender in paper_contenders if contender.controller != "rpf"]
-    return build_contest(plan, build_convex_maps(plan), participants, CONVEX_KINDS, plan.convex_seeds)
+    return build_contest(plan, build_convex_maps(plan), participants, plan.convex_starts, plan.convex_seeds)
 
 
 def build_claims_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
     """Build the sweep of the paper's contenders on non-convex maps."""
-    return build_contest(plan, build_claim_maps(plan), paper_contenders, KINDS, plan.seeds)
+    return build_contest(plan, build_claim_maps(plan), paper_contenders, plan.starts, plan.seeds)
 
 
 def build_limited_contest(plan: Plan, paper_contenders: Sequence[Contender]) -> Contest:
