@@ -1,10 +1,10 @@
 """Connections through passages that the moves of a coarse lattice miss.
 
-The moves of a lattice are straight lines between nodes. In a large window the nodes are far apart, and no
-such line may lead through a narrow door. The lattice then falls apart into separate pieces, although the
+The moves of a lattice are straight lines between nodes. In a large window the nodes are far apart, and it may
+be that no such line leads through a narrow door. The lattice then consists of separate pieces, although the
 free cells are connected. *Portals* connect these pieces: they are the shortest paths from cell to cell
-between nodes of different pieces. They lead only through cells that have been seen to be free, because a
-wall that has been seen only in part seems to have narrow holes.
+between nodes of different pieces. They lead only through cells that are known to be free, because a wall that
+has been seen only in part seems to have narrow holes.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from robocov.planning.lattice import Edges
 
 _NEIGHBORS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)])
 """Rows and columns from a cell to its neighbors: first those that share a side, then those at the corners."""
-_SIDES = 4
+_SIDE_COUNT = 4
 """Number of neighbors that share a side."""
 _SIDE_COST = 5
 """Cost of a step to a neighbor that shares a side."""
 _CORNER_COST = 7
 """Cost of a step to a neighbor at a corner: 7 / 5 is close to √2, and not above it."""
 _NONE = -1
-"""Stands for a cell, or a node, where there is none."""
+"""Index that stands for no cell, or no node."""
 
 
 class Portals(NamedTuple):
@@ -39,22 +39,22 @@ class Portals(NamedTuple):
     first_nodes: IntArray
     """(p,) The node at the start of each path."""
     last_nodes: IntArray
-    """(p,) The node at its end."""
+    """(p,) The node at the end of each path."""
     lengths: Array
     """(p,) Length of each path, in sides of a cell."""
     paths: list[IntArray]
-    """The cells of each path between the two nodes, (k, 2): row and column in the window."""
+    """Rows and columns, in the window, of the cells on each path between its two nodes, (k, 2)."""
 
 
-class _Reach(NamedTuple):
-    """The shortest way to each cell from the nearest of several nodes."""
+class _ShortestPaths(NamedTuple):
+    """The shortest path to each cell from the nearest of several nodes."""
 
     nodes: IntArray
-    """(h, w) Index of the nearest node, `_NONE` for cells that no node reaches."""
+    """(h, w) Index of the nearest node; `_NONE` for cells to which no path leads."""
     costs: IntArray
-    """(h, w) Sum of the costs of the steps from there."""
+    """(h, w) Sum of the costs of the steps on the path."""
     previous_cells: IntArray
-    """(h, w) Flat index of the cell before, `_NONE` for the cells of the nodes themselves."""
+    """(h, w) Flat index of the cell before, on the path; `_NONE` for the cells of the nodes themselves."""
 
 
 def find_portals(is_passable: BoolArray, node_cells: IntArray, graph: csr_array) -> Portals:
@@ -63,7 +63,7 @@ def find_portals(is_passable: BoolArray, node_cells: IntArray, graph: csr_array)
     Parameters
     ----------
     is_passable : (h, w) bool array
-        Whether each cell is known to be free, and far enough from walls.
+        Whether each cell is known to be free, and not near a wall.
     node_cells : (m, 2) int array
         Row and column of the cell in which each node lies.
     graph : (m, m) csr_array
@@ -72,11 +72,11 @@ def find_portals(is_passable: BoolArray, node_cells: IntArray, graph: csr_array)
     Returns
     -------
     Portals
-        For each two nodes of different pieces whose nearest cells meet, the shortest path between them. There
-        are none if the lattice connects all nodes that the cells connect.
+        The shortest path between each two nodes of different pieces, if the cells to which these nodes are
+        the nearest ones touch. There are no portals if the lattice connects all nodes that the cells connect.
     """
     rows, columns = node_cells.T
-    # In both directions: a node without clearance can be reached, but no move leads on from it.
+    # Pieces are connected in both directions: no move leads on from a node without clearance.
     _, labels = connected_components(graph, directed=True, connection="strong")
     pieces = np.asarray(labels, dtype=np.intp)
     areas, _ = ndimage.label(is_passable)
@@ -86,27 +86,33 @@ def find_portals(is_passable: BoolArray, node_cells: IntArray, graph: csr_array)
     if len(pairs) == len(np.unique(node_areas)):
         # All nodes in the same connected area of cells belong to the same piece.
         return Portals(nodes[:0], nodes[:0], np.empty(0), [])
-    reach = _reach_cells(is_passable, node_cells, nodes)
-    first_cells, last_cells = _find_meeting_cells(reach, pieces)
-    costs = reach.costs.ravel()
+    shortest = _find_shortest_paths(is_passable, node_cells, nodes)
+    first_cells, last_cells = _find_meeting_cells(shortest, pieces)
+    costs = shortest.costs.ravel()
     return Portals(
-        first_nodes=reach.nodes.ravel()[first_cells],
-        last_nodes=reach.nodes.ravel()[last_cells],
+        first_nodes=shortest.nodes.ravel()[first_cells],
+        last_nodes=shortest.nodes.ravel()[last_cells],
         lengths=(costs[first_cells] + costs[last_cells] + _SIDE_COST) / _SIDE_COST,
         paths=[
-            _trace_path(reach, first, last)
+            _trace_path(shortest, first, last)
             for first, last in zip(first_cells.tolist(), last_cells.tolist(), strict=True)
         ],
     )
 
 
 @kernel
-def _reach_cells(is_passable: BoolArray, node_cells: IntArray, source_nodes: IntArray) -> _Reach:
-    """Find the nearest of the source nodes of each cell, by Dijkstra's algorithm from all of them at once."""
+def _find_shortest_paths(
+    is_passable: BoolArray, node_cells: IntArray, source_nodes: IntArray
+) -> _ShortestPaths:
+    """Find the shortest path to each cell from the nearest source node, by Dijkstra's algorithm.
+
+    The search starts from all source nodes at once. Costs are integers, so that equal ones are exactly equal.
+    """
     height, width = is_passable.shape
     nodes = np.full((height, width), _NONE)
     costs = np.full((height, width), np.iinfo(np.int64).max)
     previous_cells = np.full((height, width), _NONE)
+    # Numba infers the type of the elements from the first one.
     front = [(0, 0, 0)]
     front.clear()
     for node in source_nodes:
@@ -118,7 +124,7 @@ def _reach_cells(is_passable: BoolArray, node_cells: IntArray, source_nodes: Int
     while len(front) > 0:
         cost, row, column = heapq.heappop(front)
         if cost > costs[row, column]:
-            # A shorter way to this cell has been found since.
+            # A shorter path to this cell has been found in the meantime.
             continue
         for k in range(len(_NEIGHBORS)):
             next_row = row + _NEIGHBORS[k, 0]
@@ -128,7 +134,7 @@ def _reach_cells(is_passable: BoolArray, node_cells: IntArray, source_nodes: Int
             if not is_passable[next_row, next_column]:
                 continue
             step_cost = _SIDE_COST
-            if k >= _SIDES:
+            if k >= _SIDE_COUNT:
                 # A step across a corner must not cut the corner of a wall.
                 if not (is_passable[row, next_column] and is_passable[next_row, column]):
                     continue
@@ -138,42 +144,44 @@ def _reach_cells(is_passable: BoolArray, node_cells: IntArray, source_nodes: Int
                 costs[next_row, next_column] = cost + step_cost
                 previous_cells[next_row, next_column] = row * width + column
                 heapq.heappush(front, (cost + step_cost, next_row, next_column))
-    return _Reach(nodes, costs, previous_cells)
+    return _ShortestPaths(nodes, costs, previous_cells)
 
 
-def _find_meeting_cells(reach: _Reach, pieces: IntArray) -> tuple[IntArray, IntArray]:
-    """Find where the cells of two nodes of different pieces meet.
+def _find_meeting_cells(shortest: _ShortestPaths, pieces: IntArray) -> tuple[IntArray, IntArray]:
+    """Find the cells in which the paths from two nodes of different pieces meet.
 
     Returns
     -------
     first_cells, last_cells : (p,) int arrays
-        Flat indices of neighboring cells: for each two nodes, those on the shortest path between the nodes.
-        The first one belongs to the node with the lower index.
+        Flat indices of two cells that share a side: for each pair of nodes, those on the shortest path
+        between the nodes. The first cell belongs to the node with the lower index.
     """
-    height, width = reach.nodes.shape
-    cells = np.arange(height * width).reshape(height, width)
-    a = np.concatenate([cells[:, :-1].ravel(), cells[:-1].ravel()])
-    b = np.concatenate([cells[:, 1:].ravel(), cells[1:].ravel()])
-    nodes = reach.nodes.ravel()
-    is_reached = (nodes[a] != _NONE) & (nodes[b] != _NONE)
-    a = a[is_reached]
-    b = b[is_reached]
-    is_meeting = pieces[nodes[a]] != pieces[nodes[b]]
-    a = a[is_meeting]
-    b = b[is_meeting]
-    has_lower_node = nodes[a] < nodes[b]
-    first = np.where(has_lower_node, a, b)
-    last = np.where(has_lower_node, b, a)
-    costs = reach.costs.ravel()[first] + reach.costs.ravel()[last]
-    # The cheapest of each pair of nodes comes first. The cells themselves break ties.
+    height, width = shortest.nodes.shape
+    nodes = shortest.nodes.ravel()
+    # All pairs of cells that share a side, and both of which belong to a node.
+    flat_indices = np.arange(height * width).reshape(height, width)
+    cells = np.concatenate([flat_indices[:, :-1].ravel(), flat_indices[:-1].ravel()])
+    neighbors = np.concatenate([flat_indices[:, 1:].ravel(), flat_indices[1:].ravel()])
+    have_nodes = (nodes[cells] != _NONE) & (nodes[neighbors] != _NONE)
+    cells = cells[have_nodes]
+    neighbors = neighbors[have_nodes]
+    are_in_different_pieces = pieces[nodes[cells]] != pieces[nodes[neighbors]]
+    cells = cells[are_in_different_pieces]
+    neighbors = neighbors[are_in_different_pieces]
+    is_lower_first = nodes[cells] < nodes[neighbors]
+    first = np.where(is_lower_first, cells, neighbors)
+    last = np.where(is_lower_first, neighbors, cells)
+    costs = shortest.costs.ravel()[first] + shortest.costs.ravel()[last]
+    # Of the pairs of cells for the same two nodes, keep the one with the lowest cost. The indices of the
+    # cells break ties.
     order = np.lexsort((last, first, costs, nodes[last], nodes[first]))
     _, unique = np.unique(np.column_stack([nodes[first], nodes[last]])[order], axis=0, return_index=True)
     return first[order][unique], last[order][unique]
 
 
-def _trace_path(reach: _Reach, first_cell: int, last_cell: int) -> IntArray:
-    """Return the cells of the path between two nodes over the two given cells, (k, 2): rows and columns."""
-    previous_cells = reach.previous_cells.ravel()
+def _trace_path(shortest: _ShortestPaths, first_cell: int, last_cell: int) -> IntArray:
+    """Return the rows and columns, (k, 2), of the path between two nodes that meets in the given cells."""
+    previous_cells = shortest.previous_cells.ravel()
     ends = []
     for cell in (first_cell, last_cell):
         path = [cell]
@@ -181,7 +189,7 @@ def _trace_path(reach: _Reach, first_cell: int, last_cell: int) -> IntArray:
             path.append(int(previous_cells[path[-1]]))
         ends.append(path)
     to_first, to_last = ends
-    return np.column_stack(np.unravel_index([*reversed(to_first), *to_last], reach.nodes.shape))
+    return np.column_stack(np.unravel_index([*reversed(to_first), *to_last], shortest.nodes.shape))
 
 
 def add_portals(edges: Edges, portals: Portals, cell_size: float) -> Edges:
@@ -192,6 +200,7 @@ def add_portals(edges: Edges, portals: Portals, cell_size: float) -> Edges:
     edges : Edges
     portals : Portals
     cell_size : float, m
+        Side of a cell.
 
     Returns
     -------
