@@ -257,7 +257,7 @@ def build_session(options: Arguments) -> Session:
     first_name, *other_names = options.controllers
     choices = [ControllerChoice(first_name, parse_gains(options.gains))]
     choices += [ControllerChoice(name) for name in other_names]
-    conditions = options.conditions.build_conditions(options.seed, robots)
+    conditions = options.condition.build_conditions(options.seed, robots)
     scenario = SessionScenario(
         load_map(options.map or DEFAULT_MAP),
         tuple(choices),

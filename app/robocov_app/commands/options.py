@@ -296,7 +296,7 @@ class ScenarioOptions:
     """TOML or JSON file of a mixed team; options apply where a group sets no value."""
     lattice: int = DEFAULT_LATTICE
     """Compute the coverage cost on a lattice of N x N sites over the map."""
-    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
+    condition: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
 
 @dataclass(kw_only=True)
@@ -432,7 +432,7 @@ class RunOptions(ScenarioOptions, JsonOption):
             seed=self.seed,
             duration=self.duration,
             dt=self.dt,
-            conditions=self.conditions.build_conditions(self.seed, self.robots),
+            conditions=self.condition.build_conditions(self.seed, self.robots),
         )
         scenario.check()
         return scenario
