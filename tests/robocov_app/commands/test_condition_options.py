@@ -81,7 +81,7 @@ def test_a_robot_that_joins_outside_the_map_is_rejected(
 ) -> None:
     out = tmp_path / "out"
     said = read_complaint(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
-    assert said.startswith("--join: expected a place inside the boundary of map 'Rooms' (x from 0 to 12 m, ")
+    assert said.startswith("--join: expected a position inside the boundary of map 'Rooms' (x from 0 to 12 m")
     assert said.endswith("got [100, 100] for robot 6")
     assert not out.exists()
 
