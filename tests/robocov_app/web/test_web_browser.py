@@ -260,6 +260,34 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         wait_for_rest(browser)
 
 
+def test_shift_and_alt_work_in_the_browser_too(browser, tmp_path):
+    set_size(browser, 1280, 720)
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
+        wait_for_rest(browser)
+
+        def drag(modifiers, *points):
+            for number, (x, y) in enumerate(points):
+                kind = "mouseMoved" if number else "mousePressed"
+                event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "modifiers": modifiers}
+                browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event | {"clickCount": 1})
+                time.sleep(0.1)
+            event = {"type": "mouseReleased", "x": x, "y": y, "button": "left", "modifiers": modifiers}
+            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event | {"clickCount": 1})
+
+        def wait_for_message(text):
+            browser.wait_until(lambda: text in browser.find("#status").get_property("textContent"))
+
+        alt = 1
+        shift = 8
+        drag(alt, (699, 160), (690, 190), (680, 215))  # the round table
+        wait_for_message("copied")
+        drag(shift, (600, 90), (700, 200), (785, 248))  # the floor of its room
+        wait_for_message("2 obstacles selected")
+        assert browser.read_console() == []
+
+
 def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, tmp_path):
     touch = {"enabled": True, "maxTouchPoints": 2}
     browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
