@@ -197,8 +197,9 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
     spacing = max(high_x - low_x, high_y - low_y) / lattice
     boundary = shapely.union(configuration_space.boundary, region.polygon.boundary)
     walls = shapely.segmentize(boundary, spacing)
-    coordinates, line = shapely.get_coordinates(shapely.get_parts(walls), return_index=True)
-    is_segment = line[1:] == line[:-1]
+    coordinates, lines = shapely.get_coordinates(shapely.get_parts(walls), return_index=True)
+    # Two consecutive points are a segment if they belong to the same line.
+    is_segment = lines[1:] == lines[:-1]
     starts = coordinates[:-1][is_segment]
     ends = coordinates[1:][is_segment]
     inner = _build_inner_points(region, walls, spacing)

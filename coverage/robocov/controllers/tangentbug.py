@@ -519,7 +519,7 @@ class Navigator:
             return self._head_for(state, Mode.LEAVING, leaving_point, passes_waypoint=True)
         is_around = boundary.is_around()
         if is_around or not ends or boundary.length > boundary.max_length:
-            # After a full turn, the robot keeps going; otherwise it returns the way it came.
+            # After a full turn, the robot keeps its direction. Otherwise, it turns and goes back on its path.
             turn = state.turn if is_around else -state.turn
             return self._move_to_best_point(replace(state, mode=Mode.RETURN, turn=turn), best_point)
         return state

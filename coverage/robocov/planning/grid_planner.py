@@ -325,6 +325,7 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (k,) bool array
+            Whether each line is clear.
         """
         return find_clear_lines(position, ends, is_obstructing, self._frame, ignored_length)
 

@@ -385,6 +385,7 @@ def find_clear_lines(
     Returns
     -------
     (k,) bool array
+        Whether each line is clear.
     """
     # All lines are sampled at the same number of points, at most half a cell apart.
     lengths = np.empty(len(ends))
@@ -398,6 +399,7 @@ def find_clear_lines(
     is_clear = np.ones(len(ends), dtype=np.bool_)
     for k in range(len(ends)):
         for step in range(step_count + 1):
+            # As in `np.linspace`, the last point is exactly the end of the line.
             fraction = step * (1.0 / step_count) if step < step_count else 1.0
             x = position[0] + (ends[k, 0] - position[0]) * fraction
             y = position[1] + (ends[k, 1] - position[1]) * fraction

@@ -366,7 +366,8 @@ def _is_responsible(scan: NumberedScan, state: RobotExchange, robot: int, receiv
     """Return whether it is up to a robot to send a scan again to the sender of a digest.
 
     Only one robot should do so. Candidates are the robots that the sender hears and that have the scan, as
-    far as `robot` knows. The owner of the scan comes first, then the robots with the next higher indices.
+    far as `robot` knows. The owner of the scan comes first, then the robots with the next higher indices, and
+    then those from 0 on.
     """
     robot_count = len(received.digest.is_heard)
     for step in range(robot_count):
