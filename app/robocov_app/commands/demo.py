@@ -325,7 +325,8 @@ def _render(launcher: ViewerLauncher, options: Arguments) -> int:
             assert window.lesson.player is not None
             count = round(window.lesson.player.duration * HEADLESS_FPS)
         with show_progress("frames", count) as update:
-            frames = _draw_frames(window, count, interruption, update, is_whole_tour=options.frames is None)
+            stops_at_tour_end = options.frames is None
+            frames = _draw_frames(window, count, interruption, update, stops_at_tour_end=stops_at_tour_end)
             folder = None
             if result is not None:
                 folder = result.staging
@@ -342,17 +343,19 @@ def _draw_frames(
     interruption: Interruption,
     update: Callable[[int], None],
     *,
-    is_whole_tour: bool,
+    stops_at_tour_end: bool,
 ) -> Iterator[Frame]:
-    """Draw frames of the window, until there are `count`, the tour is over, or the user interrupts.
+    """Draw frames of the window until `count` are drawn, the tour is over, or the user interrupts.
 
-    `update` is called with the number of drawn frames.
+    The end of the tour only counts with `stops_at_tour_end`. `update` is called with the number of drawn
+    frames.
     """
     from robocov_app.viewer.launch import HEADLESS_FPS
     from robocov_app.viewer.window.screen_video import copy_pixels
 
     for number in range(1, count + 1):
-        is_tour_over = is_whole_tour and window.lesson.player is None
+        # The lesson has no player once its tour has ended.
+        is_tour_over = stops_at_tour_end and window.lesson.player is None
         if interruption.requested or is_tour_over:
             return
         window.run_frame(1.0 / HEADLESS_FPS)

@@ -148,7 +148,7 @@ def _build_problem(options: Arguments) -> _Problem:
 
 
 def _search(options: Arguments, problem: _Problem) -> Optimum:
-    """Search for the best positions, and show the progress if that takes long."""
+    """Search for the best positions, showing the progress if that takes long."""
     with show_late_progress("searching", quiet=options.json) as update:
         return find_optimum(
             problem.environment,
@@ -162,7 +162,7 @@ def _search(options: Arguments, problem: _Problem) -> Optimum:
 
 
 def _prove_bound(options: Arguments, problem: _Problem, best: Optimum) -> LowerBound:
-    """Compute a lower bound on the cost of all placements, and show the progress if that takes long."""
+    """Compute a lower bound on the cost of all placements, showing the progress if that takes long."""
     with show_late_progress("proving the bound", quiet=options.json) as update:
         return compute_lower_bound(
             problem.environment,

@@ -73,7 +73,7 @@ class Arguments(JsonOption):
 
     @property
     def includes_beyond(self) -> bool:
-        """Whether the part beyond the paper is included."""
+        """Whether the part "beyond" is included: the questions that the paper leaves open."""
         return not (self.figures_only or self.without_beyond)
 
 
@@ -160,6 +160,9 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
 
 def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:
     """Execute the selected parts of the study, and write their claims, figures and pages.
+
+    The parts are the paper's figures, the paper's claims, and "beyond", the questions that the paper leaves
+    open.
 
     Raises
     ------

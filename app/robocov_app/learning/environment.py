@@ -80,7 +80,7 @@ def draw_episode(
 def _build_scenario(
     task: CoverageTask, environment: Environment, random_values: _RandomValues, options: Mapping[str, Any]
 ) -> Scenario:
-    """Build the scenario of an episode, which starts at given positions or at a start of the map."""
+    """Build the scenario of an episode, which begins at given positions or at a start of the map."""
     conditions = task.conditions
     if conditions is not None:
         conditions_seed = options.get("conditions_seed", random_values.conditions_seed)
@@ -88,7 +88,7 @@ def _build_scenario(
     name = options.get("start", task.start)
     if name == "*":
         name = random_values.start
-    # This checks the name even if positions are given.
+    # Look the start up even if positions are given, so that an unknown name is an error.
     start = environment.start(name)
     if "positions" in options:
         return Scenario(

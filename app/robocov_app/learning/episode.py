@@ -122,7 +122,7 @@ class SharedSimulation:
         ----------
         actions : (count, n, 2) array, N or m/s
         episodes : Mapping
-            Episodes whose outcomes are computed, by index.
+            Episodes for which outcomes are computed, by index.
 
         Returns
         -------
@@ -138,10 +138,13 @@ class SharedSimulation:
             cost = episodes[due[0]].cost
             results = cost.evaluate_teams(self._simulation.positions[due])
             coverage_by_run = dict(zip(due, results, strict=True))
-        return {
-            run: episode.finish_action(contact_time[run], run in coverage_by_run, coverage_by_run.get(run))
-            for run, episode in episodes.items()
-        }
+        outcomes = {}
+        for run, episode in episodes.items():
+            coverage = coverage_by_run.get(run)
+            outcomes[run] = episode.finish_action(
+                contact_time[run], is_rewarded=coverage is not None, coverage=coverage
+            )
+        return outcomes
 
     def build_rows(self) -> Rows:
         """Return the current observation rows of all episodes, (count, n, size)."""
@@ -302,7 +305,7 @@ class Episode:
         contact_time = execute_actions(self.task, self.simulation, checked, snapshots)
         self.working = self.simulation.working[self._index]
         self._scans = self.simulation.observe().scans
-        return self.finish_action(contact_time, is_last or self.is_reward_due())
+        return self.finish_action(contact_time, is_rewarded=is_last or self.is_reward_due())
 
     def is_reward_due(self) -> bool:
         """Return whether the next action is rewarded."""
@@ -310,7 +313,7 @@ class Episode:
         return actions >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 
     def finish_action(
-        self, contact_time: Array, is_rewarded: bool, coverage: CoverageResult | None = None
+        self, contact_time: Array, *, is_rewarded: bool, coverage: CoverageResult | None = None
     ) -> ActionOutcome:
         """Record the positions after an action, and compute its rewards.
 

@@ -151,12 +151,12 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         Parameters
         ----------
         actions : Mapping
-            Actions by agent, (2,) N or m/s.
+            Action of each agent by its name, (2,) N or m/s.
 
         Returns
         -------
         observations, rewards, terminations, truncations, infos : dict
-            Results by agent, for each robot that worked before or works after the actions.
+            Results by agent, for each robot that was working before the actions or is working after them.
         """
         episode = self._get_episode()
         checked = self._check_actions(actions)

@@ -213,9 +213,9 @@ def test_hairs_are_removed_and_counted(tmp_path: Path) -> None:
     assert report.changed == ("removed 1 hair (slits, spurs) thinner than 0.2 mm, 3.5e-05 m²",)
     assert len(environment.boundary) == 4
     spur = MultiPolygon([box(0, 0, 5, 5) | box(4, 2, 9, 2.0001)])
-    assert remove_hairs(spur, 2e-4, 0.02).number == 1
+    assert remove_hairs(spur, 2e-4, 0.02).hair_count == 1
     real = MultiPolygon([box(0, 0, 5, 5) | box(4, 2, 9, 2.001)])
-    assert remove_hairs(real, 2e-4, 0.02).number == 0
+    assert remove_hairs(real, 2e-4, 0.02).hair_count == 0
 
 
 def test_the_deviation_is_measured_along_edges_too() -> None:

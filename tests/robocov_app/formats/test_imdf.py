@@ -204,7 +204,7 @@ def test_invalid_content_is_refused(tmp_path: Path) -> None:
         (
             "level",
             [build_feature("level", None)],
-            "features[0].properties.ordinal: expected the number of a floor, got null",
+            "features[0].properties.ordinal: expected a floor number, got null",
         ),
         ("unit", [build_unit("office", 0, 0, 0, 0)], "expected spaces with an area on this level, got none"),
         ("unit", [build_unit("column", 0, 0, 1, 1)], "expected spaces with an area on this level, got none"),

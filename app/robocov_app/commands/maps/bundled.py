@@ -33,7 +33,7 @@ def command(options: Arguments) -> None:
 
 
 def _build_row(name: str) -> dict[str, Any]:
-    """Build the JSON content about a map."""
+    """Build the JSON entry of a map."""
     environment = load_map(name)
     low_x, low_y, high_x, high_y = environment.region.bounds
     return {

@@ -114,8 +114,8 @@ class _MapTask(NamedTuple):
     """File name of the map, without the suffix."""
     build: Callable[[], Environment]
     """Builds the map."""
-    seed: int | None = None
-    """Seed of a map of a series, for messages; None for a single map."""
+    reported_seed: int | None = None
+    """Seed that error messages name, in a series of consecutive seeds; otherwise None."""
 
 
 def command(options: Arguments) -> None:
@@ -134,7 +134,7 @@ def command(options: Arguments) -> None:
             path = out
             if out is not None and options.writes_folder:
                 path = out / f"{task.name}.json"
-                _check_replaced_map(path)
+                _require_replaceable(path)
             environment = _build_map(task)
             environments.append(environment)
             if path is None:
@@ -156,8 +156,8 @@ def _build_map(task: _MapTask) -> Environment:
     except ParameterError as error:
         # The message begins with the name of the parameter, which is also that of the option.
         message = f"--{error}"
-        if task.seed is not None:
-            message += f" (seed {task.seed})"
+        if task.reported_seed is not None:
+            message += f" (seed {task.reported_seed})"
         raise ParameterError(message) from None
 
 
@@ -199,8 +199,12 @@ def _check_file(path: Path, *, overwrite: bool) -> None:
     check_output_file(path, "another --out", overwrite=overwrite)
 
 
-def _check_replaced_map(path: Path) -> None:
-    """Raise an InputError if a file exists and is not a map of robocov, because only maps are replaced."""
+def _require_replaceable(path: Path) -> None:
+    """Raise an InputError if a file exists that is not a map of robocov.
+
+    Only for files in a folder: their names are not given by the user, so ``--overwrite`` may only replace
+    earlier maps.
+    """
     if not resolve_target(path).exists():
         return
     try:
@@ -211,7 +215,7 @@ def _check_replaced_map(path: Path) -> None:
 
 
 def _list_tasks(options: Arguments) -> list[_MapTask]:
-    """List the maps to build: those of consecutive seeds, or those of a study of the paper."""
+    """List the maps to build: one per consecutive seed, or those of a study of the paper."""
     if options.study is not None:
         return _list_study_tasks(is_quick=options.study == "quick")
     from robocov.generator import generate_map
@@ -224,7 +228,8 @@ def _list_tasks(options: Arguments) -> list[_MapTask]:
         _MapTask(
             name=f"{options.kind}-{seed:0{digits}}",
             build=partial(generate_map, seed, **parameters),
-            seed=None if options.count is None else seed,
+            # With one map, the user knows the seed.
+            reported_seed=None if options.count is None else seed,
         )
         for seed in seeds
     ]

@@ -23,7 +23,7 @@ MAX_YAML_DEPTH = 12
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Parse a YAML text that contains a mapping.
+    """Parse a YAML text whose top level is a mapping.
 
     Anchors, aliases and the merge key ``<<`` work as in YAML 1.1.
 
@@ -38,7 +38,7 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
     ------
     MapError
         If the text is not YAML, not a mapping, too large or too deep, or has tags, duplicate keys, or more
-        than `MAX_YAML_VALUES` values once its aliases are followed.
+        than `MAX_YAML_VALUES` values once its aliases are expanded.
     """
     if len(text) > MAX_YAML_BYTES:
         raise MapError(f"{where}: expected at most {MAX_YAML_BYTES // 1024} kB of YAML, got more")

@@ -59,7 +59,7 @@ def sniff(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Read the features of a file or of a sequence.
+    """Read the features of a GeoJSON file, or of a sequence of GeoJSON texts.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         If the file is not GeoJSON, or its coordinates cannot be converted to meters.
     """
     content = files.read_content(path, files.MAX_TEXT_BYTES)
-    sequence = _convert_to_list(content, path.suffix.lower())
+    sequence = _convert_sequence_to_list(content, path.suffix.lower())
     if sequence is not None:
         content = sequence
     file = JsonFile(path, content)
@@ -109,7 +109,7 @@ def _parse_origin(file: JsonFile, document: dict[str, Any]) -> tuple[float, floa
     raise file.build_error(("origin",), origin, "longitude and latitude in degrees")
 
 
-def _convert_to_list(content: bytes, suffix: str) -> bytes | None:
+def _convert_sequence_to_list(content: bytes, suffix: str) -> bytes | None:
     """Convert a sequence of GeoJSON texts to one JSON list; return None if the content is not a sequence.
 
     Each text stays on its line, so that error messages name the right one.

@@ -220,7 +220,7 @@ def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
 
 
 def _parse_levels(archive: _Archive) -> dict[str, _Level]:
-    """Return the levels of a venue, keyed by their identifiers."""
+    """Return the levels of a venue, keyed by identifier."""
     levels = {}
     file = archive.files["level"]
     for k, feature in enumerate(archive.list_features("level")):
@@ -231,7 +231,7 @@ def _parse_levels(archive: _Archive) -> dict[str, _Level]:
             raise file.build_error(("features", k, "id"), identifier, "a string")
         if not is_number(ordinal):
             place = ("features", k, "properties", "ordinal")
-            raise file.build_error(place, ordinal, "the number of a floor")
+            raise file.build_error(place, ordinal, "a floor number")
         short_names = _list_names(properties.get("short_name"))
         names = (identifier, *short_names, *_list_names(properties.get("name")))
         levels[identifier] = _Level(float(ordinal), names)

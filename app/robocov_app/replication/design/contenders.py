@@ -202,13 +202,13 @@ def collect_gain_sets(contenders: Sequence[Contender]) -> dict[str, list[dict[st
     return gain_sets
 
 
-def format_potential(gains: Mapping[str, Value], no_limit: str = "") -> str:
-    """Return the numeric gains of a potential as text.
+def format_potential(gains: Mapping[str, Value], unlimited_text: str = "") -> str:
+    """Format the numeric gains of a potential.
 
     Parameters
     ----------
     gains : Mapping
-    no_limit : str
+    unlimited_text : str
         Text for an unlimited attraction. If it is empty, gains without a value are left out.
 
     Examples
@@ -218,12 +218,13 @@ def format_potential(gains: Mapping[str, Value], no_limit: str = "") -> str:
     """
     texts = []
     for name, value in gains.items():
+        # Texts and the height of the sensor select cells and targets; they are not part of the potential.
         if isinstance(value, str) or name == "height":
             continue
-        if value is None and not no_limit:
+        if value is None and not unlimited_text:
             continue
         if value is None and name == "attraction_limit":
-            texts.append(no_limit)
+            texts.append(unlimited_text)
         else:
             texts.append(f"{name} {format_value(value)}")
     return f"({', '.join(texts)})"

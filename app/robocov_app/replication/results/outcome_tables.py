@@ -43,7 +43,7 @@ _ControllerKey: TypeAlias = tuple[Any, ...]
 
 
 def read_outcomes(folder: Path, contest: Contest, references: References) -> Outcomes:
-    """Read the outcomes of the contenders of a sweep.
+    """Read the outcomes of each contender of a sweep.
 
     Parameters
     ----------
@@ -78,9 +78,11 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         for key in matching_keys:
             for measure, value in measured.items():
                 values[key, measure][instance_index] = value
+    # Side of the square whose area is the share of one robot, a length by which distances are divided.
     share_sides = {}
     for study_map in contest.study.maps:
-        share_sides[study_map.name] = float(np.sqrt(study_map.environment.free_area / ROBOTS))
+        area_per_robot = study_map.environment.free_area / ROBOTS
+        share_sides[study_map.name] = float(np.sqrt(area_per_robot))
     return Outcomes(instances, values, share_sides)
 
 

@@ -125,7 +125,7 @@ def build_grid_map(
     )
 
 
-def _find_free_cells(cells: Cells, unknown: Meaning, unknown_name: str, where: str) -> BoolArray:
+def _find_free_cells(cells: Cells, unknown_meaning: Meaning, unknown_name: str, where: str) -> BoolArray:
     """Return the mask of the free cells.
 
     Raises
@@ -135,7 +135,7 @@ def _find_free_cells(cells: Cells, unknown: Meaning, unknown_name: str, where: s
     """
     is_unknown = cells == UNKNOWN
     free: BoolArray = cells == FREE
-    if unknown == "free":
+    if unknown_meaning == "free":
         free |= is_unknown
     if free.any():
         return free
@@ -153,7 +153,7 @@ def _require_coordinates(cells: Cells, frame: GridFrame, where: str) -> None:
         require_coordinate(value, f"{where}: a corner of the grid")
 
 
-def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: str) -> str:
+def _describe_cells(cells: Cells, cell: float, unknown_meaning: Meaning, unknown_name: str) -> str:
     """Return the line of the import report about the numbers of free, blocked and unknown cells."""
     rows, columns = cells.shape
     free = _format_share(int(np.count_nonzero(cells == FREE)), cells.size)
@@ -162,8 +162,9 @@ def _describe_cells(cells: Cells, cell: float, unknown: Meaning, unknown_name: s
     unknown_count = int(np.count_nonzero(cells == UNKNOWN))
     if not unknown_count:
         return line
-    meaning = {"obstacle": "treated as obstacles", "free": "treated as free", "cut": "cut away"}[unknown]
-    return f"{line}, {_format_share(unknown_count, cells.size)} {unknown_name}, {meaning}"
+    treatments = {"obstacle": "treated as obstacles", "free": "treated as free", "cut": "cut away"}
+    treatment = treatments[unknown_meaning]
+    return f"{line}, {_format_share(unknown_count, cells.size)} {unknown_name}, {treatment}"
 
 
 def _format_share(number: int, total: int) -> str:

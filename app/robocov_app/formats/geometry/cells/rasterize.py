@@ -111,22 +111,24 @@ class CellGrid:
         of the walls.
         """
         cells = np.zeros((self.rows, self.columns), dtype=bool)
-        for oriented, is_transposed in ((cells, False), (cells.T, True)):
+        for view, is_transposed in ((cells, False), (cells.T, True)):
             line, position = self._find_crossings(geometry, transposed=is_transposed)
             order = np.lexsort((position, line))
             line = line[order]
             position = position[order]
             # Along each line, entries into the polygons and exits from them alternate. A wall is between an
             # exit and the following entry.
-            number_on_line = np.arange(len(line)) - np.searchsorted(line, line)
+            first_on_line = np.searchsorted(line, line)
+            number_on_line = np.arange(len(line)) - first_on_line
             exits = np.flatnonzero(number_on_line % 2)
             if len(exits) and exits[-1] == len(line) - 1:
                 exits = exits[:-1]
-            # A wall around a single center is that cell, regardless of how positions were rounded.
+            # A wall around a single center marks the cell of that center, which is outside the polygons
+            # anyway. So a wall that ends at a center gives the same cells however its ends were rounded.
             is_narrow = np.ceil(position[exits + 1]) - np.ceil(position[exits]) <= 1
             exits = exits[(line[exits] == line[exits + 1]) & is_narrow]
             middle = np.rint((position[exits] + position[exits + 1]) / 2).astype(np.intp)
-            oriented[line[exits], middle] = True
+            view[line[exits], middle] = True
         return cells
 
     def _find_crossings(

@@ -29,15 +29,15 @@ class Cleaned(NamedTuple):
     Attributes
     ----------
     free : MultiPolygon, m
-    number : int
+    hair_count : int
         Number of hairs that were removed.
-    area : float, m²
+    hair_area : float, m²
         Total area of these hairs.
     """
 
     free: MultiPolygon
-    number: int = 0
-    area: float = 0.0
+    hair_count: int = 0
+    hair_area: float = 0.0
 
 
 def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:

@@ -115,9 +115,9 @@ def _build_report(
         tolerance=simplified.tolerance,
         moved_area=layout.deviation.area,
         moved=layout.deviation.distance,
-        removed=cleaned.number,
-        removed_area=cleaned.area,
-        others=selection.others,
+        removed=cleaned.hair_count,
+        removed_area=cleaned.hair_area,
+        others=selection.offered_positions,
         repaired=tuple(conversion.repaired),
         dropped=tuple(conversion.dropped),
         changed=tuple(conversion.changed),
@@ -131,10 +131,10 @@ def _remove_hairs(free: MultiPolygon, conversion: Conversion) -> Cleaned:
         return Cleaned(free)
     width = 2 * conversion.grid
     cleaned = remove_hairs(free, width, max(conversion.tolerance, width))
-    if cleaned.number:
-        count = f"{format_count(cleaned.number, 'hair')} (slits, spurs)"
+    if cleaned.hair_count:
+        count = f"{format_count(cleaned.hair_count, 'hair')} (slits, spurs)"
         thinner = f"thinner than {2000 * conversion.grid:g} mm"
-        conversion.changed.append(f"removed {count} {thinner}, {format_area(cleaned.area, 2)}")
+        conversion.changed.append(f"removed {count} {thinner}, {format_area(cleaned.hair_area, 2)}")
     return cleaned
 
 

@@ -40,14 +40,14 @@ class PartSelection(NamedTuple):
     Attributes
     ----------
     parts : list of Polygon, m
-    others : tuple of (x, y), m
+    offered_positions : tuple of (x, y), m
         A position in each large part that was dropped, for the option ``inside``.
     is_enclosed : bool
         Whether an enclosed part stays because the largest part is the paper around a plan.
     """
 
     parts: list[Polygon]
-    others: tuple[tuple[float, float], ...] = ()
+    offered_positions: tuple[tuple[float, float], ...] = ()
     is_enclosed: bool = False
 
 
@@ -88,12 +88,12 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
         largest = f"no part of the free space is larger than {area[0]:.3g} m²"
         min_size = f"{conversion.min_obstacle_area:g} m²"
         raise MapError(f"{conversion.where}: {largest}, expected one of at least {min_size}")
-    others = _report_dropped_parts(parts, stays, conversion)
+    offered_positions = _report_dropped_parts(parts, stays, conversion)
     if len(kept) > 1:
         conversion.notes.append(
             f"the free space consists of {len(kept)} separate parts: robots cannot pass between them"
         )
-    return PartSelection(kept, others, is_enclosed)
+    return PartSelection(kept, offered_positions, is_enclosed)
 
 
 def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
@@ -164,33 +164,40 @@ def _find_main_part(parts: NDArray[np.object_], conversion: Conversion) -> int:
 
 
 def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> int | None:
-    """Return the index of the largest enclosed part, or None if the largest part is not paper around a plan.
+    """Return the index of the plan if the largest part is the paper around it; None in all other cases.
 
-    An enclosed part does not touch the edge of the page. A note reports the decision; another one warns if
-    the walls of a plan seem to be open.
+    The plan is the largest enclosed part, that is, the largest that does not touch the edge of the page. If
+    there is one, a note reports the decision. If there is none, but the walls of a plan seem to have an
+    opening, a note suggests that.
+
+    Parameters
+    ----------
+    parts : array of Polygon, m
+        The largest first.
+    conversion : Conversion
     """
     page = conversion.foreign.page
     if page is None or conversion.foreign.robots:
         return None
+    largest = parts[0]
     edge_lengths = [_measure_length_along(part, page) for part in parts]
     edge_share = edge_lengths[0] / page.length
     if edge_share < _MIN_PAGE_EDGE_SHARE:
         return None
-    largest = parts[0]
     edge = f"{100 * edge_share:.0f} % of the edge of the picture"
-    paper = f"{format_area(largest.area, 3)}, runs along {edge}"
+    description = f"{format_area(largest.area, 3)}, runs along {edge}"
     enclosed = [k for k, length in enumerate(edge_lengths) if length == 0.0]
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
         x, y = _choose_position_in(largest)
         conversion.notes.append(
-            f"the largest part of the free space, {paper}: treated as the paper around a plan; the "
+            f"the largest part of the free space, {description}: treated as the paper around a plan; the "
             f"largest enclosed part is kept (--inside {x:.10g} {y:.10g}: the part along the edge)"
         )
         return enclosed[0]
     if _has_hollow_obstacle(largest, _HOLLOW_SHARE * page.area):
         conversion.notes.append(
-            f"the largest part of the free space, {paper}: if that is the paper around a plan, an outer "
-            "door may be open"
+            f"the largest part of the free space, {description}: if that is the paper around a plan, "
+            "an outer door may be open"
         )
     return None
 

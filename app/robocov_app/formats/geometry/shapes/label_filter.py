@@ -28,18 +28,18 @@ class LabelFilter:
         self._options = options
         self._known: dict[str, str] = {}
 
-    def register(self, labels: Iterable[str]) -> set[str]:
+    def register_and_fold(self, labels: Iterable[str]) -> set[str]:
         """Remember that labels occur in the file, and return them in lower case, as they are compared."""
-        folded = {label.casefold(): label for label in labels}
-        self._known |= folded
-        return set(folded)
+        label_by_folded = {label.casefold(): label for label in labels}
+        self._known |= label_by_folded
+        return set(label_by_folded)
 
     def accepts(self, labels: Iterable[str]) -> bool:
         """Remember that labels occur in the file, and return whether to read a shape with these labels."""
-        folded = self.register(labels)
-        if self.only is not None and not self.only & folded:
+        folded_labels = self.register_and_fold(labels)
+        if self.only is not None and not self.only & folded_labels:
             return False
-        return not self.skip & folded
+        return not self.skip & folded_labels
 
     def require_known_names(self) -> None:
         """Raise ParameterError if an option contains a name that does not occur in the file."""

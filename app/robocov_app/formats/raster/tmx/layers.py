@@ -53,14 +53,14 @@ def _iterate_layers(group: Layer, shapes: Shapes) -> Iterator[Layer]:
             continue
         names = [element.attributes.get(key, "") for key in ("name", "class")]
         labels = (*filter(None, names), *group.labels)
-        folded = selection.register(labels)
+        folded_labels = selection.register_and_fold(labels)
         offset = group.offset + parse_vector(element, "offsetx", "offsety")
         if selection.only is None:
             is_solid = group.is_solid or is_declared_solid(element, labels)
         else:
-            is_solid = group.is_solid or bool(selection.only & folded)
+            is_solid = group.is_solid or bool(selection.only & folded_labels)
         layer = Layer(element, labels, offset, is_solid)
-        if selection.skip & folded:
+        if selection.skip & folded_labels:
             shapes.count_omission("layer", "by their names (--only, --skip)")
         elif element.tag == "group":
             yield from _iterate_layers(layer, shapes)

@@ -171,15 +171,15 @@ class ObstacleReader:
         for element in layer.element.children:
             names = [element.attributes.get(key, "") for key in ("name", "class", "type")]
             labels = (*filter(None, names), *layer.labels)
-            folded = self._shapes.labels.register(labels)
-            if element.tag != "object" or self._shapes.labels.skip & folded:
+            folded_labels = self._shapes.labels.register_and_fold(labels)
+            if element.tag != "object" or self._shapes.labels.skip & folded_labels:
                 continue
             shape = parse_object(element)
             shape = shape._replace(points=shape.points + layer.offset)
             if shape.kind and any(is_robot_name(name) for name in names):
                 x, y = self._frame.to_meters(shape.points.mean(axis=0)).tolist()
                 self._shapes.robots.append((x, y))
-            elif self._is_solid(element, labels, folded, are_all_solid or layer.is_solid):
+            elif self._is_solid(element, labels, folded_labels, are_all_solid or layer.is_solid):
                 self._add_shape(element, shape, labels)
             else:
                 reason = "that is not solid by name or property (--only NAME selects it)"
