@@ -138,7 +138,7 @@ def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
 
 @plain_style()
 def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
-    """Draw the results over two gains as a heat map with numbers, the lowest in bold.
+    """Draw results over two gains as a heat map with their values, the lowest one in bold.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
     """
     low = float(np.nanmin(grid.values))
     high = float(np.nanmax(grid.values))
-    colors = theme.quiet_heat
+    colors = theme.muted_heat
     decimals = _choose_decimals(low, high)
     for row, column in np.argwhere(np.isfinite(grid.values)).tolist():
         value = grid.values[row, column]

@@ -12,7 +12,7 @@ from robocov_app.look.colors import Color, compute_luminance, mix, parse_hex_col
 
 HEAT_LEVELS = 12
 """Number of colors in a grid of numbers."""
-_QUIET_FRACTION = 0.55
+_MUTED_FRACTION = 0.55
 """Fraction of the heat scale that grids of numbers use; on the rest, their text would be illegible."""
 _MIN_HUE_LUMINANCE = 0.16
 """Luminance below which a hue can hardly be told from the background of the dark theme."""
@@ -127,10 +127,10 @@ class Theme:
         return mix(self.ink, self.background, 0.1)
 
     @property
-    def quiet_heat(self) -> list[Color]:
+    def muted_heat(self) -> list[Color]:
         """Colors of a grid of numbers from low to high; text in `ink` is legible on all of them."""
         # Evenly spaced rows of the first part of a table with 200 colors.
-        rows = [round(_QUIET_FRACTION * 199 * level / (HEAT_LEVELS - 1)) for level in range(HEAT_LEVELS)]
+        rows = [round(_MUTED_FRACTION * 199 * level / (HEAT_LEVELS - 1)) for level in range(HEAT_LEVELS)]
         return [(int(red), int(green), int(blue)) for red, green, blue in self.build_heat_table(200)[rows]]
 
     def get_cell_color(self, hue: int) -> Color:

@@ -308,8 +308,8 @@ class Canvas:
         is_near = ((centers > -_OUTSIDE_PX) & (centers < limit)).all(axis=1)
         rows = np.flatnonzero(is_near)
         # Whole coordinates are the middles of pixels, as in the lines of pygame.
-        quarters = np.rint((centers[rows] + 0.5) * sprites.FINENESS).astype(int)
-        pixels, shifts = np.divmod(quarters, sprites.FINENESS)
+        quarters = np.rint((centers[rows] + 0.5) * sprites.SUPERSAMPLING).astype(int)
+        pixels, shifts = np.divmod(quarters, sprites.SUPERSAMPLING)
         chosen = np.zeros(len(rows), dtype=int)
         if indices is not None:
             chosen = indices[rows]

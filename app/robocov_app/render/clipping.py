@@ -32,7 +32,7 @@ def is_within_limit(points: Array) -> bool:
 
 
 def clip_polygon(corners: Array) -> list[Array]:
-    """Clip a polygon to coordinates of at most `MAX_DRAWN_PX`.
+    """Clip a polygon to coordinates whose magnitude is at most `MAX_DRAWN_PX`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def clip_polygon(corners: Array) -> list[Array]:
 
 
 def clip_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
-    """Clip a segment to coordinates of at most `MAX_DRAWN_PX`.
+    """Clip a segment to coordinates whose magnitude is at most `MAX_DRAWN_PX`.
 
     Parameters
     ----------

@@ -16,12 +16,12 @@ from robocov_app.look.colors import Color, choose_text_color
 from robocov_app.render.fonts import render_text
 from robocov_app.render.surface_cache import cache_surfaces
 
-FINENESS = 4
-"""Factor by which sprites are drawn larger before they are shrunk; also the shifts within a pixel."""
-SKETCH_FINENESS = 3
+SUPERSAMPLING = 4
+"""Factor by which sprites are drawn larger and then shrunk; also the number of shifts in a pixel."""
+SKETCH_SUPERSAMPLING = 3
 """Factor for sketches, which may be as large as the whole picture."""
 MAX_FINE_RADIUS_PX = 60.0
-"""Larger sprites take megabytes, so they have half the fineness, and no shift, which would be invisible."""
+"""Larger sprites take megabytes: they have half the supersampling, and no shift, which would be invisible."""
 NOSE_LENGTH = 1.65
 """Distance of the tip of a nose from the center of its disc, in radii."""
 N_NOSE_DIRECTIONS = 96
@@ -55,7 +55,7 @@ def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> p
     margin : float, px
         Space around the points.
     surface : pygame.Surface
-        Only its clip is visible.
+        Only the area in its clip rectangle is visible.
 
     Returns
     -------
@@ -82,7 +82,7 @@ class Sketch:
     ----------
     box : pygame.Rect, px
         The rectangle of the surface.
-    fineness : int
+    supersampling : int
         Factor by which the drawing is larger.
 
     Attributes
@@ -92,10 +92,12 @@ class Sketch:
         The enlarged drawing.
     """
 
-    def __init__(self, box: pygame.Rect, fineness: int = SKETCH_FINENESS) -> None:
+    def __init__(self, box: pygame.Rect, supersampling: int = SKETCH_SUPERSAMPLING) -> None:
         self.box = box
-        self.large = pygame.Surface((box.width * fineness, box.height * fineness), pygame.SRCALPHA, 32)
-        self._fineness = fineness
+        self.large = pygame.Surface(
+            (box.width * supersampling, box.height * supersampling), pygame.SRCALPHA, 32
+        )
+        self._supersampling = supersampling
 
     @classmethod
     def from_points(cls, points: Sequence[Pixel], margin: float) -> "Sketch | None":
@@ -121,12 +123,12 @@ class Sketch:
         # Whole coordinates are the middles of pixels, so the first pixel starts half a pixel earlier.
         left = self.box.x - 0.5
         top = self.box.y - 0.5
-        fineness = self._fineness
-        return [((point[0] - left) * fineness, (point[1] - top) * fineness) for point in points]
+        supersampling = self._supersampling
+        return [((point[0] - left) * supersampling, (point[1] - top) * supersampling) for point in points]
 
     def draw_path(self, points: Sequence[Pixel], color: Color, width: float) -> None:
         """Draw a line through points, with a width in px and round joints and ends."""
-        large_width = max(width * self._fineness, 1.0)
+        large_width = max(width * self._supersampling, 1.0)
         large_points = self.to_large(points)
         pygame.draw.lines(self.large, color, False, large_points, round(large_width))
         for point in large_points:
@@ -139,7 +141,7 @@ class Sketch:
     def draw_dot(self, center: Pixel, radius: float, color: Color) -> None:
         """Draw a dot of a radius, px."""
         large_center = self.to_large([center])[0]
-        pygame.draw.circle(self.large, color, large_center, radius * self._fineness)
+        pygame.draw.circle(self.large, color, large_center, radius * self._supersampling)
 
     def draw_on(self, surface: pygame.Surface) -> None:
         """Shrink the drawing, and blit it on a surface at its box."""
@@ -147,20 +149,22 @@ class Sketch:
         surface.blit(picture, self.box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _create_large(radius: float, shift: Shift, fineness: int) -> tuple[pygame.Surface, tuple[int, int]]:
+def _create_enlarged_surface(
+    radius: float, shift: Shift, supersampling: int
+) -> tuple[pygame.Surface, tuple[int, int]]:
     """Create an enlarged transparent square for a sprite with a radius, px; return it with its center."""
-    half = (int(radius) + 2) * fineness
+    half = (int(radius) + 2) * supersampling
     surface = pygame.Surface((2 * half, 2 * half), pygame.SRCALPHA, 32)
     return surface, (half + shift[0], half + shift[1])
 
 
-def _shrink(large: pygame.Surface, fineness: int) -> pygame.Surface:
+def _shrink(large: pygame.Surface, supersampling: int) -> pygame.Surface:
     width, height = large.get_size()
-    return pygame.transform.smoothscale(large, (width // fineness, height // fineness))
+    return pygame.transform.smoothscale(large, (width // supersampling, height // supersampling))
 
 
-def _choose_fineness(radius: float) -> int:
-    return FINENESS if radius <= MAX_FINE_RADIUS_PX else FINENESS // 2
+def _choose_supersampling(radius: float) -> int:
+    return SUPERSAMPLING if radius <= MAX_FINE_RADIUS_PX else SUPERSAMPLING // 2
 
 
 def _choose_shift(radius: float, shift: Shift) -> Shift:
@@ -239,18 +243,18 @@ def _render_disc(
 
     Circles are drawn from the largest to the smallest: edge, ring, fill.
     """
-    fineness = _choose_fineness(radius)
-    large, center = _create_large(radius + 1, shift, fineness)
-    pygame.draw.circle(large, edge, center, (radius + _EDGE_PX) * fineness)
-    pygame.draw.circle(large, ring, center, radius * fineness)
-    pygame.draw.circle(large, fill, center, (radius - ring_width) * fineness)
+    supersampling = _choose_supersampling(radius)
+    large, center = _create_enlarged_surface(radius + 1, shift, supersampling)
+    pygame.draw.circle(large, edge, center, (radius + _EDGE_PX) * supersampling)
+    pygame.draw.circle(large, ring, center, radius * supersampling)
+    pygame.draw.circle(large, fill, center, (radius - ring_width) * supersampling)
     if text:
         size = choose_number_size(radius - ring_width, min(len(text), len(_DIGIT_SIZES)))
-        number = render_text(text, round(size * fineness), choose_text_color(fill), True)
+        number = render_text(text, round(size * supersampling), choose_text_color(fill), True)
         # Center the visible part of the digits; the font leaves space for ascenders and descenders.
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
-    return _shrink(large, fineness)
+    return _shrink(large, supersampling)
 
 
 @cache_surfaces(12_000_000)
@@ -270,8 +274,8 @@ def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: 
     -------
     pygame.Surface
     """
-    fineness = _choose_fineness(radius)
-    large, center = _create_large(NOSE_LENGTH * radius + 1, shift, fineness)
+    supersampling = _choose_supersampling(radius)
+    large, center = _create_enlarged_surface(NOSE_LENGTH * radius + 1, shift, supersampling)
     heading = 2 * math.pi * direction / N_NOSE_DIRECTIONS
     for color, margin in ((edge, _EDGE_PX), (fill, 0.0)):
         base = radius + margin
@@ -281,9 +285,9 @@ def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: 
         for distance, angle in ((tip, 0.0), (base, _NOSE_HALF_ANGLE), (base, -_NOSE_HALF_ANGLE)):
             dx = distance * math.cos(heading + angle)
             dy = distance * math.sin(heading + angle)
-            corners.append((center[0] + fineness * dx, center[1] - fineness * dy))
+            corners.append((center[0] + supersampling * dx, center[1] - supersampling * dy))
         pygame.draw.polygon(large, color, corners)
-    return _shrink(large, fineness)
+    return _shrink(large, supersampling)
 
 
 def render_ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
@@ -306,19 +310,19 @@ def render_ring(radius: float, color: Color, width: float, shift: Shift) -> pyga
 
 @cache_surfaces(6_000_000)
 def _render_ring(radius: float, color: Color, width: float, shift: Shift) -> pygame.Surface:
-    fineness = _choose_fineness(radius)
-    large, center = _create_large(radius + width / 2, shift, fineness)
-    pygame.draw.circle(large, color, center, (radius + width / 2) * fineness)
-    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fineness)
-    return _shrink(large, fineness)
+    supersampling = _choose_supersampling(radius)
+    large, center = _create_enlarged_surface(radius + width / 2, shift, supersampling)
+    pygame.draw.circle(large, color, center, (radius + width / 2) * supersampling)
+    pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * supersampling)
+    return _shrink(large, supersampling)
 
 
 @cache_surfaces(4_000_000)
 def render_dot(radius: float, color: Color, shift: Shift) -> pygame.Surface:
     """Render a dot of a radius, px."""
-    large, center = _create_large(radius, shift, FINENESS)
-    pygame.draw.circle(large, color, center, radius * FINENESS)
-    return _shrink(large, FINENESS)
+    large, center = _create_enlarged_surface(radius, shift, SUPERSAMPLING)
+    pygame.draw.circle(large, color, center, radius * SUPERSAMPLING)
+    return _shrink(large, SUPERSAMPLING)
 
 
 @cache_surfaces(4_000_000)
@@ -341,10 +345,10 @@ def render_cross(
     -------
     pygame.Surface
     """
-    large, center = _create_large(arm + width, shift, FINENESS)
-    length = arm * FINENESS * (_DIAGONAL_ARM if is_diagonal else 1.0)
-    large_width = width * FINENESS
-    halo_px = _CROSS_HALO_PX * FINENESS
+    large, center = _create_enlarged_surface(arm + width, shift, SUPERSAMPLING)
+    length = arm * SUPERSAMPLING * (_DIAGONAL_ARM if is_diagonal else 1.0)
+    large_width = width * SUPERSAMPLING
+    halo_px = _CROSS_HALO_PX * SUPERSAMPLING
     directions = _DIAGONAL_DIRECTIONS if is_diagonal else _AXIS_DIRECTIONS
     for shade, reach, shade_width in (
         (halo, length + halo_px / 2, large_width + halo_px),
@@ -352,7 +356,7 @@ def render_cross(
     ):
         for direction in directions:
             pygame.draw.polygon(large, shade, _build_bar(center, direction, reach, shade_width))
-    return _shrink(large, FINENESS)
+    return _shrink(large, SUPERSAMPLING)
 
 
 def _build_bar(

@@ -37,7 +37,7 @@ def list_css_colors(theme: Theme) -> dict[str, Color]:
     colors |= {name: theme.get_controller_color(name) for name in theme.controllers}
     colors |= {f"other-{number}": color for number, color in enumerate(theme.others)}
     colors |= {f"cell-{hue}": theme.get_paper_cell_color(hue) for hue in range(len(theme.robots))}
-    colors |= {f"heat-{level}": color for level, color in enumerate(theme.quiet_heat)}
+    colors |= {f"heat-{level}": color for level, color in enumerate(theme.muted_heat)}
     return colors
 
 

@@ -264,9 +264,9 @@ class TestRobots:
         scene = build_row_scene(record_walk(SQUARE, 9, seed=3))
         frame, painter = render_layers(scene, "robots")
         for robot, pixel in enumerate(painter.camera.to_pixels(scene.snapshot.positions)):
-            quarters = np.rint((pixel + 0.5) * sprites.FINENESS).astype(int)
-            x, y = quarters // sprites.FINENESS
-            shift = tuple((quarters % sprites.FINENESS).tolist())
+            quarters = np.rint((pixel + 0.5) * sprites.SUPERSAMPLING).astype(int)
+            x, y = quarters // sprites.SUPERSAMPLING
+            shift = tuple((quarters % sprites.SUPERSAMPLING).tolist())
             fill = LIGHT.robots[painter._hues[robot]]
             misses = []
             for number in range(1, 10):

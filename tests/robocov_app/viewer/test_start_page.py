@@ -32,10 +32,10 @@ SIZES = ((900, 600), (1280, 720), (1920, 1080))
 def open_page(
     size: tuple[int, int] = (900, 600),
     recent: list[Path] | None = None,
-    is_ready: Callable[[], bool] = lambda: True,
+    can_open_viewer: Callable[[], bool] = lambda: True,
 ) -> Iterator[StartPage]:
     with open_display(headless=True):
-        page = StartPage(size, 1.0, recent=recent or [], is_ready=is_ready)
+        page = StartPage(size, 1.0, recent=recent or [], can_open_viewer=can_open_viewer)
         page.catches_exceptions = False
         yield page
 
@@ -131,7 +131,7 @@ def test_a_file_that_cannot_be_opened_is_reported(tmp_path: Path) -> None:
 
 def test_the_page_stays_usable_until_the_viewer_is_ready() -> None:
     is_ready = False
-    with open_page(is_ready=lambda: is_ready) as page:
+    with open_page(can_open_viewer=lambda: is_ready) as page:
         press(page, "2")
         before = pygame.surfarray.array3d(page.screen)
         assert not page.closed
@@ -143,7 +143,7 @@ def test_the_page_stays_usable_until_the_viewer_is_ready() -> None:
         page.run_frame(0.02)
         assert page.closed
         assert page.choice is START_CARDS[2].choice
-    with open_page(is_ready=lambda: False) as page:
+    with open_page(can_open_viewer=lambda: False) as page:
         press(page, "2")
         pygame.event.post(pygame.event.Event(pygame.QUIT))
         page.run_frame(0.02)

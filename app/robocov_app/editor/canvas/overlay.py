@@ -173,7 +173,7 @@ def draw_handles(
     hovered : Handle or None
         Handle under the cursor. It is drawn larger.
     """
-    floor = canvas.theme.background
+    background = canvas.theme.background
     accent = canvas.theme.accent
     positions = to_pixels(canvas, (handle.position for handle in handles)).tolist()
     for handle, (x, y) in zip(handles, positions, strict=True):
@@ -181,11 +181,11 @@ def draw_handles(
         if handle.kind == "rotate":
             canvas.draw_line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.scale_width(1.0))
             radius = LARGE_KNOB_RADIUS_PX if is_large else KNOB_RADIUS_PX
-            draw_disc(canvas, (x, y), radius, DiscColors(floor, accent, accent), rim=KNOB_RIM_PX)
+            draw_disc(canvas, (x, y), radius, DiscColors(background, accent, accent), rim=KNOB_RIM_PX)
         elif handle.kind == "scale":
-            _draw_square(canvas, (x, y), floor, is_large=is_large)
+            _draw_square(canvas, (x, y), background, is_large=is_large)
         else:
-            fill = floor
+            fill = background
             if handle.vertex in selected:
                 fill = accent
             _draw_square(canvas, (x, y), fill, is_large=is_large, is_rounded=True)
@@ -269,9 +269,9 @@ def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
     legs = list(pairwise(points))
     if path.repeat == "loop" and len(points) > 2:
         legs.append((points[-1], points[0]))
-    for number, (start, end) in enumerate(legs):
+    for index, (start, end) in enumerate(legs):
         # The leg of a loop from the last waypoint back to the first one.
-        is_closing = number == len(points) - 1
+        is_closing = index == len(points) - 1
         width = canvas.scale_width(1.0 if is_closing else LINE_PX)
         canvas.draw_dashed_line(start.tolist(), end.tolist(), color, width, dash=PATH_DASH_PX)
         _draw_arrow(canvas, start, end, color)
@@ -310,19 +310,29 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
 
 
 def draw_preview(canvas: Canvas, state: EditorToolOverlay, cursor: Point | None) -> None:
-    """Draw the preview of a tool; its label is next to the cursor, px."""
-    floor = canvas.theme.background
+    """Draw the preview of a tool.
+
+    Parameters
+    ----------
+    canvas : Canvas
+        The canvas.
+    state : EditorToolOverlay
+        What the tool previews.
+    cursor : Point or None
+        Position of the cursor, px. The label of the tool is drawn next to it, if there is one.
+    """
+    background = canvas.theme.background
     accent = canvas.theme.accent
     for shape in state.shapes:
         draw_ghost(canvas, shape.polygon)
     if state.start is not None:
         draw_start(canvas, state.start, is_selected=True)
     _draw_preview_line(canvas, state)
-    for number, ring in enumerate(state.outlines):
-        width = SELECTED_LINE_PX if number == state.chosen else THIN_LINE_PX
+    for index, ring in enumerate(state.outlines):
+        width = SELECTED_LINE_PX if index == state.chosen else THIN_LINE_PX
         canvas.draw_outline(to_pixels(canvas, ring), accent, canvas.scale_width(width))
-    for number, (x, y) in enumerate(to_pixels(canvas, state.markers).tolist()):
-        _draw_square(canvas, (x, y), floor, is_large=number == state.chosen, is_rounded=True)
+    for index, (x, y) in enumerate(to_pixels(canvas, state.markers).tolist()):
+        _draw_square(canvas, (x, y), background, is_large=index == state.chosen, is_rounded=True)
     if state.box is not None:
         _draw_selection_box(canvas, state.box, selects_partial=state.box_selects_partial)
     if state.label and cursor is not None:

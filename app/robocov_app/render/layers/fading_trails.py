@@ -84,21 +84,23 @@ def draw_fading_trails(
 
 
 def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen: Pen) -> Array:
-    """Draw the part of all trajectories that has the same shade.
+    """Draw the section of each trajectory that has a given shade.
+
+    All positions are in pixels of the sketch, which is enlarged by `_SUPERSAMPLING`.
 
     Parameters
     ----------
     sketch : Sketch
-    points : (k, n, 2) array, enlarged px
-    tips : (n, 2) array, enlarged px
-        Ends of the parts drawn before; nan for robots without one.
+    points : (k, n, 2) array, px
+    tips : (n, 2) array, px
+        Ends of the sections drawn before; nan for robots without one.
     opacity : float
     pen : Pen
 
     Returns
     -------
-    (n, 2) array, enlarged px
-        The ends of the parts drawn now; unchanged for robots that have hardly moved.
+    (n, 2) array, px
+        The ends of the sections drawn now; unchanged for robots that have hardly moved.
     """
     shades = {color: premultiply(color, opacity) for color in set(pen.colors)}
     width = max(1, round(pen.width * _SUPERSAMPLING))
@@ -108,6 +110,7 @@ def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen:
     is_present: BoolArray = np.asarray(np.isfinite(points).all(axis=(0, 2)))
     continues = is_present & ~np.isnan(tips[:, 0])
     paths = points.copy()
+    # Each section starts where the one before it ended, so that there are no gaps between them.
     paths[0, continues] = tips[continues]
     for robot in np.flatnonzero(has_moved).tolist():
         path = paths[:, robot]

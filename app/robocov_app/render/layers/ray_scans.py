@@ -69,8 +69,8 @@ def draw_dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> No
     radius : float, px
     color : Color
     """
-    quarters = np.unique(np.rint((centers + 0.5) * sprites.FINENESS), axis=0)
-    different = quarters / sprites.FINENESS - 0.5
+    quarters = np.unique(np.rint((centers + 0.5) * sprites.SUPERSAMPLING), axis=0)
+    different = quarters / sprites.SUPERSAMPLING - 0.5
     canvas.draw_sprites([partial(sprites.render_dot, radius, color)], different)
 
 

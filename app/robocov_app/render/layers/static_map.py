@@ -35,7 +35,7 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
     for axis in (0, 1):
         low = max(bounds[axis], visible[axis])
         high = min(bounds[axis + 2], visible[axis + 2])
-        # Lines are at multiples of the step, also when the view moves.
+        # Lines are at multiples of the step, so that they stay in place when the view moves.
         for coordinate in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
             _draw_grid_line(canvas, environment, axis, coordinate)
 

@@ -220,7 +220,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     if is_visible(page, rect):
         box = Rect(0, 0, page.px(_CHECK_BOX_PX), page.px(_CHECK_BOX_PX))
         box.midleft = rect.midleft
-        _draw_check_box(page, box, is_hovered=page.is_hovered(rect), value=value)
+        _draw_check_box(page, box, is_hovered=page.is_hovered(rect), is_ticked=value)
         text_rect = rect.move(page.px(_CHECK_TEXT_LEFT_PX), 0)
         text_rect.width -= page.px(_CHECK_TEXT_LEFT_PX)
         draw_text(page, text, text_rect, page.theme.ink, TEXT_PX)
@@ -230,10 +230,10 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     return None
 
 
-def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> None:
-    """Draw the box of a check box, with a tick if its value is True."""
+def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, is_ticked: bool) -> None:
+    """Draw the box of a check box, with a tick if it is ticked."""
     theme = page.theme
-    if value:
+    if is_ticked:
         fill = edge = theme.accent
     elif is_hovered:
         fill = mix(get_field_color(theme), theme.accent, _HOVERED_BOX_TINT)
@@ -242,9 +242,9 @@ def _draw_check_box(page: Page, box: Rect, *, is_hovered: bool, value: bool) -> 
         fill = get_field_color(theme)
         edge = shade(page, _BOX_EDGE_SHADE)
     draw_box(page, box, fill, edge=edge, radius=_CHECK_BOX_RADIUS_PX, width=get_edge_width(page))
-    if not value or page.surface is None:
+    if not is_ticked or page.surface is None:
         return
-    # Lines with smooth edges: draw the tick enlarged, and scale it down.
+    # For smooth edges, the tick is drawn enlarged and scaled down.
     side = _SUPERSAMPLING * box.width
     large = Surface((side, side), pygame.SRCALPHA, 32)
     line_width = max(_SUPERSAMPLING, round(_TICK_WIDTH * side))

@@ -49,7 +49,7 @@ def show_text_field(
     tip : str
         Tool tip.
     live : bool
-        Whether every change is returned, not only the text confirmed with Enter.
+        Whether to return every change, rather than only the text that is confirmed with Enter.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def show_text_field(
     if live and edit is not None and edit.text != text:
         entered_text = edit.text
     shown_text = text if edit is None else edit.text
-    page.add_widget(Widget("entry", key, rect, shown_text, text, tip))
+    page.add_widget(Widget("entry", key, rect, text=shown_text, value=text, tip=tip))
     if page.surface is not None and is_visible(page, rect):
         _draw_field(page, rect, is_edited=edit is not None)
         if edit is None:

@@ -86,7 +86,7 @@ class ViewerCanvas:
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._environment: Environment | None = None
-        self._root: Node | None = None  # of the run that is shown
+        self._root: Node | None = None  # root of the displayed run
         self._scene_builder = SceneBuilder(viewer)
         self._layers = build_standard_layers()
 

@@ -45,23 +45,23 @@ class SceneBuilder:
         displayed = viewer.session.displayed
         setup = displayed.get_setup(pane)
         snapshot = displayed.get_snapshot(pane)
-        known = viewer.costs.known.get(pane.number)
+        known_cost = viewer.costs.known.get(pane.number)
         selected = viewer.selected_robot
         row = setup.numbers.index(selected) if selected in setup.numbers else None
-        if known is not None and painter.needs_field:
-            self._update_color_limit(known.field.max_distance)
+        if known_cost is not None and painter.needs_field:
+            self._update_color_limit(known_cost.field.max_distance)
         return pane.build_scene(
             setup,
             snapshot,
             displayed.get_trail(pane),
             trail_fade=FADE_S if viewer.view.fades_trajectories else None,
-            field=known.field if known is not None and painter.needs_field else None,
+            field=known_cost.field if known_cost is not None and painter.needs_field else None,
             field_limit=self._color_limit,
             cost=self._describe_cost(pane),
             selected=row,
             scans=self._list_scans(pane, setup, snapshot.positions, row),
             sensed=pane.sensed,
-            path=self._get_path(known),
+            path=self._get_path(known_cost),
         )
 
     def _update_color_limit(self, largest: float) -> None:
@@ -70,11 +70,11 @@ class SceneBuilder:
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
             self._color_limit = choose_color_limit(_COLOR_LIMIT_MARGIN * largest)
 
-    def _get_path(self, known: KnownCost | None) -> Array | None:
+    def _get_path(self, known_cost: KnownCost | None) -> Array | None:
         """Return the path from the cursor to its nearest robot, (k, 2) m; None if it is not shown."""
-        if known is None or self._viewer.inspection.cursor is None:
+        if known_cost is None or self._viewer.inspection.cursor is None:
             return None
-        return known.path
+        return known_cost.path
 
     def _list_scans(
         self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
@@ -108,10 +108,10 @@ class SceneBuilder:
             return ""
         name = get_cost_name(displayed.get_setup(pane).environment)
         text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
-        known = self._viewer.costs.known.get(pane.number)
-        if known is not None and known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
+        known_cost = self._viewer.costs.known.get(pane.number)
+        if known_cost is not None and known_cost.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
             # The mean only covers the reachable area, so it decreases when robots are locked out of a room.
-            text += f" ({known.result.uncovered_area:.1f} m² cut off)"
+            text += f" ({known_cost.result.uncovered_area:.1f} m² cut off)"
         if displayed.time - time > MAX_COST_LAG_S:
             return f"{text} at {time:.1f} s"
         return text

@@ -105,11 +105,11 @@ class CostCurves:
             )
 
     def _add_answers(self) -> None:
-        for number, known in self._viewer.costs.poll():
+        for number, known_cost in self._viewer.costs.poll():
             self.answer_count += 1
             for pane in self._viewer.session.timeline.panes:
-                if pane.number != number or known.time > pane.time + TIME_TOLERANCE_S:
+                if pane.number != number or known_cost.time > pane.time + TIME_TOLERANCE_S:
                     continue
-                pane.distance_curve.add(known.time, known.result.mean_distance)
-                if known.travel_time is not None:
-                    pane.curves["time"].add(known.time, known.travel_time)
+                pane.distance_curve.add(known_cost.time, known_cost.result.mean_distance)
+                if known_cost.travel_time is not None:
+                    pane.curves["time"].add(known_cost.time, known_cost.travel_time)

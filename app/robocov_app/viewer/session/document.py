@@ -261,9 +261,9 @@ class SessionDocument:
         Parameters
         ----------
         node : Node
-            The node.
+            The last node of the path.
         step : int
-            The step.
+            The last step of the path, in the time span of the node.
         dt : float, s
             Control period.
 
@@ -275,9 +275,11 @@ class SessionDocument:
         events = []
         for ancestor in self.get_path(node):
             last_step = last_steps[ancestor.number]
+            # A node with a scenario starts the run, which is not an event in it.
             if ancestor.scenario is None and ancestor.branch_step <= last_step:
                 time = ancestor.branch_step * dt
                 events.append(SessionEvent(time, ancestor.kind, ancestor.description))
+            # Sets have no order: without sorting, that of simultaneous events would be random.
             events += [
                 SessionEvent(event.step * dt, event.kind, event.text)
                 for event in sorted(ancestor.automatic_events)
@@ -298,11 +300,10 @@ def replay(
     Parameters
     ----------
     document : SessionDocument
-        The document.
     node : Node
-        The node.
+        The last node of the path.
     step : int
-        The step.
+        The last step of the path, in the time span of the node.
     run : PaneGroup or None
         A run at some step of the node `start_node`, with which to start; by default a new run at time 0.
     start_node : Node or None

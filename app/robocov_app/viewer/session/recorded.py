@@ -215,7 +215,7 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
 
 
 def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
-    """Return the setup of each state; states with the same working and failed robots share one."""
+    """Return the setup of each state; states with the same sets of working and failed robots share one."""
     if record.conditions is None:
         return [setup] * len(record)
     setup_by_robots: dict[bytes, PaneSetup] = {}
@@ -224,6 +224,7 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
     for positions, working, present in zip(record.positions, record.working, record.present, strict=True):
         key = working.tobytes() + present.tobytes()
         if key not in setup_by_robots:
+            # Failed robots do not move, so their positions are the same in all states that share the setup.
             failed = dict(setup.failed)
             for row in np.flatnonzero(present & ~working):
                 failed[setup.numbers[row]] = tuple(positions[row].tolist())

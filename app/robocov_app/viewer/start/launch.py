@@ -89,7 +89,7 @@ class StartLauncher:
             theme_name=self.theme,
             recent=[Path(name) for name in self._settings.recent if Path(name).is_file()],
             folder=self._folder,
-            is_ready=lambda: self._preparation.is_ready,
+            can_open_viewer=lambda: self._preparation.is_ready,
         )
         page.model.show_message(message or self._message, is_error=bool(message))
         if not self._has_started:

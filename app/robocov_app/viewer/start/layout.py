@@ -18,6 +18,11 @@ _MAP_GAP_PX = 8
 _HEADING_PX = 22
 _BUTTON_HEIGHT_PX = 30
 _ARROW_WIDTH_PX = 26
+_TITLE_TOP_PX = 18
+_BUTTON_TOP_PX = 16
+_BUTTON_GAP_PX = 8
+_BUTTON_WIDTHS_PX = (56, 62, 108)  # from right to left: help, theme, open
+_ROW_PADDING_PX = 8  # between the left edge of a recent session and its text
 _MAX_CARD_ASPECT = 1.5
 """Width of a card divided by its height, at most; wider windows leave a margin."""
 
@@ -29,7 +34,7 @@ class StartLayout:
     Attributes
     ----------
     scale : float
-        Scale of texts.
+        Scale of texts and lengths.
     title, maps_title : (x, y)
         Upper left corners of texts.
     cards : tuple of Rect
@@ -56,7 +61,7 @@ class StartLayout:
         """Return the box of a recent session."""
         height = round(RECENT_ROW_PX * self.scale)
         top = self.recent.top + round(_HEADING_PX * self.scale) + row * height
-        return Rect(self.recent.left - round(8 * self.scale), top, self.recent.width, height)
+        return Rect(self.recent.left - round(_ROW_PADDING_PX * self.scale), top, self.recent.width, height)
 
 
 def build_start_layout(size: tuple[int, int], scale: float, map_count: int, has_recent: bool) -> StartLayout:
@@ -66,7 +71,7 @@ def build_start_layout(size: tuple[int, int], scale: float, map_count: int, has_
     ----------
     size : (width, height), px
     scale : float
-        Scale of texts.
+        Scale of texts and lengths.
     map_count : int
         Number of maps.
     has_recent : bool
@@ -85,7 +90,7 @@ def build_start_layout(size: tuple[int, int], scale: float, map_count: int, has_
     cards_height = height - px(_HEADER_PX + _GAP_PX + _MARGIN_PX) - maps_height
     recent_width = px(_RECENT_WIDTH_PX) if has_recent else 0
     recent_gap = px(2 * _GAP_PX) if has_recent else 0
-    card_height = (cards_height - px(_GAP_PX)) // CARD_ROWS
+    card_height = (cards_height - (CARD_ROWS - 1) * px(_GAP_PX)) // CARD_ROWS
     max_cards_width = CARD_COLUMNS * round(_MAX_CARD_ASPECT * card_height) + (CARD_COLUMNS - 1) * px(_GAP_PX)
     free_width = width - 2 * px(_MARGIN_PX) - recent_width - recent_gap
     cards_width = min(free_width, max_cards_width)
@@ -99,7 +104,7 @@ def build_start_layout(size: tuple[int, int], scale: float, map_count: int, has_
     recent = Rect(left + cards_width + recent_gap, px(_HEADER_PX), recent_width, cards_height)
     return StartLayout(
         scale=scale,
-        title=(left, px(18)),
+        title=(left, px(_TITLE_TOP_PX)),
         maps_title=(left, maps_top),
         cards=cards,
         maps=maps,
@@ -149,11 +154,13 @@ def _place_maps(
 
 def _place_buttons(right: int, scale: float) -> tuple[Rect, ...]:
     """Return the boxes of the buttons in the header, from left to right."""
-    gap = round(8 * scale)
+    gap = round(_BUTTON_GAP_PX * scale)
+    top = round(_BUTTON_TOP_PX * scale)
+    height = round(_BUTTON_HEIGHT_PX * scale)
     buttons: list[Rect] = []
-    for width_px in (56, 62, 108):
+    for width_px in _BUTTON_WIDTHS_PX:
         width = round(width_px * scale)
-        box = Rect(right - width, round(16 * scale), width, round(_BUTTON_HEIGHT_PX * scale))
+        box = Rect(right - width, top, width, height)
         buttons.append(box)
         right = box.left - gap
     help_button, theme_button, open_button = buttons

@@ -55,6 +55,9 @@ _TITLE_PX = 22
 _TAGLINE_PX = 13
 _HEADING_PX = 12
 _BUTTON_TEXT_PX = 13
+_TAGLINE_GAP_PX = 16  # from the title to the tagline
+_TAGLINE_DROP_PX = 9  # from the top of the title to that of the tagline
+_TAGLINE_MARGINS_PX = 40  # to the left and right of the tagline, together
 
 
 class StartPage(BaseWindow):
@@ -71,7 +74,7 @@ class StartPage(BaseWindow):
         Sessions used recently, newest first.
     folder : Path
         Folder in which files are opened.
-    is_ready : callable
+    can_open_viewer : callable
         Returns whether the viewer can be opened. Until then, the page shows that it is loading.
 
     Attributes
@@ -93,7 +96,7 @@ class StartPage(BaseWindow):
         theme_name: ThemeName = _LIGHT_NAME,
         recent: Sequence[Path] = (),
         folder: Path = Path(),
-        is_ready: Callable[[], bool] = lambda: True,
+        can_open_viewer: Callable[[], bool] = lambda: True,
     ) -> None:
         super().__init__(size)
         pygame.display.set_caption(_TITLE)
@@ -106,12 +109,12 @@ class StartPage(BaseWindow):
         self.is_help_open = False
         self._recent = list(recent)
         self._folder = folder
-        self._is_ready = is_ready
+        self._can_open_viewer = can_open_viewer
         previews = load_previews()
         self._cards = CardSection(previews, self.choose)
         self._maps = MapSection(previews, self.choose)
         self._recent_sessions = RecentSection(self._recent, self.open_file)
-        self._animated_until_s = ANIMATION_S
+        self._animation_end_s = ANIMATION_S
         self._is_motion_reduced = prefers_reduced_motion()
         self._commands = CommandTable(self._list_commands(), self.model.attempt)
         self._arrange()
@@ -195,7 +198,7 @@ class StartPage(BaseWindow):
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event: dialogs first, then keys and the mouse."""
         self.model.revision += 1
-        self._animated_until_s = self.model.now + ANIMATION_S
+        self._animation_end_s = self.model.now + ANIMATION_S
         if event.type == pygame.QUIT:
             self._quit()
         elif event.type == pygame.KEYUP:
@@ -244,15 +247,16 @@ class StartPage(BaseWindow):
     def update(self, seconds: float) -> None:
         """Advance the examples; close the page once the viewer can open the user's choice."""
         self.model.pass_time(seconds)
-        if self.choice is not None and self._is_ready():
+        if self.choice is not None and self._can_open_viewer():
             self.closed = True
         self._arrange()
 
     def build_frame_key(self) -> object:
         """Return everything on which the frame depends."""
-        moment = self._preview_time
+        time = self._preview_time
         if self.choice is not None:
-            moment = self.model.now
+            # The message that the viewer is loading moves as well.
+            time = self.model.now
         return (
             self.model.revision,
             self.model.message,
@@ -260,7 +264,7 @@ class StartPage(BaseWindow):
             self.theme_name,
             self.focus.name,
             self.is_help_open,
-            round(moment * ANIMATION_FPS),
+            round(time * ANIMATION_FPS),
         )
 
     @property
@@ -271,7 +275,7 @@ class StartPage(BaseWindow):
         """
         if self._is_motion_reduced:
             return STILL_TIME_S
-        return min(self.model.now, self._animated_until_s)
+        return min(self.model.now, self._animation_end_s)
 
     def _arrange(self) -> None:
         """Lay out the page for the size of the window, and list the items."""
@@ -338,9 +342,10 @@ def _draw_headings(drawing: StartDrawing, layout: StartLayout) -> None:
     left, top = layout.title
     drawing.write(_TITLE, (left, top), _TITLE_PX, theme.ink, bold=True)
     title_width = measure_text(_TITLE, drawing.px(_TITLE_PX), True)
-    room = layout.open_button.left - left - title_width - 40 * scale
-    tagline = shorten_to_width(_TAGLINE, drawing.px(_TAGLINE_PX), room)
-    drawing.write(tagline, (left + title_width + 16 * scale, top + 9 * scale), _TAGLINE_PX, theme.faint)
+    max_tagline_width = layout.open_button.left - left - title_width - _TAGLINE_MARGINS_PX * scale
+    tagline = shorten_to_width(_TAGLINE, drawing.px(_TAGLINE_PX), max_tagline_width)
+    tagline_position = (left + title_width + _TAGLINE_GAP_PX * scale, top + _TAGLINE_DROP_PX * scale)
+    drawing.write(tagline, tagline_position, _TAGLINE_PX, theme.faint)
     drawing.write("Maps", layout.maps_title, _HEADING_PX, theme.faint, bold=True)
     if layout.recent.width:
         drawing.write("Recent sessions", layout.recent.topleft, _HEADING_PX, theme.faint, bold=True)

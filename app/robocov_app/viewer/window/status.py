@@ -46,9 +46,9 @@ def list_facts(
     time = session.displayed.time
     paused = "" if session.playback.is_playing else "paused · "
     facts = [f"{paused}t = {time:.2f} s"]
-    known = viewer.costs.known.get(viewer.pane.number)
-    if known is not None:
-        facts += _list_cost_facts(known, time)
+    known_cost = viewer.costs.known.get(viewer.pane.number)
+    if known_cost is not None:
+        facts += _list_cost_facts(known_cost, time)
     if video_duration is not None:
         facts.append(f"● video {video_duration:.0f} s")
     facts.append(_describe_speed(viewer, step_rate))
@@ -60,17 +60,17 @@ def list_facts(
 
 def describe_cut_off(viewer: ViewerModel, pane: Pane) -> str:
     """Describe the area of a pane that no robot can reach; empty if there is none worth mentioning."""
-    known = viewer.costs.known.get(pane.number)
-    if known is None or known.result.uncovered_area <= MIN_UNCOVERED_AREA_M2:
+    known_cost = viewer.costs.known.get(pane.number)
+    if known_cost is None or known_cost.result.uncovered_area <= MIN_UNCOVERED_AREA_M2:
         return ""
-    return f"{known.result.uncovered_area:.1f} m² cut off"
+    return f"{known_cost.result.uncovered_area:.1f} m² cut off"
 
 
-def _list_cost_facts(known: KnownCost, time: float) -> list[str]:
-    age = f" (at {known.time:.1f} s)" if abs(known.time - time) > _MAX_COST_LAG_S else ""
-    facts = [f"J = {known.result.value:.2f} m³{age}"]
-    if known.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
-        facts.append(f"cut off {known.result.uncovered_area:.1f} m²")
+def _list_cost_facts(known_cost: KnownCost, time: float) -> list[str]:
+    age = f" (at {known_cost.time:.1f} s)" if abs(known_cost.time - time) > _MAX_COST_LAG_S else ""
+    facts = [f"J = {known_cost.result.value:.2f} m³{age}"]
+    if known_cost.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
+        facts.append(f"cut off {known_cost.result.uncovered_area:.1f} m²")
     return facts
 
 
@@ -84,25 +84,25 @@ def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
 
 
 def describe_cursor(viewer: ViewerModel) -> str:
-    """Describe the point under the cursor and its distance to the nearest robot; empty without a cursor."""
+    """Describe the point under the cursor and its distance to the nearest robot; empty if there is none."""
     cursor = viewer.inspection.cursor
     if cursor is None:
         return ""
     panes = viewer.session.timeline.panes
     pane = panes[min(viewer.inspection.cursor_pane, len(panes) - 1)]
     position = f"({cursor[0]:.2f}, {cursor[1]:.2f}) m"
-    known = viewer.costs.known.get(pane.number)
-    if known is None:
+    known_cost = viewer.costs.known.get(pane.number)
+    if known_cost is None:
         return position
-    return f"{position}: {_describe_point(viewer, pane, known, cursor)}"
+    return f"{position}: {_describe_point(viewer, pane, known_cost, cursor)}"
 
 
-def _describe_point(viewer: ViewerModel, pane: Pane, known: KnownCost, point: Point) -> str:
+def _describe_point(viewer: ViewerModel, pane: Pane, known_cost: KnownCost, point: Point) -> str:
     """Describe the distance of a point to the robot that covers it, or why no robot does."""
-    result = known.result
+    result = known_cost.result
     squares = (result.points[:, 0] - point[0]) ** 2 + (result.points[:, 1] - point[1]) ** 2
     site = int(squares.argmin())
-    if squares[site] > (_MAX_SITE_DISTANCE * known.get_lattice().spacing) ** 2:
+    if squares[site] > (_MAX_SITE_DISTANCE * known_cost.get_lattice().spacing) ** 2:
         setup = viewer.session.displayed.get_setup(pane)
         is_in_map = setup.environment.boundary_polygon.intersects(shapely.Point(point))
         if is_in_map:

@@ -13,12 +13,11 @@ QUANTITIES = ("distance", "time")
 def build_ghost_curves(
     document: SessionDocument, head: Node, step: int, dt: float, panes: int
 ) -> list[GhostCurve]:
-    """Build the curves of the newest branches of the same run, apart from the present branch.
+    """Build the curves of the newest branches of the same run, other than the present branch.
 
     Parameters
     ----------
     document : SessionDocument
-        The document.
     head : Node
         The node whose time span contains the present.
     step : int
@@ -36,6 +35,7 @@ def build_ghost_curves(
     last_steps = document.get_last_steps(head, step)
     root = document.get_path(head)[0]
     ghosts = []
+    # The present branch adds no curves: no part of it is off the path to the present.
     for branch in document.list_branches():
         if document.get_path(branch.node)[0] is root:
             ghosts += _build_branch_curves(document, branch, last_steps, dt)
@@ -51,9 +51,7 @@ def _build_branch_curves(
     Parameters
     ----------
     document : SessionDocument
-        The document.
     branch : Branch
-        The branch.
     last_steps : dict of int to int
         Last step on the path to the present for each node of that path, by the node's number.
     dt : float, s
