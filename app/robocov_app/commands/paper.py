@@ -211,11 +211,11 @@ def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcom
 
 def _print_interruption(options: Arguments) -> int:
     """Print the command that resumes an interrupted study, and return the exit status."""
-    words = ["robocov", "paper", "--out", str(options.out)]
+    arguments = ["robocov", "paper", "--out", str(options.out)]
     if options.quick:
-        words.append("--quick")
-    words += options.selection
-    message = f"Interrupted. Partial results are in {options.out}/. To resume: {' '.join(words)}"
+        arguments.append("--quick")
+    arguments += options.selection
+    message = f"Interrupted. Partial results are in {options.out}/. To resume: {' '.join(arguments)}"
     print_answer(options, {"out": str(options.out), "interrupted": True}, message)
     return INTERRUPTED
 
@@ -247,11 +247,11 @@ def _print_outcome(options: Arguments, plan: Plan, outcome: _Outcome) -> None:
 
 def _print_claims(claims: Sequence[Claim]) -> None:
     """Print the table of claims with their verdicts."""
-    fold: dict[str, Any] = {"overflow": "fold"}
+    wrapped: dict[str, Any] = {"overflow": "fold"}
     rows = []
     for claim in claims:
         measured = "–"
         if claim.criteria:
             measured = f"{claim.criteria[0].measure}: {claim.criteria[0].result_text}"
         rows.append((claim.text, claim.verdict, measured, str(claim.runs)))
-    print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
+    print_table([("claim", wrapped), ("verdict", BOLD), ("measured", wrapped), ("runs", RIGHT)], rows)

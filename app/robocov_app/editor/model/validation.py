@@ -74,7 +74,7 @@ def _check_map_rules(sketch: Sketch, environment: env.Environment) -> list[Probl
 
 
 def _build_rough_free_space(sketch: Sketch) -> MultiPolygon:
-    """Build the free space of an invalid map from its repairable parts; empty without a usable boundary."""
+    """Build the free space of an invalid map from its repairable parts; empty if no boundary is usable."""
     ring = sketch.boundary or ()
     if len(ring) < 3 or np.abs(ring).max() > MAX_COORDINATE_M or np.ptp(ring, axis=0).max() > MAX_SIZE_M:
         return MultiPolygon()

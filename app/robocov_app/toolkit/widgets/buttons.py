@@ -86,7 +86,8 @@ def show_button(
     key = key or text
     rect = page.cell()
     rect.height = min(rect.height, page.px(_MAX_BUTTON_HEIGHT_PX))
-    is_clicked = page.add_clickable(Widget("button", key, rect, text, selected, tip), disabled_reason)
+    widget = Widget("button", key, rect, text, value=selected, tip=tip)
+    is_clicked = page.add_clickable(widget, disabled_reason)
     if is_visible(page, rect):
         ink = draw_face(page, rect, key, selected=selected, enabled=not disabled_reason)
         size = get_text_size(small=small)
@@ -119,7 +120,7 @@ def show_option(
         Whether it was just clicked.
     """
     rect = page.cell()
-    is_clicked = page.add_clickable(Widget("option", key, rect, text, highlighted), disabled_reason)
+    is_clicked = page.add_clickable(Widget("option", key, rect, text, value=highlighted), disabled_reason)
     if not is_visible(page, rect):
         return is_clicked
     if highlighted:
@@ -216,7 +217,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     """
     key = key or text
     rect = page.cell()
-    is_clicked = page.add_clickable(Widget("check", key, rect, text, value, tip))
+    is_clicked = page.add_clickable(Widget("check", key, rect, text, value=value, tip=tip))
     if is_visible(page, rect):
         box = Rect(0, 0, page.px(_CHECK_BOX_PX), page.px(_CHECK_BOX_PX))
         box.midleft = rect.midleft

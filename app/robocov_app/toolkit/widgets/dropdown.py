@@ -52,7 +52,7 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
     """
     rect = page.cell()
     picked = _read_list(page, key, options)
-    is_clicked = page.add_clickable(Widget("menu", key, rect, value, value, tip))
+    is_clicked = page.add_clickable(Widget("menu", key, rect, text=value, value=value, tip=tip))
     if picked is None and (is_clicked or page.get_key(key) == "down"):
         page.open_list = _build_list(page, key, options, value, rect)
         page.focus = key

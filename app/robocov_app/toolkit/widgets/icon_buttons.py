@@ -71,7 +71,8 @@ def show_icon_button(
         Whether it was just pressed.
     """
     rect = page.cell()
-    is_clicked = page.add_clickable(Widget("button", key, rect, text, selected, tip), disabled_reason)
+    widget = Widget("button", key, rect, text, value=selected, tip=tip)
+    is_clicked = page.add_clickable(widget, disabled_reason)
     if is_visible(page, rect):
         ink = _draw_flat_face(page, rect, key, selected=selected, enabled=not disabled_reason)
         icon_rect = rect.copy()

@@ -29,6 +29,8 @@ _LABEL_LINE_PX = 18
 _BADGE_PX = 18
 _PADDING_PX = 10
 _GAP_PX = 8
+_LABEL_GAP_PX = 3  # between a map and the label below it
+_BADGE_RADIUS_PX = 5
 
 _MAX_TEXT_LINES = 2
 
@@ -96,7 +98,7 @@ class CardSection:
             draw_run(drawing.screen, run, part, theme, scale, seconds=seconds, outside=theme.background)
             if card.labels:
                 label = render_text(card.labels[k], drawing.px(_LABEL_PX), theme.ink)
-                bottom = fit_outline(run.outline, part).bottom + drawing.px(3)
+                bottom = fit_outline(run.outline, part).bottom + drawing.px(_LABEL_GAP_PX)
                 drawing.screen.blit(label, label.get_rect(midtop=(part.centerx, bottom)))
 
 
@@ -113,6 +115,6 @@ def _draw_badge(number: int, box: Rect, drawing: StartDrawing, *, is_focused: bo
     badge = Rect(box.left, box.top, drawing.px(_BADGE_PX), drawing.px(_BADGE_PX))
     fill = theme.accent if is_focused else mix(theme.background, theme.ink, 0.1)
     color = get_accent_ink(theme) if is_focused else theme.ink
-    draw_rounded_box(drawing.screen, badge, fill, edge=fill, radius=drawing.px(5))
+    draw_rounded_box(drawing.screen, badge, fill, edge=fill, radius=drawing.px(_BADGE_RADIUS_PX))
     digit = render_text(str(number), drawing.px(_LABEL_PX), color, True)
     drawing.screen.blit(digit, digit.get_rect(center=badge.center))

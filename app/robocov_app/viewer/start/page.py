@@ -255,7 +255,7 @@ class StartPage(BaseWindow):
         """Return everything on which the frame depends."""
         time = self._preview_time
         if self.choice is not None:
-            # The message that the viewer is loading moves as well.
+            # The dots of the message "Opening …" move until the viewer opens.
             time = self.model.now
         return (
             self.model.revision,

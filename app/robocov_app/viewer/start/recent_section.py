@@ -19,6 +19,8 @@ MAX_RECENT_ROWS = 7
 _NAME_PX = 13
 _FOLDER_PX = 11
 _MARGIN_PX = 8
+_NAME_TOP_PX = 4
+_FOLDER_DROP_PX = 3  # from the middle of a row to the top of the folder
 
 
 class RecentSection:
@@ -56,6 +58,7 @@ def _draw_row(path: Path, box: Rect, drawing: StartDrawing, is_focused: bool) ->
     width = box.width - 2 * _MARGIN_PX * scale
     x = box.left + _MARGIN_PX * scale
     name = shorten_to_width(path.stem, drawing.px(_NAME_PX), width)
-    drawing.write(name, (x, box.top + 4 * scale), _NAME_PX, theme.ink)
+    drawing.write(name, (x, box.top + _NAME_TOP_PX * scale), _NAME_PX, theme.ink)
     folder = shorten_to_width(str(path.parent), drawing.px(_FOLDER_PX), width)
-    drawing.write(folder, (x, box.top + (RECENT_ROW_PX / 2 + 3) * scale), _FOLDER_PX, theme.faint)
+    folder_top = box.top + (RECENT_ROW_PX / 2 + _FOLDER_DROP_PX) * scale
+    drawing.write(folder, (x, folder_top), _FOLDER_PX, theme.faint)

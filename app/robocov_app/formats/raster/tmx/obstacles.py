@@ -186,12 +186,12 @@ class ObstacleReader:
                 self._shapes.count_omission("object", reason)
 
     def _is_solid(
-        self, element: Element, labels: tuple[str, ...], folded: set[str], is_layer_solid: bool
+        self, element: Element, labels: tuple[str, ...], folded_labels: set[str], is_layer_solid: bool
     ) -> bool:
-        """Return whether an object is an obstacle; `folded` are its labels in lower case."""
+        """Return whether an object is an obstacle; `folded_labels` are its labels in lower case."""
         only = self._shapes.labels.only
         if only is not None:
-            return bool(only & folded)
+            return bool(only & folded_labels)
         return is_layer_solid or is_declared_solid(element, labels)
 
     def _add_shape(self, element: Element, shape: ObjectShape, labels: tuple[str, ...]) -> None:

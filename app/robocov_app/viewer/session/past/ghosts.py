@@ -72,12 +72,12 @@ def _build_branch_curves(
             if len(curve) > 1:
                 ghosts.append(
                     GhostCurve(
-                        controller.name,
-                        controller.description,
-                        curve.times,
-                        curve.values,
-                        quantity,
-                        branch.node.number,
+                        controller=controller.name,
+                        description=controller.description,
+                        times=curve.times,
+                        values=curve.values,
+                        quantity=quantity,
+                        node=branch.node.number,
                     )
                 )
     return ghosts
