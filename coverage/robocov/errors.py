@@ -185,7 +185,7 @@ class MapError(InputError):
         issues : sequence of Issue
             At least one.
         unlisted : int
-            Number of further issues, which are not in `issues`.
+            Number of additional issues that are not in `issues`.
 
         Returns
         -------

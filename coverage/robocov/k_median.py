@@ -58,7 +58,7 @@ class _Swap(NamedTuple):
 
 
 def seed_sources(table: Array, source_count: int, rng: np.random.Generator) -> IntArray:
-    """Choose sources at random, so that they are mostly far from each other.
+    """Choose sources at random, so that they tend to be far apart.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def _compute_cost(table: Array, sources: IntArray) -> float:
 
 @kernel
 def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
-    """Return the nearest source of each target, and the distances to the nearest two sources."""
+    """Return the nearest source of each target, and the distances to the two nearest sources."""
     target_count = len(table)
     owners = np.zeros(target_count, dtype=np.intp)
     distances = np.full(target_count, np.inf)

@@ -126,7 +126,7 @@ class Outbox:
         messages : sequence of sequence of Message
             New messages of each robot; empty if there are none.
         working : (n,) bool array
-            Mask of the robots that work. The queues of the other robots are emptied.
+            Mask of the working robots. The queues of the other robots are emptied.
 
         Returns
         -------
@@ -278,7 +278,7 @@ class Radio:
         true_positions : (n, 2) array, m
             True positions, which determine which robots are in range.
         working : (n,) bool array
-            Mask of the robots that work.
+            Mask of the working robots.
 
         Returns
         -------
@@ -330,7 +330,8 @@ class Radio:
         Parameters
         ----------
         inbox : Inbox or None
-            Messages after the positions of the step were exchanged. None if no message is in flight or waits.
+            Messages after the positions of the step were exchanged. None if no message is in flight or
+            waiting.
         step : int
             Index of the step, from 0 at time zero.
         observations : Observations
@@ -386,23 +387,22 @@ class Radio:
         Parameters
         ----------
         inbox : Inbox or None
-            Messages after the observations of the step; None if no message is in flight or waits.
+            Messages after the observations of the step; None if no message is in flight or waiting.
         step : int
             Index of the step, from 0 at time zero.
         messages : sequence of sequence of Message
-            New messages of each robot; empty if there are none. Messages of robots that do not work are
-            dropped.
+            New messages of each robot; empty if there are none. Messages of failed robots are dropped.
         true_positions : (n, 2) array, m
             True positions, which determine which robots are in range.
         working : (n,) bool array
-            Mask of the robots that work.
+            Mask of the working robots.
 
         Returns
         -------
         inbox : Inbox or None
-            Messages after the step. None if it was None, and there are no new messages.
+            Messages after the step. None if it was None and there are no new messages.
         sent_bytes : int
-            Total size of the messages that were sent in this step, without those that wait.
+            Total size of the messages that were sent in this step, excluding those still waiting.
         """
         if inbox is None and not any(messages):
             return None, 0
@@ -501,7 +501,7 @@ class Radio:
         step : int
             Index of the step, from 0 at time zero.
         working : (n,) bool array
-            Mask of the robots that work.
+            Mask of the working robots.
 
         Returns
         -------

@@ -63,7 +63,7 @@ class Perception:
         inbox : Inbox or None
             Messages before the step; None if communication is ideal and no messages are in flight.
         working : (n,) bool array
-            Mask of the robots that work.
+            Mask of the working robots.
 
         Returns
         -------
@@ -149,7 +149,7 @@ def restrict_decision_to_working(decision: Decision, working: BoolArray) -> Deci
     decision : Decision
         The decision of the controller, for all robots.
     working : (n,) bool array
-        Mask of the robots that work.
+        Mask of the working robots.
 
     Returns
     -------

@@ -131,7 +131,7 @@ class Ascent:
         return replace(self, trail=trail, mode=Mode.RETURN if trail else Mode.GRADIENT)
 
     def _leave_optimum(self, position: Array, time: float, value: float, max_boosts: int) -> Ascent:
-        """Leave a local optimum by a boost, or return to the previous optimum if that was better.
+        """Leave a local optimum with a boost, or return to the previous optimum if that was better.
 
         A robot that has had its maximum number of boosts stays.
         """

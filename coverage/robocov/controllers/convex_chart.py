@@ -68,6 +68,8 @@ class ConvexChart:
         corners = mesh.points[mesh.triangles]
         centers = corners.mean(axis=1)
         is_obstacle = ~shapely.contains_xy(self.configuration_space, centers)
+        # F maps each vertex to its image. The stiffer the triangles of an obstacle are, the smaller their
+        # images.
         self.images = _compute_harmonic_images(mesh, stiffness=np.where(is_obstacle, shrink, 1.0))
         image_corners = self.images[mesh.triangles]
         self._to_chart = _PiecewiseAffineMap.build(corners, image_corners)

@@ -271,7 +271,7 @@ class TangentBug(BaseController):
                 controller=self,
                 view=view,
                 position=position,
-                goal=state.get_goal(centroids[i]) - position,
+                goal_offset=state.get_goal(centroids[i]) - position,
                 obstacle_squares=obstacle_squares[i],
             )
             updated_states.append(navigator.update(state))
@@ -387,7 +387,7 @@ class Navigator:
     view: ObstacleView
     position: Array
     """(2,) m, position of the robot in the region."""
-    goal: Array
+    goal_offset: Array
     """(2,) m, its goal relative to its position."""
     obstacle_squares: Squares
     """Squares in which it has detected obstacle points."""
@@ -395,10 +395,10 @@ class Navigator:
     def update(self, state: NavigationState) -> NavigationState:
         """Return the navigation state after the scan.
 
-        In any mode, a robot moves straight to its goal once that is in view. Otherwise, the mode decides.
+        In any mode, a robot moves straight to its goal once it is in view. Otherwise, the mode decides.
         """
-        if self.view.contains(self.goal):
-            return self._head_for(state, Mode.GOAL, self.position + self.goal)
+        if self.view.contains(self.goal_offset):
+            return self._head_for(state, Mode.GOAL, self.position + self.goal_offset)
         if state.mode is Mode.BEST_POINT:
             return state
         if state.mode in (Mode.BOUNDARY, Mode.RETURN):
@@ -408,12 +408,12 @@ class Navigator:
                 return state
             state = self._finish_leaving(state)
         elif self._is_free_ahead():
-            return self._head_for(state, Mode.GOAL, self.position + self.goal)
+            return self._head_for(state, Mode.GOAL, self.position + self.goal_offset)
         return self._move_to_goal(state)
 
     def _is_free_ahead(self) -> bool:
         """Return whether the sensor sees no obstacle on the straight path to the goal."""
-        return self.view.compute_free_distance(self.goal) >= self.view.sensing_range - _ROUNDING_M
+        return self.view.compute_free_distance(self.goal_offset) >= self.view.sensing_range - _ROUNDING_M
 
     def _must_approach_waypoint(self, state: NavigationState) -> bool:
         """Return whether the waypoint is in view, and the robot has not yet reached it."""
@@ -437,13 +437,13 @@ class Navigator:
 
     def _move_to_goal(self, state: NavigationState) -> NavigationState:
         """Return the state of a robot that moves to the goal, past the obstacle that blocks the path."""
-        ends = self.view.find_contour_ends(self.goal, self.controller.jump)
-        remaining = {turn: math.dist(self.goal, end.point) for turn, end in ends.items()}
+        ends = self.view.find_contour_ends(self.goal_offset, self.controller.jump)
+        remaining = {turn: math.dist(self.goal_offset, end.point) for turn, end in ends.items()}
         path_lengths = {turn: math.hypot(*end.point) + remaining[turn] for turn, end in ends.items()}
         if state.turn in ends:
             # The robot does not alternate between two ends with about the same path length.
             path_lengths[state.turn] -= _MIN_IMPROVEMENT_M
-        goal_distance = math.hypot(*self.goal)
+        goal_distance = math.hypot(*self.goal_offset)
         approaching_turns = [turn for turn in ends if remaining[turn] < goal_distance]
         turn = min(approaching_turns or ends, key=path_lengths.__getitem__, default=state.turn)
         state = replace(state, turn=turn)
@@ -470,7 +470,7 @@ class Navigator:
             mode=Mode.BOUNDARY,
             passes_waypoint=True,
             attempts=attempts,
-            fixed_goal=FixedGoal(freeze(self.position + self.goal), best_point),
+            fixed_goal=FixedGoal(freeze(self.position + self.goal_offset), best_point),
             boundary=FollowedBoundary(position, position, length=0.0, max_length=max_length),
         )
         if self._is_goal_blocked() or max_length < _MIN_BOUNDARY_LENGTH_M:
@@ -481,14 +481,14 @@ class Navigator:
         """Return the length after which the robot gives up a boundary, m; shorter with each attempt."""
         if self.controller.detour is None:
             return math.inf
-        return self.controller.detour * math.hypot(*self.goal) * _MAX_LENGTH_DECAY**attempts
+        return self.controller.detour * math.hypot(*self.goal_offset) * _MAX_LENGTH_DECAY**attempts
 
     def _is_goal_blocked(self) -> bool:
         """Return whether the goal is in a known obstacle, or too close to one."""
         if not self.obstacle_squares:
             return False
         centers = (np.array(list(self.obstacle_squares)) + 0.5) * _SQUARE_SIDE_M
-        distance = np.hypot(*(self.goal - (centers - self.position)).T).min()
+        distance = np.hypot(*(self.goal_offset - (centers - self.position)).T).min()
         return bool(distance < self.view.clearance + _SQUARE_SIDE_M)
 
     def _follow_boundary(self, state: NavigationState) -> NavigationState:
@@ -497,7 +497,7 @@ class Navigator:
         assert state.fixed_goal is not None
         nearest_point = self.view.find_nearest_point()
         if nearest_point is None:
-            return self._head_for(state, Mode.GOAL, self.position + self.goal)
+            return self._head_for(state, Mode.GOAL, self.position + self.goal_offset)
         ends = self.view.find_contour_ends(nearest_point, self.controller.jump)
         # A closed contour has no end to move to.
         offset = ends[state.turn].point if state.turn in ends else np.zeros(2)
@@ -528,10 +528,10 @@ class Navigator:
         """Return the point in view nearest to the goal, (2,) m, if it is nearer than the best point."""
         directions = self.view.directions
         # On each ray, the point nearest to the goal.
-        depths = np.clip((directions * self.goal).sum(axis=1), 0.0, self.view.free_distances)
-        remaining = np.hypot(*(self.goal - depths[:, None] * directions).T)
+        depths = np.clip((directions * self.goal_offset).sum(axis=1), 0.0, self.view.free_distances)
+        remaining = np.hypot(*(self.goal_offset - depths[:, None] * directions).T)
         ray = int(remaining.argmin())
-        if remaining[ray] >= math.dist(self.position + self.goal, best_point) - _MIN_IMPROVEMENT_M:
+        if remaining[ray] >= math.dist(self.position + self.goal_offset, best_point) - _MIN_IMPROVEMENT_M:
             return None
         return np.asarray(self.position + depths[ray] * directions[ray])
 
@@ -549,7 +549,7 @@ class Navigator:
             best_so_far = state.fixed_goal.best_point - self.position
         contour = self.view.free_distances[rays, None] * self.view.directions[rays]
         points = np.vstack([best_so_far, contour])
-        nearest = np.hypot(*(self.goal - points).T).argmin()
+        nearest = np.hypot(*(self.goal_offset - points).T).argmin()
         return freeze(self.position + points[nearest])
 
     def _move_to_best_point(self, state: NavigationState, best_point: Array) -> NavigationState:

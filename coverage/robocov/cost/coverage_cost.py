@@ -254,16 +254,17 @@ class CoverageCost:
         return [self._build_result(teams[team], is_covered[team], paths, team) for team in range(team_count)]
 
     def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
-        """Find the paths to all sites from the robots of teams, whose positions are (r, n, 2) grid steps.
+        """Find the paths to all sites from the robots of each team, given their positions in grid steps.
 
-        `is_covered`, (r, c), says which components of the free space contain robots of each team. The search
-        uses an index of the walls around each robot. It is repeated with a larger index if this one is too
-        small.
+        The positions are an (r, n, 2) array. `is_covered`, (r, c), says which components of the free space
+        contain robots of each team. The search uses an index of the walls around each robot. If the index
+        proves too small, the search is repeated with a larger one.
         """
         team_count, robot_count, _ = grid_positions.shape
         paths = SitePaths.allocate(team_count, len(self.points))
         while True:
-            # `add_walls` keeps one entry per bin free for the wall that it adds.
+            # `add_walls` needs one free entry per bin before it adds a wall. The index has two, so that
+            # it is less often too small.
             max_entries = self._index_entries_per_robot * robot_count + 2 * SOURCE_BINS
             search = Search.allocate(
                 wall_index=AngularWallIndex.allocate(robot_count, SOURCE_BINS, max_entries),

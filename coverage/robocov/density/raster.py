@@ -183,7 +183,7 @@ class Raster(Density):
         return np.asarray(constants + slopes_x * xi + (slopes_y + twists * xi) * eta)
 
     def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Compute mass, first moments and polar moment of each cell exactly.
+        """Compute the exact mass, first moments and polar moment of each cell.
 
         Parameters
         ----------
@@ -209,15 +209,20 @@ class Raster(Density):
         step_x, step_y = grid.step
         integrals = integrals * (step_x * step_y)
         mass = integrals[:, _ONE]
-        x = integrals[:, _U] * step_x
-        y = integrals[:, _V] * step_y
-        xx = integrals[:, _UU] * (step_x * step_x)
-        yy = integrals[:, _VV] * (step_y * step_y)
+        first_x = integrals[:, _U] * step_x
+        first_y = integrals[:, _V] * step_y
+        second_x = integrals[:, _UU] * (step_x * step_x)
+        second_y = integrals[:, _VV] * (step_y * step_y)
         # Convert moments about the origin of the grid to moments about the origins of the cells. If the
-        # origin of a cell is at the offset a, the integral of (x - a)² is that of x² - a (2 x - a).
+        # origin of a cell is at the offset a, ∫ φ (x - a)² = ∫ φ x² - a (2 ∫ φ x - a ∫ φ).
         offset_x, offset_y = offsets.T
-        polar = xx - offset_x * (2.0 * x - offset_x * mass) + yy - offset_y * (2.0 * y - offset_y * mass)
-        return np.column_stack([mass, x - offset_x * mass, y - offset_y * mass, polar])
+        polar = (
+            second_x
+            - offset_x * (2.0 * first_x - offset_x * mass)
+            + second_y
+            - offset_y * (2.0 * first_y - offset_y * mass)
+        )
+        return np.column_stack([mass, first_x - offset_x * mass, first_y - offset_y * mass, polar])
 
 
 def sample_density(density: Density | None, extent: Iterable[float], columns: int, rows: int) -> Raster:
@@ -288,14 +293,14 @@ class _Edge(NamedTuple):
 def _build_grid(raster: Raster) -> _Grid:
     """Build the grid of a raster.
 
-    With the interpolation "cells", the squares of the grid are the pixels, and the density is constant in
+    With "cells" interpolation, the squares of the grid are the pixels, and the density is constant in
     each. With "bilinear", the corners of each square are the centers of four pixels.
     """
     values = raster.values
     origin = np.array(raster.extent[:2])
     step = (np.array(raster.extent[2:]) - origin) / values.shape[::-1]
     if raster.interpolation == "bilinear":
-        # Around the image, the border pixels are repeated.
+        # The border pixels are repeated around the image.
         padded = np.pad(values, 1, mode="edge")
         lower_left = padded[:-1, :-1]
         lower_right = padded[:-1, 1:]

@@ -116,7 +116,7 @@ def add_random_points(rng: np.random.Generator, area: BaseGeometry, max_count: i
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the candidates.
+        Random number generator.
     area : geometry, m
         Area that contains the points.
     max_count : int
@@ -172,7 +172,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, s
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the positions and orientations.
+        Random number generator.
     area : geometry, m
         Area that contains the points.
     max_count : int
@@ -224,7 +224,7 @@ def choose_points(rng: np.random.Generator, points: Array, count: int) -> Array:
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the choice.
+        Random number generator.
     points : (k, 2) array, m
         Points to choose from.
     count : int

@@ -102,7 +102,7 @@ def build_town(
     corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
-        Source of the streets and of the shapes of corners.
+        Random number generator.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def divide_into_cells(request: MapRequest, rng: np.random.Generator) -> list[Cel
     request : MapRequest
         Parameters of the map.
     rng : numpy.random.Generator
-        Source of the positions and directions of the streets.
+        Random number generator.
 
     Returns
     -------

@@ -81,7 +81,7 @@ def build_cave(
     corner_disc : DiscStart
         Disc that stays free.
     rng : numpy.random.Generator
-        Source of the random field and of the bends of tunnels.
+        Random number generator.
 
     Returns
     -------
@@ -276,7 +276,7 @@ def draw_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[Ar
     request : MapRequest
         Parameters of the map.
     rng : numpy.random.Generator
-        Source of the waves.
+        Random number generator.
 
     Returns
     -------
@@ -362,7 +362,7 @@ def build_tunnels(components: Array, rng: np.random.Generator) -> list[LineStrin
     components : array of geometries
         Separate parts of the core.
     rng : numpy.random.Generator
-        Source of the bends of the tunnels.
+        Random number generator.
 
     Returns
     -------

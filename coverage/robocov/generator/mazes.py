@@ -26,7 +26,7 @@ from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE, MapRequest
 Post: TypeAlias = tuple[int, int]
 """Indices of the vertical and of the horizontal line that cross at a post."""
 GridShape: TypeAlias = tuple[int, int]
-"""Number of columns and of rows."""
+"""Number of columns and rows."""
 
 _VERTICAL = 0
 _HORIZONTAL = 1
@@ -65,7 +65,7 @@ def build_maze(
     corner_disc : DiscStart
         Disc that stays free of walls.
     rng : numpy.random.Generator
-        Source of the passages.
+        Random number generator.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def find_inner_walls(shape: GridShape) -> BoolArray:
     Parameters
     ----------
     shape : pair of int
-        Number of columns and of rows.
+        Number of columns and rows.
 
     Returns
     -------
@@ -264,9 +264,9 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
     Parameters
     ----------
     shape : pair of int
-        Number of columns and of rows.
+        Number of columns and rows.
     rng : numpy.random.Generator
-        Source of the passages.
+        Random number generator.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def grow_passages(shape: GridShape, rng: np.random.Generator) -> BoolArray:
             active.pop(index)
             continue
         neighbor = unreached_neighbors[int(rng.integers(len(unreached_neighbors)))]
-        # The wall between two cells starts at the lower left post of the right or upper one.
+        # The wall between two cells starts at the lower left post of the right or upper cell.
         post = max((column, row), neighbor)
         direction = _HORIZONTAL if neighbor[0] == column else _VERTICAL
         passages[post[0], post[1], direction] = True

@@ -61,7 +61,7 @@ def scatter_polygons(
     corner_disc : DiscStart
         Disc that stays free of obstacles.
     rng : numpy.random.Generator
-        Source of the shapes and positions.
+        Random number generator.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the shape and direction.
+        Random number generator.
     area : float, m²
         Area of the polygon.
 
@@ -199,7 +199,7 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the dimensions and direction.
+        Random number generator.
     area : float, m²
         Area of the L.
 
@@ -231,7 +231,7 @@ def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> A
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of the dimensions and direction.
+        Random number generator.
     area : float, m²
         Area of the U.
     min_opening : float, m

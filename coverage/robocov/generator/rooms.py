@@ -261,7 +261,7 @@ def build_building(
     corner_disc : DiscStart
         Disc that stays free of furniture.
     rng : numpy.random.Generator
-        Source of the walls, doors and furniture.
+        Random number generator.
 
     Returns
     -------
@@ -310,7 +310,7 @@ def draw_floor_plan(request: MapRequest, wall_thickness: float, rng: np.random.G
     wall_thickness : float, m
         Thickness of the walls.
     rng : numpy.random.Generator
-        Source of the walls and doors.
+        Random number generator.
 
     Returns
     -------

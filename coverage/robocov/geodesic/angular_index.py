@@ -77,8 +77,8 @@ _FULL_TURN = 4.0
 _MIN_LENGTH = 1e-300
 """Smallest length used as a divisor, which prevents division by zero."""
 
-_MUST_CHECK_SECTORS = -1.0
-"""Squared clear distance in all bins of a source at a vertex. No squared distance is below it."""
+_SOURCE_AT_VERTEX = -1.0
+"""Used in place of the squared clear distances of a source at a vertex. No squared distance is below it."""
 
 
 class AngularWallIndex(NamedTuple):
@@ -93,7 +93,7 @@ class AngularWallIndex(NamedTuple):
     """(n,) Squares of the distances up to which the walls around each source are in the index."""
     squared_clear_distances: Array
     """(n, bins) Squares of the distances up to which no point is hidden by a wall. If the source is at a
-    vertex, they are `_MUST_CHECK_SECTORS`."""
+    vertex, they are `_SOURCE_AT_VERTEX`."""
     squared_horizons: Array
     """(n, bins) Squares of the distances beyond which every point is hidden."""
     heads: IntArray
@@ -293,7 +293,7 @@ def add_walls(
     # At a vertex, some directions lead into the obstacle. This value makes `is_visible` check the direction.
     if find_vertex(walls.vertices, x, y) != NO_VERTEX:
         for k in range(bin_count):
-            index.squared_clear_distances[source, k] = _MUST_CHECK_SECTORS
+            index.squared_clear_distances[source, k] = _SOURCE_AT_VERTEX
     return entry_count
 
 
@@ -512,7 +512,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     source : int
         Row of the source in the index.
     x, y : float, grid steps
-        The point.
+        Coordinates of the point.
 
     Returns
     -------
@@ -543,7 +543,7 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
     source : int
         Row of the source in the index.
     x, y : float, grid steps
-        The point.
+        Coordinates of the point.
 
     Returns
     -------
@@ -564,15 +564,15 @@ def _is_visible_past_walls(
     """Return whether a source sees the point at offset (dx, dy), by testing every wall in angular bin k."""
     x = index.positions[source, 0]
     y = index.positions[source, 1]
-    if index.squared_clear_distances[source, k] == _MUST_CHECK_SECTORS:
+    if index.squared_clear_distances[source, k] == _SOURCE_AT_VERTEX:
         # The source is at a vertex, where some directions lead into the obstacle.
         vertex = find_vertex(walls.vertices, x, y)
         if not contains_direction(walls, vertex, dx, dy):
             return False
     if dx * dx + dy * dy > index.squared_ranges[source]:
-        # Walls that are as far away as the point may be missing in the index.
+        # Walls that are as far away as the point may be missing from the index.
         return _is_segment_free(walls, x, y, dx, dy)
-    # The walls of a bin are a linked list, from the last entry to the first one.
+    # The walls of a bin are a linked list, from the last entry to the first.
     entry = index.heads[source, k]
     while entry != NO_ENTRY:
         if _hides(walls.ends, index.entry_walls[entry], x, y, dx, dy):

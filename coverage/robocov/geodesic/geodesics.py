@@ -214,7 +214,8 @@ class Geodesics:
             The result of `compute`.
         """
         while True:
-            # `add_walls` keeps one entry per bin free for the wall that it adds.
+            # `add_walls` needs one free entry per bin before it adds a wall. The index has two, so that
+            # it is less often too small.
             max_entries = self._entries_per_source[bin_count] * source_count + 2 * bin_count
             result = compute(AngularWallIndex.allocate(source_count, bin_count, max_entries))
             if result is not None:

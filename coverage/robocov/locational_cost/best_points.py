@@ -333,8 +333,8 @@ def _compute_newton_step(
 ) -> tuple[float, float]:
     """Return the Newton step -H⁻¹ g for the gradient g and the Hessian H, shortened to at most `max_length`.
 
-    If H is not positive definite, or almost singular, this step would not lead toward a minimum, and another
-    one, which certainly descends, is returned.
+    If H is not positive definite, or is nearly singular, this step might not lead toward a minimum. A step
+    that certainly descends is then returned instead.
     """
     trace = xx + yy
     determinant = xx * yy - xy * xy

@@ -351,7 +351,7 @@ def _subtract_arctan(x: float) -> float:
 def _sum_edge_costs(
     starts: Array, ends: Array, cells: IntArray, points: Array, kind: int, height: float, rule: Array
 ) -> Array:
-    """Return the cost of each cell: the sum of the integrals of f over the triangles between point and edges.
+    """Return the cost of each cell: the sum of the integrals of f over triangles from the point to the edges.
 
     An edge is at the distance d from the point, and s runs along it from s1 to s2, so that r² = s² + d². Let
     F(r) be the integral of f(ρ) ρ dρ from 0 to r. The integral over the triangle is then d ∫ F(r)/r² ds. It
@@ -365,11 +365,11 @@ def _sum_edge_costs(
         s1 = edge.start
         s2 = s1 + edge.length
         if kind == SQUARED_DISTANCE:
-            # F(r)/r² = r²/4.
-            square = 3.0 * d * d + s1 * s1 + s1 * s2 + s2 * s2
-            sums[i] += d * edge.length * square / 12.0
+            # F(r)/r² = r²/4, and the mean of r² along the edge is d² + (s1² + s1 s2 + s2²) / 3.
+            triple_mean = 3.0 * d * d + s1 * s1 + s1 * s2 + s2 * s2
+            sums[i] += d * edge.length * triple_mean / 12.0
         elif kind == DISTANCE:
-            # F(r)/r² = r/3.
+            # F(r)/r² = r/3, and ∫ r ds = (s2 r2 - s1 r1 + d² ∫ 1/r ds) / 2.
             r1 = np.sqrt(d * d + s1 * s1)
             r2 = np.sqrt(d * d + s2 * s2)
             inverse_integral = _integrate_inverse(d, s1, s2)

@@ -71,7 +71,7 @@ def check_rules(environment: Environment, source_name: str) -> None:
 
 
 def _find_ring_issues(path: JsonPath, ring: Ring) -> Iterator[Issue]:
-    """Yield the issue with a closed ring of at least 3 points."""
+    """Yield the first issue, if any, with a closed ring of at least 3 points."""
     points = np.asarray(ring, dtype=float)
     extent = np.ptp(points, axis=0)
     size = f"{extent[0]:g} x {extent[1]:g} m"

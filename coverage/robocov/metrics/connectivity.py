@@ -62,8 +62,7 @@ def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
     component_count, _ = connected_components(adjacency, directed=False)
     if n == 1 or component_count > 1:
         return Connectivity(int(component_count), 0.0)
-    # The Laplacian has the number of neighbors of each robot on its diagonal, and -1 for each pair of
-    # neighbors.
+    # The Laplacian has the degree of each robot on its diagonal, and -1 for each pair of linked robots.
     laplacian = np.diag(np.bincount(robots).astype(float))
     laplacian[robots, linked_robots] = -1.0
     second_eigenvalue = float(np.linalg.eigvalsh(laplacian)[1])

@@ -63,8 +63,8 @@ def find_settling_time(
     Returns
     -------
     float or None
-        Earliest time, s, from which on the team is at rest in every window that starts at this time or later.
-        None if the team was still moving at the end.
+        Earliest time, s, such that the team is at rest in every window that starts then or later. None
+        if the team was still moving at the end.
 
     See Also
     --------
@@ -72,7 +72,7 @@ def find_settling_time(
 
     Notes
     -----
-    Speed is not a suitable criterion, because a robot may tremble in the same place forever.
+    Speed is not a suitable criterion, because a robot may jitter in place forever.
 
     Examples
     --------

@@ -353,11 +353,11 @@ class _Search:
         cost = self.cost
         block_side = max(1, math.ceil(math.sqrt(np.count_nonzero(is_covered) / _MAX_GROUPS)))
         rows, columns = np.divmod(cost.cells, cost.lattice)
-        # The number of a group is composed of the number of its block and of its component.
+        # The number of a group combines the numbers of its block and its component.
         blocks = rows // block_side * cost.lattice + columns // block_side
         groups = blocks * len(self.space.components) + site_components
         # A group is represented by the site nearest to the middle of its block. Ties, such as between all
-        # cells of a two by two block, are broken at random.
+        # cells of a two-by-two block, are broken at random.
         row_offsets = _compute_offsets(rows, block_side)
         column_offsets = _compute_offsets(columns, block_side)
         squared_offsets = row_offsets**2 + column_offsets**2

@@ -289,7 +289,7 @@ def compute_distances(
 def _add_sources(
     sources: IntArray, offsets: Array, distance: Array, front: IntArray, is_in_front: BoolArray
 ) -> int:
-    """Set the distances of the sources, in m, and add them to an empty front; return their number.
+    """Set the distances of the sources, in m, and add them to an empty front; return the number added.
 
     The last three arrays are changed in place. A source that is given several times is added once.
     """

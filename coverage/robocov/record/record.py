@@ -407,7 +407,7 @@ class Record(Drawable):
     def load(cls, folder: Path | str) -> Record:
         """Load a record that was written by `save`.
 
-        Of the controller, only the name and the gains are loaded. No code is executed.
+        Only the controller's name and gains are loaded. No code is executed.
 
         Parameters
         ----------
@@ -421,9 +421,10 @@ class Record(Drawable):
         Raises
         ------
         InputError
-            If this is not the folder of a run, or a file in it cannot be used.
+            If this is not the folder of a run, or if a file in it cannot be used.
         """
         folder = Path(folder)
+        # If `save` was interrupted while it replaced files, the replacement is completed first.
         complete_commit(folder)
         for file in (RUN_FILE, RECORD_FILE):
             if not (folder / file).is_file():

@@ -221,7 +221,7 @@ class Scenario:
         check_joins(self.environment, self.conditions)
 
     def replace(self, **changes: Any) -> Scenario:
-        """Return the scenario with other values of some parameters.
+        """Return a copy of the scenario with some parameters changed.
 
         Parameters
         ----------

@@ -437,14 +437,14 @@ class Simulation:
         -------
         Simulation
         """
-        twin = copy(self)
-        twin._world = self._world.copy()
-        twin.memory = deepcopy(self.memory)
+        duplicate = copy(self)
+        duplicate._world = self._world.copy()
+        duplicate.memory = deepcopy(self.memory)
         if self._has_changing_obstacles:
-            twin.sensor = self.sensor.copy()
+            duplicate.sensor = self.sensor.copy()
         # The snapshot contains the memory for the next step, which the two must not share.
-        twin._start_step()
-        return twin
+        duplicate._start_step()
+        return duplicate
 
     def __getstate__(self) -> dict[str, Any]:
         # The observations and the decision of this step are computed again on demand.
@@ -466,10 +466,10 @@ class Simulation:
         -------
         Simulation
         """
-        twin = self.copy()
-        twin.environment = environment
-        twin._controller_caller = ControllerCaller(self.controller, environment.static, self.time)
-        return twin
+        changed = self.copy()
+        changed.environment = environment
+        changed._controller_caller = ControllerCaller(self.controller, environment.static, self.time)
+        return changed
 
     def with_memory(self, memory: Any, inbox: Inbox | None = None) -> Simulation:
         """Return a simulation in the same state, but with another memory.
@@ -485,11 +485,11 @@ class Simulation:
         -------
         Simulation
         """
-        twin = self.copy()
-        twin.memory = deepcopy(memory)
+        changed = self.copy()
+        changed.memory = deepcopy(memory)
         if inbox is not None:
-            twin.inbox = inbox
-        return twin
+            changed.inbox = inbox
+        return changed
 
     def with_changes(
         self,
@@ -502,7 +502,7 @@ class Simulation:
         steering: Array | None = None,
         conditions: Conditions | None = None,
     ) -> Simulation:
-        """Return a simulation that continues from the current state with changes; this one is not affected.
+        """Return a changed copy of the simulation, which continues from the current state.
 
         The memory of the robots and the controller messages are dropped if the controller or the number of
         robots changes. All messages are dropped if the conditions or the number of robots change.
@@ -521,7 +521,7 @@ class Simulation:
         Raises
         ------
         StartError
-            If a robot is in a wall or in another robot, by more than contacts allow.
+            If a robot overlaps a wall or another robot by more than contacts allow.
         ParameterError
             If team and positions differ in size.
         """
@@ -534,7 +534,7 @@ class Simulation:
             steering=steering,
             steps=self._steps,
         )
-        twin = Simulation(
+        changed = Simulation(
             self.environment if environment is None else environment,
             self.controller if controller is None else controller,
             state,
@@ -542,25 +542,27 @@ class Simulation:
             self.dt,
             conditions=self.conditions if conditions is None else conditions,
         )
-        twin.joined = self.joined
-        twin.sent_bytes = self.sent_bytes
+        changed.joined = self.joined
+        changed.sent_bytes = self.sent_bytes
         if len(new_team) == len(self.team):
             self._copy_knowledge_to(
-                twin, copy_messages=conditions is None, has_same_controller=controller is None
+                changed, copy_messages=conditions is None, has_same_controller=controller is None
             )
-        return twin
+        return changed
 
-    def _copy_knowledge_to(self, twin: Simulation, *, copy_messages: bool, has_same_controller: bool) -> None:
+    def _copy_knowledge_to(
+        self, target: Simulation, *, copy_messages: bool, has_same_controller: bool
+    ) -> None:
         """Copy the memory and the messages to a simulation of the same robots, unless they are invalid there.
 
         Another controller would understand neither the memory nor the controller messages of this one.
         """
         if copy_messages:
-            twin.inbox = self.inbox
+            target.inbox = self.inbox
         if has_same_controller:
-            twin.memory = deepcopy(self.memory)
-        elif twin.inbox is not None:
-            twin.inbox = twin.inbox.drop_messages()
+            target.memory = deepcopy(self.memory)
+        elif target.inbox is not None:
+            target.inbox = target.inbox.drop_messages()
 
 
 def _check_robots_fit(

@@ -130,7 +130,7 @@ def trace_boundaries(
     """Find the pieces of the boundaries of all cells.
 
     If only the region and the neighbors of the same speed bounded it, a cell would be a convex polygon. The
-    edges of this polygon are given. The circles of Apollonius between robots of different speeds cut areas
+    edges of this polygon are given. The circles of Apollonius between robots of different speeds cut parts
     off it. The sections of each edge and of each circle that are on the cell's side of all other curves are
     divided into pieces.
 
@@ -146,7 +146,7 @@ def trace_boundaries(
         Edges of the polygons, sorted by cell. For the columns, see the constants `EDGE_...` of
         `robocov.voronoi.clipping`.
     is_straight : (n,) bool array
-        Result: whether each cell is bounded by these edges alone.
+        Output: whether each cell is bounded by these edges alone.
 
     Returns
     -------
@@ -169,8 +169,9 @@ def trace_boundaries(
             continue
         line_count = len(own_edges)
         curves = np.empty((line_count + len(own_pairs), _CURVE_COLUMNS))
+        # The lines are counted here, but written only if there are circles. Without circles, the cell is the
+        # polygon that the edges bound.
         curve_count = _write_circles(curves, own_pairs, own_edges)
-        # Without circles, the cell is the polygon that the edges bound.
         is_straight[i] = curve_count == line_count
         if is_straight[i]:
             pieces = _reserve(pieces, piece_count, line_count)
@@ -365,8 +366,8 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
     leaves the cell's side of curve j; nan if the curves do not intersect. A curve that is nowhere on the
     cell's side of another one does not bound the cell, and its interval of t becomes empty.
 
-    The first `line_count` curves are the edges of a convex polygon. They meet only at their ends, so that no
-    two of them need to be intersected.
+    The first `line_count` curves are the edges of a convex polygon. They meet only at their ends, so no two
+    of them need to be intersected.
     """
     curve_count = len(curves)
     for first in range(curve_count):
@@ -387,7 +388,7 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
             crossings[first, second, _ENTER] = enter
             crossings[first, second, _LEAVE] = leave
             # The second curve crosses the first one at the same two points. Both curves have the cell on
-            # their left, so that one enters where the other one leaves.
+            # their left, so one enters where the other leaves. Without crossings, all these values are nan.
             leave_x, leave_y = _evaluate(curves[first], leave)
             enter_x, enter_y = _evaluate(curves[first], enter)
             crossings[second, first, _ENTER] = _find_parameter(curves[second], leave_x, leave_y)

@@ -10,7 +10,7 @@ from robocov.compiled import kernel
 def find_own_samples(
     samples: Array, positions: Array, robots: IntArray, neighbor_positions: Array
 ) -> BoolArray:
-    """Find the samples in the cell of each robot: those to which no neighbor is nearer than the robot.
+    """Find the samples in the cell of each robot: those at least as close to it as to any neighbor.
 
     Parameters
     ----------

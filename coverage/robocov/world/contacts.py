@@ -181,7 +181,7 @@ class ContactSolver:
         max_speed: Array,
         dt: float,
     ) -> Array:
-        """Move some robots in a step, with contacts.
+        """Move some robots by one step, and resolve their contacts.
 
         Parameters
         ----------
@@ -228,7 +228,8 @@ class ContactSolver:
             for row, (vx, vy) in enumerate(final_states[:, 2:].tolist()):
                 final_states[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
             self._apply_pending_corrections(bodies_and_discs, substep)
-            # The corrections changed the positions. The velocities are those from before the corrections.
+            self._arrays.read_states()
+            # The corrections changed the positions. The velocities stay those from before the corrections.
             final_states[:, :2] = self._arrays.states[rows, :2]
             return final_states
         finally:
@@ -254,14 +255,13 @@ class ContactSolver:
         return min(_MAX_SUBSTEPS, max(1, math.ceil(speed * dt / self._max_travel)))
 
     def _apply_pending_corrections(self, bodies_and_discs: list[BodyAndDisc], dt: float) -> None:
-        """Apply the overlap corrections that pymunk has computed but not yet applied, and read the states.
+        """Apply the overlap corrections that pymunk has computed but not yet applied.
 
         Pymunk applies them in the next substep, which here is one at rest.
         """
         self._arrays.states[:, 2:] = 0.0
         self._arrays.write_states()
         self._run_substep(bodies_and_discs, dt)
-        self._arrays.read_states()
 
     def _run_substep(self, bodies_and_discs: list[BodyAndDisc], dt: float) -> None:
         """Run a substep, and move robots that a moving obstacle has pushed into a wall out of the wall."""

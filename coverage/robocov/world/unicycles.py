@@ -328,7 +328,9 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 def remove_sideways_velocity(
     velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
 ) -> Array:
-    """Remove the velocity of unicycles that a contact has caused and that wheels do not allow.
+    """Remove from unicycles the velocity after a contact that their wheels do not allow.
+
+    A unicycle keeps its forward velocity, up to its maximum speed. Sideways and backward velocity is removed.
 
     Parameters
     ----------
@@ -339,7 +341,7 @@ def remove_sideways_velocity(
     max_speed : (n,) array, m/s
         Maximum forward speed.
     is_rolling : (n,) bool array
-        Whether wheels move each robot. All other robots keep their velocity.
+        Whether each robot is moved by wheels. All other robots keep their velocity.
 
     Returns
     -------

@@ -29,7 +29,7 @@ from robocov.controllers.exploration.localization import (
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.exploration.scan_exchange import ScanExchange
 from robocov.controllers.exploration.shared_map import build_unknown_map
-from robocov.controllers.exploration.staggering import compute_fraction
+from robocov.controllers.exploration.staggering import compute_stagger_fraction
 from robocov.controllers.exploration.team_goals import Cooperation, compute_team_goals
 from robocov.controllers.exploration.team_knowledge import (
     MAX_PLANNING_GROUP,
@@ -207,7 +207,7 @@ class Atlas(BaseController):
         for robot in range(len(team)):
             delay = 0.0
             if self.is_staggered:
-                delay = self.period * _STAGGERING * compute_fraction(robot)
+                delay = self.period * _STAGGERING * compute_stagger_fraction(robot)
             states.append(PlannerState(unknown_map, next_plan_time=delay, knowledge=no_knowledge))
         return AtlasMemory(
             team=team,
@@ -372,7 +372,7 @@ class Atlas(BaseController):
         if previous.basis is None and self.is_staggered:
             # The times from the first plan to the second differ, so that robots keep planning at different
             # times.
-            period = period * (1.0 + compute_fraction(robot + 1))
+            period = period * (1.0 + compute_stagger_fraction(robot + 1))
         return period
 
     def _choose_cooperation(

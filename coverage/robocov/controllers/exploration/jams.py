@@ -8,7 +8,7 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.exploration.atlas_memory import JamState
-from robocov.controllers.exploration.staggering import compute_fraction
+from robocov.controllers.exploration.staggering import compute_stagger_fraction
 
 _MAX_STUCK_PLANS = 3
 """Number of consecutive plans after which a stuck robot is in a jam."""
@@ -21,7 +21,7 @@ _MAX_EVASION_S = 8.0
 def plan_evasion(
     jam: JamState, positions: Array, *, is_stuck: bool, time: float, robot: int
 ) -> tuple[JamState, Array | None]:
-    """Decide whether a robot moves out of a jam, and where to.
+    """Decide whether a robot moves out of a jam and, if so, where to.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def plan_evasion(
     stuck_plans = jam.stuck_plans + 1 if is_stuck else 0
     jam = replace(jam, stuck_plans=stuck_plans)
     if stuck_plans >= _MAX_STUCK_PLANS:
-        # Robots move away for different times, so that they do not all return at once.
-        duration = _MAX_EVASION_S * compute_fraction(robot + time)
+        # Robots move away for different lengths of time, so that they do not all return at once.
+        duration = _MAX_EVASION_S * compute_stagger_fraction(robot + time)
         jam = JamState(stuck_plans=0, evasion_end=time + duration)
     position = positions[0]
     is_in_jam = ((positions - position) ** 2).sum(axis=1) < _JAM_RADIUS_M**2

@@ -121,7 +121,7 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
 
     Notes
     -----
-    A robot integrates its own velocity, and corrects the result by the residuals of its position fixes,
+    A robot integrates its own velocity, and corrects the result using the residuals of its position fixes,
     averaged over two seconds. It tracks others from their messages by alpha-beta filters with the
     steady-state gains of Kalata (1984, *The tracking index*), and with larger gains for the first messages.
     It assumes that the messages are as noisy as its own fixes, and that the others keep their velocities for

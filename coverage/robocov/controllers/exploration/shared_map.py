@@ -308,12 +308,14 @@ class SharedMapController(BaseController):
         )
 
     def _plan_routes(self, seen: Observations, memory: SharedMapMemory) -> SharedMapMemory:
-        """Return the memory with new plans, and the routes of all robots to their goals."""
+        """Return the memory with new plans and with the routes of all robots to their goals."""
         plans = self._make_plans(seen, memory)
         routes = []
         for robot, plan in enumerate(plans):
-            goal = plan.placement.goals[np.searchsorted(plan.group.robots, robot)]
-            routes.append(plan.planner.find_route(seen.positions[robot], goal))
+            # A plan has a goal for each robot of its group, whose indices are in ascending order.
+            own_row = np.searchsorted(plan.group.robots, robot)
+            own_goal = plan.placement.goals[own_row]
+            routes.append(plan.planner.find_route(seen.positions[robot], own_goal))
         return replace(
             memory,
             plans=plans,

@@ -95,18 +95,20 @@ def list_others(teammates: Teammates, position: Array, time: float, *, plans_for
     ----------
     teammates : Teammates
     position : (2,) array, m
-        Position of the robot itself.
+        Position of the robot.
     time : float, s
     plans_for_all : bool
         If true, the robot plans for all others. Otherwise, it plans for the nearest ones, at most
-        `MAX_PLANNING_GROUP` robots together with itself.
+        `MAX_PLANNING_GROUP` robots including itself.
 
     Returns
     -------
     OtherRobots
     """
-    is_fixed = (time - teammates.rest_times >= MIN_REST_S) | (teammates.heard_times < time)
-    is_quiet = bool(is_fixed.all())
+    is_at_rest = time - teammates.rest_times >= MIN_REST_S
+    # A robot out of contact is assumed to have reached its goal, and to rest there.
+    is_out_of_contact = teammates.heard_times < time
+    is_fixed = is_at_rest | is_out_of_contact
     is_outside_group = np.full(len(teammates.robots), not plans_for_all)
     squared_distances = ((teammates.positions - position) ** 2).sum(axis=1)
     nearest = np.argsort(squared_distances, kind="stable")[: MAX_PLANNING_GROUP - 1]
@@ -116,7 +118,7 @@ def list_others(teammates: Teammates, position: Array, time: float, *, plans_for
         robots=teammates.robots[order],
         positions=teammates.positions[order],
         is_fixed=(is_fixed | is_outside_group)[order],
-        is_quiet=is_quiet,
+        is_quiet=bool(is_fixed.all()),
     )
 
 
