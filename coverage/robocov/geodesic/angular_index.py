@@ -34,7 +34,7 @@ from robocov.geodesic.box_tree import (
     is_leaf,
     skip_subtree,
 )
-from robocov.geodesic.grid import cross
+from robocov.geodesic.integer_grid import cross
 from robocov.geodesic.walls import (
     END_X,
     END_Y,

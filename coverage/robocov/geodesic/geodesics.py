@@ -24,7 +24,7 @@ from robocov.geodesic.corner_graph import (
     find_visible_corners,
     relax_paths,
 )
-from robocov.geodesic.grid import Grid
+from robocov.geodesic.integer_grid import Grid
 from robocov.geodesic.walls import Walls, build_walls, count_windings
 
 _Result = TypeVar("_Result")

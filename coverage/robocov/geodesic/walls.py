@@ -26,7 +26,7 @@ from robocov.geodesic.box_tree import (
     is_leaf,
     skip_subtree,
 )
-from robocov.geodesic.grid import GRID_BITS, compute_crosses, cross
+from robocov.geodesic.integer_grid import GRID_BITS, compute_crosses, cross
 
 START_X = 0
 """Column of `Walls.ends`: x of the start of a wall."""

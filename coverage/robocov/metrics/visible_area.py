@@ -25,7 +25,7 @@ from robocov.geodesic.angular_index import (
     find_bin,
     index_walls,
 )
-from robocov.geodesic.grid import Grid
+from robocov.geodesic.integer_grid import Grid
 from robocov.geodesic.walls import END_X, END_Y, NO_WALL, START_X, START_Y, Walls, build_walls
 
 _BIN_COUNT = 512

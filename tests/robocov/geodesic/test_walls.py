@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.environment import Environment, PolygonObstacle
-from robocov.geodesic.grid import Grid, cross
+from robocov.geodesic.integer_grid import Grid, cross
 from robocov.geodesic.walls import build_walls, can_bend_at_corner, count_windings, find_vertex
 
 SIZE = 8.0

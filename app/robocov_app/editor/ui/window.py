@@ -25,9 +25,9 @@ from robocov_app.editor.ui.map_facts import list_status
 from robocov_app.editor.ui.panel import EditorPanel, find_object_kind
 from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
-from robocov_app.editor.ui.tool_text import edit_typed_value
 from robocov_app.editor.ui.top_bar import EditorTopBar
 from robocov_app.editor.ui.typed_commands import list_typed_commands
+from robocov_app.editor.ui.typed_values import edit_typed_value
 from robocov_app.look.theme import get_theme
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.commands.command import CommandTable
