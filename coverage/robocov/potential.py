@@ -9,6 +9,9 @@ Three cases that the paper leaves open are decided as follows:
 - *Saturation*: the force (27) grows with the third power of the distance, without bound, and would push
   robots against the repulsion of walls and through them. Its magnitude is therefore limited. Where the limit
   applies, the potential is linear in the distance.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from typing import NamedTuple

@@ -1,4 +1,8 @@
-"""The team: the size, limits and ranges of each robot."""
+"""The team: the size, limits and ranges of each robot.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

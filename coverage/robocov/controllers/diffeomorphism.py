@@ -35,12 +35,12 @@ class DiffeomorphismMemory:
     """Memory of the last plan."""
 
     team: Team
-    centroids: Array | None = None
-    """(n, 2) m, centroids of the cells in the chart."""
+    chart_centroids: Array | None = None
+    """(n, 2) m, centroids of the cells in the chart; None before the first plan."""
     goals: Array | None = None
-    """(n, 2) m, the same points in the map."""
+    """(n, 2) m, the same points in the map; None before the first plan."""
     plan_time: float = -np.inf
-    """s"""
+    """Time of the last plan, s."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,17 @@ class Diffeomorphism(WholeMapController):
 
     Notes
     -----
-    The motion minimizes the cost of the images: its distances are those in the chart, not path lengths in the
-    map. A room at the end of a long corridor is small in the chart, and barely attracts robots.
+    The controller minimizes the coverage cost in the chart. Distances there differ from path lengths in the
+    map: a room at the end of a long corridor is small in the chart, and barely attracts robots.
 
     Any diffeomorphism can be used; this one is a `ConvexChart`. For a `shrink` of 1, or without obstacles, it
     is the identity, and the controller is `Lloyd`.
 
-    Obstacles are enlarged by the radius of the robot and `clearance`; the image of a robot within that margin
-    is the image of the nearest point outside. Robots avoid collisions by slowing down. Cells are sampled by
-    the triangles of the mesh, and computed every `period` seconds, for each robot from the positions of the
-    robots within communication range. The chart includes unreachable rooms, but no moving obstacles.
+    Obstacles are enlarged by the radius of the largest robot and `clearance`. A robot in this margin is
+    mapped to where F maps the nearest point outside. Robots avoid collisions by slowing down. Cells are
+    sampled by the triangles of the mesh, and computed every `period` seconds, for each robot from the
+    positions of the robots within communication range. The chart includes unreachable rooms, but no moving
+    obstacles.
 
     The implementation is based on general knowledge, not on the full texts of the two papers ("A coverage
     algorithm for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA
@@ -95,16 +96,21 @@ class Diffeomorphism(WholeMapController):
         """Compute the forces that drive each robot straight, in the chart, to the centroid of its cell."""
         team = memory.team
         chart = self._get_chart(team)
-        images, jacobians = chart.map_to_chart(seen.positions)
-        centroids = memory.centroids
-        if centroids is None or is_plan_due(memory.plan_time, self.period, seen.time):
-            centroids = _compute_centroids(seen, chart, images)
+        chart_positions, jacobians = chart.map_to_chart(seen.positions)
+        chart_centroids = memory.chart_centroids
+        if chart_centroids is None or is_plan_due(memory.plan_time, self.period, seen.time):
+            chart_centroids = _compute_chart_centroids(seen, chart, chart_positions)
             memory = DiffeomorphismMemory(
-                team=team, centroids=centroids, goals=chart.map_to_region(centroids), plan_time=seen.time
+                team=team,
+                chart_centroids=chart_centroids,
+                goals=chart.map_to_region(chart_centroids),
+                plan_time=seen.time,
             )
-        offsets = _apply_inverses(jacobians, centroids - images)
+        offsets = _apply_inverses(jacobians, chart_centroids - chart_positions)
         velocities = compute_approach_velocities(offsets, self.k_prop, team.max_speed)
+        # Each robot avoids one obstacle point, the nearest one in view.
         obstacle_points = seen.obstacle_points[:, None]
+        # The motion in the chart keeps the full clearance from walls. A robot that does so need not brake.
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
@@ -116,22 +122,28 @@ class Diffeomorphism(WholeMapController):
         return _build_cached_chart(self.get_environment(), clearance, int(self.lattice), self.shrink)
 
 
-def _compute_centroids(seen: Observations, chart: ConvexChart, images: Array) -> Array:
-    """Return the centroids, (n, 2) m, of the robots' cells in the chart; `images`, (n, 2) m, are F(p_i)."""
+def _compute_chart_centroids(seen: Observations, chart: ConvexChart, chart_positions: Array) -> Array:
+    """Return the centroids of the robots' cells in the chart, (n, 2) m.
+
+    `chart_positions`, (n, 2) m, are the positions F(p_i) of the robots in the chart.
+    """
     pairs = seen.find_near_neighbors(np.inf)
     if seen.reported_positions is None:
-        neighbor_images = images[pairs.neighbor]
+        neighbor_chart_positions = chart_positions[pairs.neighbor]
     else:
         # Robots know their neighbors' positions as reported, which may differ from one receiver to the next.
-        neighbor_images, _ = chart.map_to_chart(seen.positions[pairs.robot] - pairs.offset)
-    is_own = find_own_samples(chart.samples, images, pairs.robot, neighbor_images)
-    return compute_sample_centroids(is_own, chart.samples, chart.mass, images)
+        # The offset leads from the reported position to the robot.
+        reported_positions = seen.positions[pairs.robot] - pairs.offset
+        neighbor_chart_positions, _ = chart.map_to_chart(reported_positions)
+    is_own = find_own_samples(chart.samples, chart_positions, pairs.robot, neighbor_chart_positions)
+    return compute_sample_centroids(is_own, chart.samples, chart.mass, chart_positions)
 
 
 def _apply_inverses(jacobians: Array, vectors: Array) -> Array:
     """Return the products of the inverses of Jacobians, (n, 2, 2), with (n, 2) vectors."""
     a, b, c, d = jacobians.reshape(-1, 4).T
     x, y = vectors.T
-    # The determinant of a one-to-one map is positive.
+    # The chart preserves orientation, so its determinant is positive. The limit only prevents division by
+    # zero if the determinant underflows.
     determinant = np.maximum(a * d - b * c, _MIN_DETERMINANT)
     return np.asarray(np.column_stack([d * x - b * y, a * y - c * x]) / determinant[:, None])

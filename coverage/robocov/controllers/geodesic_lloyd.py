@@ -1,4 +1,8 @@
-"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: a reference for the others."""
+"""Lloyd's algorithm on geodesic cells, by robots that know the whole map: a reference for the others.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

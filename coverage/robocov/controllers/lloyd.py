@@ -1,4 +1,8 @@
-"""Lloyd's algorithm under kinematic limits: on whole Voronoi cells, or on cells of limited range."""
+"""Lloyd's algorithm under kinematic limits: on whole Voronoi cells, or on cells of limited range.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from dataclasses import dataclass, replace
 

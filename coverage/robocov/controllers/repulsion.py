@@ -1,4 +1,8 @@
-"""Controllers that push robots apart: potential fields, and local dispersion."""
+"""Controllers that push robots apart: potential fields, and local dispersion.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 import math
 from dataclasses import dataclass, replace

@@ -3,6 +3,9 @@
 `CoverageCost` computes a `CoverageResult` for the positions of a team; `TimeVaryingCost` does the same on
 maps with moving obstacles. The cost is a mean over the `Sites` of a lattice (`lattice`). The kernels in
 `corner_views` and `site_paths` find the nearest robot of each site.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from robocov.cost.coverage_cost import CoverageCost

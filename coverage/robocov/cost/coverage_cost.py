@@ -1,4 +1,8 @@
-"""The coverage cost (22): the mean distance that the nearest robot must travel to reach a point."""
+"""The coverage cost (22): the mean distance that the nearest robot must travel to reach a point.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The coverage cost of one set of positions, with the owner of every site and the path to it."""
+"""The coverage cost of one set of positions, with the owner of every site and the path to it.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

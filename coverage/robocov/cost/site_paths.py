@@ -6,6 +6,9 @@ that sees the site, whichever is shorter. Of several robots at the same distance
 index owns the site.
 
 All lengths are in grid steps, except for those in `SitePaths`.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""The coverage cost (22) of a map whose obstacles move."""
+"""The coverage cost (22) of a map whose obstacles move.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The interface of all densities, and the uniform density."""
+"""The interface of all densities, and the uniform density.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

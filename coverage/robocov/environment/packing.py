@@ -12,10 +12,9 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 
 _ROW_DISTANCE = math.sqrt(3) / 2
-"""Distance between the rows of the hexagonal lattice of spacing 1, the densest packing of the plane.
-
-This is also the area per point of the lattice.
-"""
+"""Distance between the rows of the hexagonal lattice of spacing 1, the densest packing of the plane."""
+_AREA_PER_POINT = _ROW_DISTANCE
+"""Area per point of this lattice: the distance between two points in a row, 1, times that of the rows."""
 _PACKING_TRIALS = 6
 """Number of random packings from which the densest one is chosen."""
 _MAX_POINTS_FOR_TRIALS = 300
@@ -25,11 +24,11 @@ _LATTICE_TRIALS = 20
 _MAX_LATTICE_STEPS = 2000
 """Maximum number of rows on each side of the middle of a lattice. Larger areas are left to random points."""
 _MIN_CANDIDATES = 64
-"""Minimum number of random candidates for points that are drawn at a time."""
+"""Minimum number of random candidates that are drawn at a time."""
 _CANDIDATES_PER_POINT = 4
 """Expected number of candidates inside the area that are drawn for each missing point."""
 _MAX_CANDIDATES_PER_NEW_POINT = 100
-"""No more candidates are drawn after fewer than one in this number, inside the area, became a point."""
+"""The random packing ends when fewer than one in this number of candidates inside the area become points."""
 _MIN_AREA_FRACTION = 1e-3
 """Smallest fraction of its bounding box that an area is assumed to fill."""
 
@@ -54,7 +53,7 @@ def bound_point_count(area: BaseGeometry, spacing: float) -> int:
     # one more disc may fit.
     max_count = 0
     for part in shapely.get_parts(area):
-        max_count += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _ROW_DISTANCE))
+        max_count += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _AREA_PER_POINT))
     return max_count
 
 
@@ -73,7 +72,7 @@ def estimate_point_count(area: BaseGeometry, spacing: float) -> int:
     int
         At least 1. Effects of the boundary are neglected.
     """
-    return max(1, int(area.area / (spacing**2 * _ROW_DISTANCE)))
+    return max(1, int(area.area / (spacing**2 * _AREA_PER_POINT)))
 
 
 def pack_densely(area: BaseGeometry, spacing: float) -> Array:
@@ -100,15 +99,15 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
         rng = np.random.default_rng(trial)
         lattice_points = pack_lattice(rng, area, max_count, spacing)
         # In passages that are barely wider than a robot, random points are denser than lattices.
-        random_points = add_random_points(rng, area, max_count, spacing)
+        random_points = pack_randomly(rng, area, max_count, spacing)
         for points in (lattice_points, random_points):
             if len(points) > len(best_points):
                 best_points = points
     return best_points
 
 
-def add_random_points(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
-    """Add random points to an area, one after another, until almost no more fit.
+def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
+    """Pack random points into an area, one after another, until almost no more fit.
 
     Candidates are uniformly distributed in the area. A candidate that is too close to an earlier point is
     rejected ("random sequential addition").
@@ -156,8 +155,8 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
         return points
     is_kept = np.ones(len(points), dtype=bool)
     pairs = cKDTree(points).query_pairs(spacing, output_type="ndarray")
-    in_order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    for first, second in pairs[in_order].tolist():
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    for first, second in pairs[order].tolist():
         if is_kept[first]:
             is_kept[second] = False
     return points[is_kept]
@@ -166,8 +165,8 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
 def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
     """Pack points of a hexagonal lattice with a random position and orientation into an area.
 
-    Several positions and orientations are tried until enough points are in the area. If there are never
-    enough, the result has the most points that were found.
+    Several positions and orientations are tried, until one puts `max_count` points in the area. If none does,
+    the one with the most points is chosen.
 
     Parameters
     ----------
@@ -176,7 +175,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, s
     area : geometry, m
         Area that contains the points.
     max_count : int
-        Number of points that is enough. If more are in the area, this number is chosen at random.
+        Maximum number of points. If more lie in the area, a random selection of this number is returned.
     spacing : float, m
         Smallest distance between two points.
 
@@ -186,8 +185,8 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, s
         The points; none if the area is too large for a lattice.
     """
     low_x, low_y, high_x, high_y = area.bounds
-    # The lattice must cover the area in every orientation and position, which is shifted by up to one
-    # spacing.
+    # The lattice must cover the area in every orientation. The random shift is up to sqrt(2) spacings long;
+    # the margin of two spacings covers it.
     max_distance = float(np.hypot(high_x - low_x, high_y - low_y)) / 2 + 2 * spacing
     steps = int(np.ceil(max_distance / (spacing * _ROW_DISTANCE))) + 1
     if steps > _MAX_LATTICE_STEPS:

@@ -15,12 +15,12 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, Point, compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
-    add_random_points,
     bound_point_count,
     choose_points,
     estimate_point_count,
     pack_densely,
     pack_lattice,
+    pack_randomly,
 )
 from robocov.errors import StartError, format_count, is_number, quote
 
@@ -319,12 +319,12 @@ def compute_start_spacing(radius: float) -> float:
 def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
     """Return n random points that are at least `spacing` apart, or fewer if no more are found.
 
-    Three methods are tried in turn: adding independent random points, a random lattice, and the dense packing
-    that `Start.estimate_capacity` counts. Each finds more points than the one before, but less random ones.
+    Three methods are tried in turn: a random packing, a random lattice, and the dense packing that
+    `Start.estimate_capacity` counts. Each finds more points than the one before, but less random ones.
     """
     if n > bound_point_count(area, spacing):
         return np.empty((0, 2))
-    points = add_random_points(rng, area, n, spacing)
+    points = pack_randomly(rng, area, n, spacing)
     if len(points) < n:
         points = pack_lattice(rng, area, n, spacing)
     if len(points) < n <= MAX_COUNTED_ROBOTS:

@@ -4,6 +4,9 @@
 (`corner_graph`). With an index of the walls around a point (`angular_index`), visibility from the point is
 quickly tested. Walls and corners (`walls`) have integer coordinates (`grid`), so that visibility does not
 depend on rounding.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from robocov.geodesic.geodesics import Geodesics

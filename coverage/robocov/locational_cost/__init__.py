@@ -4,6 +4,9 @@
 - `integrals`: the cost, its gradient (11) and its Hessian, for density 1
 - `weighted_derivatives`: the gradient and the Hessian for any density, by quadrature
 - `best_points`: the point of each cell with the best cost, which is the target of its robot
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from robocov.locational_cost.integrals import (

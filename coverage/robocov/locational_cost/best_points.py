@@ -7,6 +7,9 @@ is quasi-concave (Borell; Brascamp and Lieb). Along any line, the cost to be min
 and then rises. If it still falls at the end of a step, the step was not too long. A step is accepted if it is
 not much too long in this sense, and does not leave the cell; there is no other condition. The search never
 computes the difference of two costs, which would suffer from cancellation.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from typing import NamedTuple

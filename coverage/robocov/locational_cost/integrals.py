@@ -8,12 +8,15 @@ gradient is
 so that an edge adds -n ∫ f(√(s²+d²)) ds. Here d is the distance of p from the line of the edge, and s is the
 coordinate along the edge, from s₁ to s₂, which is zero at the foot of the perpendicular from p. With
 w² = d²+h² and the angle Δ = atan(s₂/w) - atan(s₁/w), the integral is Δ/w for f = 1/(r²+h²). These are
-equations (15)-(20) of the paper, without its special case for vertical edges, and without the second integral
-of (18), which is printed with the wrong sign but sums to zero around a cell. The cost itself is a sum over
-the triangles between p and the edges.
+equations (15)-(20), without the special case for vertical edges, and without the second integral of (18),
+which is printed with the wrong sign but sums to zero around a cell. The cost itself is a sum over the
+triangles between p and the edges.
 
 The terms are added in the order of the edges of a cell, so that the result for a cell does not depend on
 other cells, to the last bit.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from typing import NamedTuple
@@ -23,10 +26,13 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import CellEdges
-from robocov.locational_cost.performance import DISTANCE, SQUARED_DISTANCE, Performance
+from robocov.locational_cost.performance import DISTANCE, SENSING, SQUARED_DISTANCE, Performance
 
 _GAUSS_RULE = np.stack(np.polynomial.legendre.leggauss(16))
-"""Gauss-Legendre rule with 16 nodes on [-1, 1]: the nodes, then the weights."""
+"""Gauss-Legendre rule with 16 nodes on [-1, 1]: the nodes, then the weights.
+
+Kernels receive it as an argument, because a compiled kernel would contain a copy of a global array.
+"""
 _NODES = 0
 """Row of `_GAUSS_RULE` that contains the nodes."""
 _WEIGHTS = 1
@@ -92,7 +98,10 @@ class _EdgeIntegral(NamedTuple):
     """Integrals along an edge. For s and d, see the description of the module."""
 
     total: float
-    """∫ f ds"""
+    """∫ (f - c) ds, where the constant c is the same for all edges of a cell, and 0 unless the cell is small.
+
+    Only the sum of n ∫ (f - c) ds over all edges of a cell has a meaning of its own: it does not depend on c.
+    """
     along: float
     """∫ f'(r)/r s ds, the derivative of `total` if s₁ and s₂ grow by the same amount."""
     across: float
@@ -145,9 +154,9 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
 
     Notes
     -----
-    If the points are the generators, this is equation (11) of the paper. Although the cells change if the
-    generators move, this is then also the gradient of the sum of all costs: what a moving boundary adds to
-    the cost of one cell, it takes from that of the other, (8)-(10).
+    If the points are the generators, this is equation (11). Although the cells change if the generators move,
+    this is then also the gradient of the sum of all costs: what a moving boundary adds to the cost of one
+    cell, it takes from that of the other, (8)-(10).
     """
     derivatives = compute_derivatives(edges, points, f)
     return np.column_stack([derivatives.x, derivatives.y])
@@ -194,15 +203,16 @@ def _sum_derivatives(
         half_perimeters=np.zeros(n),
         areas=np.zeros(n),
     )
-    end_edge = 0
+    first_edge = 0
     for i in range(n):
         x = points[i, 0]
         y = points[i, 1]
-        first_edge = end_edge
-        half_perimeter = 0.0
+        end_edge = first_edge
         while end_edge < len(cells) and cells[end_edge] == i:
-            half_perimeter += 0.5 * _compute_relative_edge(starts, ends, end_edge, x, y).length
             end_edge += 1
+        half_perimeter = 0.0
+        for k in range(first_edge, end_edge):
+            half_perimeter += 0.5 * _compute_relative_edge(starts, ends, k, x, y).length
         clearance = np.inf
         for k in range(first_edge, end_edge):
             edge = _compute_relative_edge(starts, ends, k, x, y)
@@ -216,6 +226,7 @@ def _sum_derivatives(
                 clearance = min(clearance, edge.distance)
         sums.clearances[i] = clearance if first_edge < end_edge else 0.0
         sums.half_perimeters[i] = half_perimeter
+        first_edge = end_edge
     return sums
 
 
@@ -246,9 +257,9 @@ def _compute_relative_edge(starts: Array, ends: Array, k: int, x: float, y: floa
     along_x = ends[k, 0] - starts[k, 0]
     along_y = ends[k, 1] - starts[k, 1]
     length = np.sqrt(along_x * along_x + along_y * along_y)
-    inverse = 1.0 / max(length, _MIN_LENGTH_M)
-    normal_x = along_y * inverse
-    normal_y = -along_x * inverse
+    inverse_length = 1.0 / max(length, _MIN_LENGTH_M)
+    normal_x = along_y * inverse_length
+    normal_y = -along_x * inverse_length
     distance = starts[k, 0] * normal_x + starts[k, 1] * normal_y - (x * normal_x + y * normal_y)
     s1 = starts[k, 1] * normal_x - starts[k, 0] * normal_y - (y * normal_x - x * normal_y)
     return _RelativeEdge(normal_x, normal_y, length, distance, start=s1)
@@ -264,7 +275,9 @@ def _integrate_edge(kind: int, height: float, edge: _RelativeEdge, half_perimete
         return _integrate_squared_distance(edge)
     if kind == DISTANCE:
         return _integrate_distance(edge)
-    return _integrate_sensing(edge, height, half_perimeter)
+    if kind == SENSING:
+        return _integrate_sensing(edge, height, half_perimeter)
+    raise ValueError("kind: expected the number of a performance function")
 
 
 @kernel
@@ -315,14 +328,14 @@ def _integrate_sensing(edge: _RelativeEdge, height: float, half_perimeter: float
         # are s/w² - s/h² = -s (d/w)² / h².
         remainder = _subtract_arctan(s2 / w) - _subtract_arctan(s1 / w)
         total = -length * (d / w) ** 2 / squared_height - remainder / w
-    # The values of 1/f at both ends. From them, f(r2) - f(r1), which is `along`, follows without
-    # cancellation.
+    # The squared distances r² + h² of both ends from the sensor are the values of 1/f. From them,
+    # f(r2) - f(r1), which is `along`, follows without cancellation.
     r1 = np.sqrt(d * d + s1 * s1)
     r2 = np.sqrt(d * d + s2 * s2)
-    inverse_f1 = r1 * r1 + squared_height
-    inverse_f2 = r2 * r2 + squared_height
-    along = (s1 - s2) * (s1 + s2) / (inverse_f1 * inverse_f2)
-    across = -d / (w * w) * (s2 / inverse_f2 - s1 / inverse_f1 + angle / w)
+    squared_range1 = r1 * r1 + squared_height
+    squared_range2 = r2 * r2 + squared_height
+    along = (s1 - s2) * (s1 + s2) / (squared_range1 * squared_range2)
+    across = -d / (w * w) * (s2 / squared_range2 - s1 / squared_range1 + angle / w)
     return _EdgeIntegral(total, along, across)
 
 

@@ -1,4 +1,8 @@
-"""The functions f of the distance, whose integral over a cell is the locational cost (4)."""
+"""The functions f of the distance, whose integral over a cell is the locational cost (4).
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias

@@ -12,7 +12,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density import Density
-from robocov.locational_cost.performance import Performance, Sensing
+from robocov.locational_cost.performance import Distance, Performance, Sensing
 from robocov.observation import Cells
 
 _NODES_ALONG = 16
@@ -65,8 +65,8 @@ def compute_weighted_derivatives(
     density : Density
         The density φ.
     f : Performance
-        The function f of the distance: `Distance` or `Sensing`. With `Sensing`, the derivatives are those of
-        minus the cost, which is to be minimized.
+        The function f of the distance. With `Sensing`, the derivatives are those of minus the cost, which is
+        to be minimized.
     max_diameters : (n,) array, m
         Upper bound on the diameter of each cell.
     points : (n, 2) array, m
@@ -90,18 +90,21 @@ def compute_weighted_derivatives(
     weights = weights * density.evaluate(positions.reshape(-1, 2)).reshape(weights.shape)
     dx = offsets[..., 0]
     dy = offsets[..., 1]
-    # The cost to be minimized has f = r or f = -1/(r²+h²), where r² = dx² + dy². With c1 = f'(r)/r and
+    # The cost to be minimized has f = r², r or -1/(r²+h²), where r² = dx² + dy². With c1 = f'(r)/r and
     # c2 = (f'(r)/r)'/r, the gradient of f with respect to the point is -c1 (dx, dy), and its Hessian is
     # c1 I + c2 (dx, dy)ᵀ (dx, dy). Both are multiplied by the weight of the node.
-    square = dx * dx + dy * dy
+    squared_distances = dx * dx + dy * dy
     if isinstance(f, Sensing):
-        inverse = 1.0 / (square + f.height**2)
-        c1 = 2.0 * weights * inverse * inverse
-        c2 = -8.0 * weights * inverse * inverse * inverse
+        values = 1.0 / (squared_distances + f.height**2)
+        c1 = 2.0 * weights * values * values
+        c2 = -8.0 * weights * values * values * values
+    elif isinstance(f, Distance):
+        inverse_distances = 1.0 / np.sqrt(np.maximum(squared_distances, _MIN_SQUARED_DISTANCE))
+        c1 = weights * inverse_distances
+        c2 = -weights * inverse_distances * inverse_distances * inverse_distances
     else:
-        inverse = 1.0 / np.sqrt(np.maximum(square, _MIN_SQUARED_DISTANCE))
-        c1 = weights * inverse
-        c2 = -weights * inverse * inverse * inverse
+        c1 = 2.0 * weights
+        c2 = np.zeros_like(weights)
     cell_count = len(points)
     return WeightedDerivatives(
         x=_sum_by_cell(-c1 * dx, edge_cells, cell_count),

@@ -1,7 +1,7 @@
 """A certified lower bound on the coverage cost: no placement of a team has a lower cost.
 
 `compute_lower_bound` returns a `LowerBound` (`bound`). It first searches for prices of the sites on a table
-of distances (`price_table`). For these prices, it then proves an upper bound on the profit of a robot
+of distances (`site_distances`). For these prices, it then proves an upper bound on the profit of a robot
 (`profit_bounds`).
 
 Minimizing the cost (22) means finding the positions p_1, ..., p_n of the robots for which the sum over the
@@ -28,6 +28,9 @@ T. The overestimate that results decreases with the square of the size of T.
 
 The cost of the best placement may be higher than any such bound, since a robot cannot be divided among
 several positions.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from robocov.lower_bound.bound import MIN_PRECISION, LowerBound, compute_lower_bound

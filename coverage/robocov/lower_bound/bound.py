@@ -1,4 +1,8 @@
-"""The lower bound on the coverage cost: a search for prices and a proof; see `lower_bound`."""
+"""The lower bound on the coverage cost: a search for prices and a proof; see `lower_bound`.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,6 @@ from robocov.environment import GRID_M, Environment, compute_center_areas
 from robocov.errors import ParameterError, require_number
 from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS, Geodesics
-from robocov.lower_bound.price_table import PriceTable, add_paid_shares
 from robocov.lower_bound.profit_bounds import (
     CENTER_PROFIT,
     PROFIT_BOUND,
@@ -28,6 +31,7 @@ from robocov.lower_bound.profit_bounds import (
     bound_profits,
     halve_triangles,
 )
+from robocov.lower_bound.site_distances import SiteDistances
 
 MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
@@ -298,7 +302,7 @@ class _Dual:
         Approximate spacing of the candidate positions.
     triangles : (t, 3, 2) array, grid steps
         Triangles that cover all possible positions. A proof replaces them by smaller ones.
-    table : PriceTable
+    table : SiteDistances
         Distances from the candidate positions to the sites.
     """
 
@@ -312,7 +316,7 @@ class _Dual:
     initial_prices: Array
     candidate_spacing: float
     triangles: Array
-    table: PriceTable
+    table: SiteDistances
 
     @classmethod
     def build(cls, cost: CoverageCost, positions: Array, radius: float) -> _Dual:
@@ -357,7 +361,7 @@ class _Dual:
             initial_prices=initial_prices,
             candidate_spacing=stride * cost.spacing / geodesics.grid.spacing,
             triangles=geodesics.grid.snap(_triangulate(configuration_space)),
-            table=PriceTable.build_empty(),
+            table=SiteDistances.build_empty(),
         )
         site_candidates = dual._choose_site_candidates(configuration_space, cost.points[site_numbers])
         dual.add_candidates(np.concatenate([robots, site_candidates]))
@@ -399,7 +403,7 @@ class _Dual:
         for first in range(0, len(candidates), _CANDIDATES_PER_BLOCK):
             block = candidates[first : first + _CANDIDATES_PER_BLOCK]
             distances = self.geodesics.compute_grid_distances(block, self.site_data.sites) * self.grid_spacing
-            self.table = self.table.append(distances, self.max_prices)
+            self.table = self.table.with_positions(distances, self.max_prices)
 
     def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
         """Search for prices, (m,) m, that maximize the dual over the positions in the table.
@@ -427,8 +431,7 @@ class _Dual:
             # the price of a site is raised by 1, the dual changes by the weight of the site times one minus
             # the number of robots that the site pays for, which are those nearer than its price.
             robot_shares = shares * (self.robot_count / shares.sum())
-            paid_shares = np.zeros(len(prices))
-            add_paid_shares(self.table, prices, robot_shares, paid_shares)
+            paid_shares = self.table.sum_paid_shares(prices, robot_shares)
             return -dual / scale, weights * (paid_shares - 1.0) / scale
 
         solution = minimize(

@@ -115,7 +115,7 @@ def bound_profits(
         A point of the free space in each triangle.
     scratch : TriangleScratch
     profits : (2, t) array, grid steps
-        Result: the profits of the centers in row `CENTER_PROFIT`, the bounds in row `PROFIT_BOUND`.
+        Output: the profits of the centers in row `CENTER_PROFIT`, the bounds in row `PROFIT_BOUND`.
 
     Returns
     -------

@@ -1,4 +1,8 @@
-"""The coverage cost over a run."""
+"""The coverage cost over a run.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

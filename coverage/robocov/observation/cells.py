@@ -1,4 +1,8 @@
-"""The base class of all kinds of cells into which robots can divide a region."""
+"""The base class of all kinds of cells into which robots can divide a region.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The search for the best positions of a team: the best of many restarts."""
+"""The search for the best positions of a team: the best of many restarts.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,9 @@ The goals P minimize the coverage cost (22) on the nodes q of a `GridPlanner`,
 
 where d are geodesic distances, and the weight w_q is the number of free cells that the node represents, times
 the density. Unknown cells are weighted by the probability that they are free (see `openness`).
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from typing import NamedTuple

@@ -7,6 +7,9 @@
 - `clipped_cells`, `clipping`: cells from clipping the region along the bisectors, one cell after another
 - `triangulated_cells`, `delaunay`: cells from a Delaunay triangulation that is reused from step to step
 - `boundary_curves`, `arcs`: boundaries that consist of segments and circular arcs
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from robocov.voronoi.bounded_partition import VoronoiPartition, partition

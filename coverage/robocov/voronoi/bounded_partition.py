@@ -1,4 +1,8 @@
-"""The bounded Voronoi partition (1) of all robots, with the masses and centroids (2) of its cells."""
+"""The bounded Voronoi partition (1) of all robots, with the masses and centroids (2) of its cells.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

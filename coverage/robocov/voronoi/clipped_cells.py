@@ -17,7 +17,7 @@ from robocov.voronoi.clipping import (
 def compute_clipped_cells(
     points: Array, sides: Array, neighbors: NeighborPositions, cells: CellArrays
 ) -> int:
-    """Compute all cells. For each, the region is clipped along the bisectors to the neighbors of the robot.
+    """Compute all cells by clipping the region along the bisectors between each robot and its neighbors.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def compute_clipped_cells(
             neighbor_count = _add_all_robots(workspace, points, i)
         else:
             neighbor_count = _add_listed_neighbors(workspace, points, neighbors, i)
-        polygon = clip_cell(workspace, neighbor_count, points, sides, i)
-        edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
+        vertex_range = clip_cell(workspace, neighbor_count, points, sides, i)
+        edge_count = write_cell(workspace, vertex_range, points, i, cells, edge_count)
     return edge_count
 
 

@@ -54,7 +54,7 @@ EDGE_COLUMNS = 6
 _NO_VERTEX = -1
 """Used in place of a vertex if there is none."""
 _NOT_CUT = -1
-"""Returned instead of a number of vertices if a bisector does not cut a polygon."""
+"""Returned instead of a number of vertices if a bisector does not cut a cell."""
 
 _SORTED_NEIGHBORS = 6
 """Number of neighbors that cut a cell in order of their distance. After them, few others can still cut it."""
@@ -63,27 +63,31 @@ _SORTED_NEIGHBORS = 6
 class Workspace(NamedTuple):
     """Scratch space for the computation of one cell after another."""
 
-    polygon: Array
+    vertices: Array
     """(k, 4) Vertices of the cell; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
-    cut_polygon: Array
-    """(k, 4) Vertices that remain after a cut; the columns are the same."""
+    new_vertices: Array
+    """(k, 4) Vertices of the cell after a cut; the columns are the same."""
     neighbors: Array
     """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
 
-class CellPolygon(NamedTuple):
-    """The vertices of a cell in the `polygon` of a `Workspace`."""
+class VertexRange(NamedTuple):
+    """The rows of `Workspace.vertices` that contain the vertices of a cell, and where its outline starts."""
 
     vertex_count: int
-    """Number of vertices, in the first rows."""
+    """Number of vertices. They are in the first rows, in counter-clockwise order."""
     start: int
-    """Row of the vertex with which the edges of the cell start."""
+    """Row of the vertex at which the first edge of the cell starts.
+
+    It is 0 if the region was clipped. In a triangulation, it is chosen so that the order of the edges does
+    not depend on the history of the triangulation.
+    """
 
 
 class _CutVertices(NamedTuple):
-    """The consecutive vertices of a convex polygon that a bisector cuts off.
+    """The consecutive vertices of a convex polygon that a bisector cuts off, as rows of `Workspace.vertices`.
 
-    The last vertex of the polygon is followed by the first one, so that `last` may be smaller than `first`.
+    The last row is followed by the first one, so that `last` may be smaller than `first`.
     """
 
     before: int
@@ -125,8 +129,8 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
     # Each cut adds at most one vertex. Two more are spare.
     max_vertices = side_count + robot_count + 2
     return Workspace(
-        polygon=np.empty((max_vertices, _VERTEX_COLUMNS)),
-        cut_polygon=np.empty((max_vertices, _VERTEX_COLUMNS)),
+        vertices=np.empty((max_vertices, _VERTEX_COLUMNS)),
+        new_vertices=np.empty((max_vertices, _VERTEX_COLUMNS)),
         neighbors=np.empty((robot_count, _NEIGHBOR_COLUMNS)),
     )
 
@@ -179,13 +183,14 @@ def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int)
 
 
 @inlined_kernel
-def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: Array, i: int) -> CellPolygon:
+def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: Array, i: int) -> VertexRange:
     """Compute the cell of robot i: clip the region along the bisectors between the robot and its neighbors.
 
     Parameters
     ----------
     workspace : Workspace
-        Its first neighbors are those of the robot. Their order changes.
+        Contains the neighbors of the robot in the first rows of `neighbors`. They are reordered. Its vertices
+        are overwritten.
     neighbor_count : int
         Number of neighbors of the robot.
     points : (n, 2) array, m
@@ -197,62 +202,62 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
 
     Returns
     -------
-    CellPolygon
-        The vertices of the cell, which are in the workspace.
+    VertexRange
+        Location of the vertices of the cell in the workspace.
     """
-    polygon = workspace.polygon
-    cut_polygon = workspace.cut_polygon
+    vertices = workspace.vertices
+    new_vertices = workspace.new_vertices
     neighbor_rows = workspace.neighbors
-    # At first, the polygon is the region. The nearest neighbors cut it first, so that few of the others can
-    # still cut it.
+    # At first, the cell is the whole region. The nearest neighbors cut it first, so that few of the others
+    # can still cut it.
     count = len(sides)
     for k in range(count):
-        polygon[k, X] = sides[k, SIDE_X] - points[i, 0]
-        polygon[k, Y] = sides[k, SIDE_Y] - points[i, 1]
-        polygon[k, OTHER_CELL] = REGION
-    squared_range = _compute_squared_range(polygon, count)
+        vertices[k, X] = sides[k, SIDE_X] - points[i, 0]
+        vertices[k, Y] = sides[k, SIDE_Y] - points[i, 1]
+        vertices[k, OTHER_CELL] = REGION
+    squared_range = _compute_squared_range(vertices, count)
     for row in range(neighbor_count):
         is_sorted = row < _SORTED_NEIGHBORS
         if is_sorted:
-            _move_nearest(neighbor_rows, row, neighbor_count)
+            _move_nearest_to(neighbor_rows, row, neighbor_count)
         if neighbor_rows[row, SQUARED_DISTANCE] <= squared_range:
-            new_count = _cut_polygon(polygon, cut_polygon, count, neighbor_rows, row)
+            new_count = _cut_polygon(vertices, new_vertices, count, neighbor_rows, row)
             if new_count != _NOT_CUT:
                 count = new_count
-                _copy_vertices(cut_polygon, polygon, count)
-                squared_range = _compute_squared_range(polygon, count)
+                _copy_vertices(new_vertices, vertices, count)
+                squared_range = _compute_squared_range(vertices, count)
         elif is_sorted:
             # This is the nearest of the remaining neighbors. If it is too far away, so are all others.
             break
-    return CellPolygon(vertex_count=count, start=0)
+    return VertexRange(vertex_count=count, start=0)
 
 
 @inlined_kernel
 def _copy_vertices(source: Array, target: Array, count: int) -> None:
-    """Copy the first `count` vertices of a polygon to another one."""
+    """Copy the first `count` vertices."""
     for k in range(count):
         for column in range(_VERTEX_COLUMNS):
             target[k, column] = source[k, column]
 
 
 @inlined_kernel
-def _compute_squared_range(polygon: Array, count: int) -> float:
-    """Return the square of the largest distance at which a neighbor can cut the polygon, m².
+def _compute_squared_range(vertices: Array, count: int) -> float:
+    """Return the square of the largest distance at which a neighbor can cut the cell, m².
 
-    The bisector is half as far away from the generator as the neighbor. It can cut the polygon only if the
+    The bisector is half as far away from the generator as the neighbor. It can cut the cell only if the
     neighbor is at most twice as far away as the farthest vertex.
     """
     squared_range = 0.0
     for k in range(count):
-        x = polygon[k, X]
-        y = polygon[k, Y]
+        x = vertices[k, X]
+        y = vertices[k, Y]
         squared_range = max(squared_range, 2.0**2 * (x * x + y * y))
     return squared_range
 
 
 @inlined_kernel
-def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
-    """Exchange the neighbor in a row and the nearest of the neighbors from that row on."""
+def _move_nearest_to(neighbor_rows: Array, row: int, count: int) -> None:
+    """Swap the neighbor in a row with the nearest of the neighbors in this and all later rows."""
     nearest = row
     for k in range(row + 1, count):
         if neighbor_rows[k, SQUARED_DISTANCE] < neighbor_rows[nearest, SQUARED_DISTANCE]:
@@ -265,20 +270,21 @@ def _move_nearest(neighbor_rows: Array, row: int, count: int) -> None:
 
 
 @inlined_kernel
-def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
+def _cut_polygon(vertices: Array, new_vertices: Array, count: int, neighbor_rows: Array, row: int) -> int:
     """Cut a convex polygon along the bisector between the generator and the neighbor in a row.
 
-    The points that are nearer to the generator are written to `cut_polygon` as a polygon: the vertices beyond
-    the bisector are replaced by the two points where the outline crosses the bisector. A new edge along the
-    bisector connects these points, with the cell of the neighbor on the other side.
+    The part that is nearer to the generator is written to `new_vertices`: the vertices beyond the bisector
+    are replaced by the two points where the outline crosses the bisector. A new edge along the bisector
+    connects these points, with the cell of the neighbor on the other side.
 
     Return the new number of vertices, or `_NOT_CUT`, without writing anything, if no vertex is beyond the
     bisector.
     """
-    farthest = _compute_excess(polygon, count, neighbor_rows, row)
+    _write_excess(vertices, count, neighbor_rows, row)
+    farthest = _find_farthest_vertex(vertices, count)
     if farthest == _NO_VERTEX:
         return _NOT_CUT
-    cut = _find_cut_vertices(polygon, count, farthest)
+    cut = _find_cut_vertices(vertices, count, farthest)
     if cut.after == _NO_VERTEX:
         return 0
     # Copy the vertices that remain.
@@ -286,28 +292,28 @@ def _cut_polygon(polygon: Array, cut_polygon: Array, count: int, neighbor_rows: 
     k = cut.after
     while k != cut.first:
         for column in (X, Y, OTHER_CELL):
-            cut_polygon[new_count, column] = polygon[k, column]
+            new_vertices[new_count, column] = vertices[k, column]
         new_count += 1
         k = _get_next_vertex(k, count)
     # The new edge starts where the outline leaves the generator's side of the bisector: at the vertex that
     # was copied last, if it is on the bisector, and otherwise at a new vertex.
     robot = neighbor_rows[row, ROBOT]
-    if polygon[cut.before, _EXCESS] == 0.0:
-        cut_polygon[new_count - 1, OTHER_CELL] = robot
+    if vertices[cut.before, _EXCESS] == 0.0:
+        new_vertices[new_count - 1, OTHER_CELL] = robot
     else:
-        _add_crossing(polygon, cut_polygon, new_count, cut.before, cut.first, robot)
+        _add_crossing(vertices, new_vertices, new_count, cut.before, cut.first, robot)
         new_count += 1
     # The new edge ends where the outline returns: at the vertex that was copied first, if it is on the
     # bisector, and otherwise at a new vertex, where the rest of an edge of the old outline starts.
-    if polygon[cut.after, _EXCESS] < 0.0:
-        other_cell = polygon[cut.last, OTHER_CELL]
-        _add_crossing(polygon, cut_polygon, new_count, cut.after, cut.last, other_cell)
+    if vertices[cut.after, _EXCESS] < 0.0:
+        other_cell = vertices[cut.last, OTHER_CELL]
+        _add_crossing(vertices, new_vertices, new_count, cut.after, cut.last, other_cell)
         new_count += 1
     return new_count
 
 
 @inlined_kernel
-def _find_cut_vertices(polygon: Array, count: int, farthest: int) -> _CutVertices:
+def _find_cut_vertices(vertices: Array, count: int, farthest: int) -> _CutVertices:
     """Return the vertices with a positive excess; `farthest` is one of them.
 
     They are consecutive, because the polygon is convex. If rounding separates some others, these are not cut
@@ -315,14 +321,14 @@ def _find_cut_vertices(polygon: Array, count: int, farthest: int) -> _CutVertice
     """
     last = farthest
     next_vertex = _get_next_vertex(last, count)
-    while next_vertex != farthest and polygon[next_vertex, _EXCESS] > 0.0:
+    while next_vertex != farthest and vertices[next_vertex, _EXCESS] > 0.0:
         last = next_vertex
         next_vertex = _get_next_vertex(last, count)
     first = farthest
     previous = _get_previous_vertex(first, count)
     if next_vertex == farthest:
         return _CutVertices(previous, first, last, _NO_VERTEX)
-    while polygon[previous, _EXCESS] > 0.0:
+    while vertices[previous, _EXCESS] > 0.0:
         first = previous
         previous = _get_previous_vertex(first, count)
     return _CutVertices(previous, first, last, next_vertex)
@@ -341,50 +347,54 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 
 @inlined_kernel
-def _compute_excess(polygon: Array, count: int, neighbor_rows: Array, row: int) -> int:
-    """Write the excess of each vertex of a polygon over a bisector to the column `_EXCESS`.
+def _write_excess(vertices: Array, count: int, neighbor_rows: Array, row: int) -> None:
+    """Write the excess of each vertex over the bisector to a neighbor to the column `_EXCESS`.
 
     The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
     is proportional to the signed distance of the vertex from the bisector, and positive if the vertex is
-    nearer to the neighbor. Return the vertex that is farthest beyond the bisector, or `_NO_VERTEX` if none is
-    beyond it.
+    nearer to the neighbor.
     """
     dx = neighbor_rows[row, DX]
     dy = neighbor_rows[row, DY]
     half_squared_distance = 0.5 * neighbor_rows[row, SQUARED_DISTANCE]
+    for k in range(count):
+        vertices[k, _EXCESS] = vertices[k, X] * dx + vertices[k, Y] * dy - half_squared_distance
+
+
+@inlined_kernel
+def _find_farthest_vertex(vertices: Array, count: int) -> int:
+    """Return the vertex farthest beyond the current bisector, or `_NO_VERTEX` if none is beyond it."""
     farthest = _NO_VERTEX
     max_excess = 0.0
     for k in range(count):
-        excess = polygon[k, X] * dx + polygon[k, Y] * dy - half_squared_distance
-        polygon[k, _EXCESS] = excess
-        if excess > max_excess:
+        if vertices[k, _EXCESS] > max_excess:
             farthest = k
-            max_excess = excess
+            max_excess = vertices[k, _EXCESS]
     return farthest
 
 
 @inlined_kernel
 def _add_crossing(
-    polygon: Array, cut_polygon: Array, new_vertex: int, inner: int, outer: int, other_cell: float
+    vertices: Array, new_vertices: Array, new_row: int, inner: int, outer: int, other_cell: float
 ) -> None:
-    """Add a vertex to `cut_polygon` at the point where an edge of `polygon` crosses the current bisector.
+    """Add a vertex to `new_vertices` at the point where an edge of the polygon crosses the current bisector.
 
     The edge connects the vertex `inner`, on the generator's side of the bisector, with the vertex `outer` on
     the other side. The crossing is found by linear interpolation between their excesses, which are
-    proportional to their signed distances from the bisector. It becomes vertex `new_vertex` of `cut_polygon`.
-    `other_cell` is the cell on the other side of the edge that starts at the new vertex.
+    proportional to their signed distances from the bisector. It is written to row `new_row` of
+    `new_vertices`. `other_cell` is the cell on the other side of the edge that starts at the new vertex.
     """
-    inner_excess = polygon[inner, _EXCESS]
-    fraction = inner_excess / (inner_excess - polygon[outer, _EXCESS])
+    inner_excess = vertices[inner, _EXCESS]
+    fraction = inner_excess / (inner_excess - vertices[outer, _EXCESS])
     for column in (X, Y):
-        step = polygon[outer, column] - polygon[inner, column]
-        cut_polygon[new_vertex, column] = polygon[inner, column] + fraction * step
-    cut_polygon[new_vertex, OTHER_CELL] = other_cell
+        step = vertices[outer, column] - vertices[inner, column]
+        new_vertices[new_row, column] = vertices[inner, column] + fraction * step
+    new_vertices[new_row, OTHER_CELL] = other_cell
 
 
 @inlined_kernel
 def write_cell(
-    workspace: Workspace, polygon: CellPolygon, points: Array, i: int, cells: CellArrays, edge_count: int
+    workspace: Workspace, vertex_range: VertexRange, points: Array, i: int, cells: CellArrays, edge_count: int
 ) -> int:
     """Write mass, centroid and edges of the cell of robot i, for density 1.
 
@@ -392,8 +402,8 @@ def write_cell(
     ----------
     workspace : Workspace
         Scratch space that contains the vertices of the cell.
-    polygon : CellPolygon
-        Which vertices these are.
+    vertex_range : VertexRange
+        Location of these vertices in the workspace.
     points : (n, 2) array, m
         The generators.
     i : int
@@ -408,15 +418,15 @@ def write_cell(
     int
         Number of edges of all cells so far.
     """
-    vertices = workspace.polygon
+    vertices = workspace.vertices
     edges = cells.edges
     # Twice the area and six times the first moments are sums over the triangles between edges and generator.
     doubled_area = 0.0
     moment_sum_x = 0.0
     moment_sum_y = 0.0
-    k = polygon.start
-    for edge in range(edge_count, edge_count + polygon.vertex_count):
-        next_vertex = _get_next_vertex(k, polygon.vertex_count)
+    k = vertex_range.start
+    for edge in range(edge_count, edge_count + vertex_range.vertex_count):
+        next_vertex = _get_next_vertex(k, vertex_range.vertex_count)
         start_x = vertices[k, X]
         start_y = vertices[k, Y]
         end_x = vertices[next_vertex, X]
@@ -437,4 +447,4 @@ def write_cell(
     cells.masses[i] = max(0.5 * doubled_area, 0.0)
     cells.centroids[i, 0] = points[i, 0] + moment_sum_x * factor
     cells.centroids[i, 1] = points[i, 1] + moment_sum_y * factor
-    return edge_count + polygon.vertex_count
+    return edge_count + vertex_range.vertex_count

@@ -67,7 +67,7 @@ def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: In
     points : (n + 3, 2) array, m
         Positions of the points. The last three are sentinels, whose triangle contains all others.
     cotangents : (8 n + 4,) array
-        Result: the cotangent of the angle opposite to each half-edge.
+        Output: the cotangent of the angle opposite to each half-edge.
     stack : (8 n + 4,) int array
         Scratch space.
 

@@ -10,7 +10,7 @@ from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET
 from robocov.voronoi.clipping import (
     OTHER_CELL,
     CellArrays,
-    CellPolygon,
+    VertexRange,
     Workspace,
     X,
     Y,
@@ -99,8 +99,8 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
     edge_count = 0
     total_area = 0.0
     for i in range(len(points)):
-        polygon = _find_cell(workspace, triangulation, points, sides, i)
-        edge_count = write_cell(workspace, polygon, points, i, cells, edge_count)
+        vertex_range = _find_cell(workspace, triangulation, points, sides, i)
+        edge_count = write_cell(workspace, vertex_range, points, i, cells, edge_count)
         total_area += cells.masses[i]
     region_area = _compute_region_area(sides)
     is_complete = abs(total_area - region_area) <= _AREA_TOLERANCE * region_area
@@ -183,7 +183,7 @@ def _compute_region_area(sides: Array) -> float:
 @inlined_kernel
 def _find_cell(
     workspace: Workspace, triangulation: Triangulation, points: Array, sides: Array, i: int
-) -> CellPolygon:
+) -> VertexRange:
     """Find the cell of robot i from the triangles around it.
 
     The neighbors of the robot are the other corners of these triangles, and the vertices of its cell are the
@@ -196,7 +196,7 @@ def _find_cell(
     # depend on the triangle at which the walk starts.
     is_within_region = clearance > 0.0 and fan.max_squared_distance < clearance * clearance
     if is_within_region:
-        return CellPolygon(vertex_count=fan.neighbor_count, start=fan.lowest_position)
+        return VertexRange(vertex_count=fan.neighbor_count, start=fan.lowest_position)
     fan = _walk_around(workspace, triangulation, points, i, fan.half_edge_to_lowest)
     return clip_cell(workspace, fan.neighbor_count, points, sides, i)
 
@@ -222,7 +222,7 @@ def _walk_around(
     relative to the robot. Points with an index of n or more are sentinels, which are no neighbors.
     """
     mesh = triangulation.mesh
-    polygon = workspace.polygon
+    vertices = workspace.vertices
     n = len(points)
     count = 0
     lowest_robot = n
@@ -242,11 +242,11 @@ def _walk_around(
             dy = points[j, 1] - points[i, 1]
             x, y = _compute_voronoi_vertex(dx, dy, triangulation.cotangents[h])
             max_squared_distance = max(max_squared_distance, x * x + y * y)
-            polygon[count, X] = x
-            polygon[count, Y] = y
+            vertices[count, X] = x
+            vertices[count, Y] = y
             # The edge from this Voronoi vertex to the next one borders on the cell of the triangle's third
             # corner.
-            polygon[count, OTHER_CELL] = mesh[CORNER, previous]
+            vertices[count, OTHER_CELL] = mesh[CORNER, previous]
             write_neighbor(workspace.neighbors, count, dx, dy, j)
             count += 1
         else:

@@ -11,6 +11,9 @@ Source: F. Aurenhammer and H. Edelsbrunner, *An optimal algorithm for constructi
 diagram in the plane*, Pattern Recognition 17 (1984). Unlike there, the pieces of all boundaries are found
 independently of each other and are not linked, because the integrals by Green's theorem do not depend on
 their order.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from dataclasses import dataclass

@@ -4,6 +4,9 @@ A controller returns a force F. Equation (28) with its sign corrected, m q'' = F
 over a substep, so that the motion is stable for any time step. Then the change of velocity and the speed are
 limited. The net force is the constant force under which a point mass reaches the resulting velocity in this
 substep. Pymunk integrates the motion under net forces.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""The world of a team that stays the same: robots under forces, among obstacles."""
+"""The world of a team that stays the same: robots under forces, among obstacles.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

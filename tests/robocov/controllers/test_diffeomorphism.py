@@ -121,7 +121,7 @@ def test_without_obstacles_it_is_lloyds_algorithm(density: Gaussians | None) -> 
     team = Team.homogeneous(4)
     memory = controller.decide(seen, controller.begin(region, team)).memory
     expected = lloyd.decide(seen, lloyd.begin(region, team)).goals
-    np.testing.assert_allclose(memory.centroids, expected, atol=0.03)
+    np.testing.assert_allclose(memory.chart_centroids, expected, atol=0.03)
 
 
 @pytest.mark.slow

@@ -31,6 +31,8 @@ from robocov.locational_cost import (
     compute_gradients,
     compute_locational_costs,
 )
+from robocov.locational_cost.integrals import _integrate_edge, _RelativeEdge
+from robocov.locational_cost.performance import SENSING
 from robocov.observation.region import Region
 from robocov.voronoi import partition
 
@@ -294,3 +296,9 @@ def test_cells_without_area_cost_nothing() -> None:
 def test_heights_must_be_positive_numbers(height: float) -> None:
     with pytest.raises(ParameterError, match=r"height: expected a number above 0, got .* m"):
         Sensing(height)
+
+
+def test_kernels_reject_unknown_functions() -> None:
+    edge = _RelativeEdge(normal_x=1.0, normal_y=0.0, length=1.0, distance=1.0, start=0.0)
+    with pytest.raises(ValueError, match="kind: expected the number of a performance function"):
+        _integrate_edge(kind=SENSING + 1, height=1.0, edge=edge, half_perimeter=1.0)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from voronoi_cases import evaluate_performance
 
 from robocov.density import Gaussian, Gaussians, WeightedArea, WeightedPolygons
-from robocov.locational_cost import Distance, Sensing
+from robocov.locational_cost import Distance, Sensing, SquaredDistance
 from robocov.locational_cost.best_points import find_best_points, find_targets
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
@@ -82,6 +82,14 @@ def test_targets_lie_in_their_cells(density, target):
     goals = find_targets(cells, density, target, 1.0)
     for goal, ring in zip(goals, cells.polygons, strict=True):
         assert shapely.Polygon(ring).buffer(1e-6).contains(shapely.Point(goal))
+
+
+def test_the_best_point_for_squared_distances_is_the_weighted_centroid():
+    points = np.random.default_rng(3).uniform(0.5, 7.5, (12, 2))
+    density = GAUSSIANS["two"]
+    cells = partition(points, SQUARE, density=density)
+    best_points = find_best_points(cells, SquaredDistance(), density)
+    assert_allclose(best_points, cells.centroid, atol=1e-6)
 
 
 def test_the_median_is_in_the_room_with_most_of_the_mass():

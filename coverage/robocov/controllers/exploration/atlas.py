@@ -1,4 +1,8 @@
-"""Atlas: each robot plans the placement of its team on the map that it has discovered itself."""
+"""Atlas: each robot plans the placement of its team on the map that it has discovered itself.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Greedy placement on the map that the team discovers, followed by local descent."""
+"""Greedy placement on the map that the team discovers, followed by local descent.
+
+Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
+Non-Convex Environment".
+"""
 
 from __future__ import annotations
 

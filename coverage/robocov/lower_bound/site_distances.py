@@ -1,4 +1,4 @@
-"""A table of distances from some positions to the sites, used to search for prices of the sites."""
+"""Distances from some positions to the sites, used to search for prices of the sites."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _MIN_SHARE = 1e-9
 """Smaller shares of a robot at a position are ignored, which saves most of the work."""
 
 
-class PriceTable(NamedTuple):
-    """Distances from p positions to the sites that may pay for a robot there.
+class SiteDistances(NamedTuple):
+    """Distances from p positions to the sites near them, in compressed sparse row form.
 
-    There is an entry for each pair of a position and such a site. The entries are sorted by position.
+    There is an entry for each pair of a position and a site that may pay for a robot there. The entries are
+    sorted by position.
     """
 
     entry_starts: IntArray
@@ -28,34 +29,34 @@ class PriceTable(NamedTuple):
     """(e,) Distance from the position of each entry to its site, m."""
 
     @classmethod
-    def build_empty(cls) -> PriceTable:
+    def build_empty(cls) -> SiteDistances:
         """Build a table without positions.
 
         Returns
         -------
-        PriceTable
+        SiteDistances
         """
         return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
 
-    def append(self, distances: Array, max_distances: Array) -> PriceTable:
+    def with_positions(self, distances: Array, max_distances: Array) -> SiteDistances:
         """Return a table with more positions at the end.
 
         Parameters
         ----------
         distances : (p, m) array, m
-            Distances from the new positions to all sites.
+            Distances from the new positions to all m sites.
         max_distances : (m,) array, m
             Only smaller distances to a site get an entry.
 
         Returns
         -------
-        PriceTable
+        SiteDistances
         """
         positions, sites = np.nonzero((distances < max_distances) & np.isfinite(distances))
         entry_counts = np.bincount(positions, minlength=len(distances))
         new_starts = self.entry_starts[-1] + np.cumsum(entry_counts)
         new_distances = distances[positions, sites].astype(np.float32)
-        return PriceTable(
+        return SiteDistances(
             entry_starts=np.append(self.entry_starts, new_starts),
             sites=np.append(self.sites, sites.astype(np.int32)),
             distances=np.append(self.distances, new_distances),
@@ -70,7 +71,8 @@ class PriceTable(NamedTuple):
         Parameters
         ----------
         prices : (m,) array, m
-            Prices of the sites.
+            Prices of the sites. Each must be at most the `max_distances` of its site in every call of
+            `with_positions`, because more distant sites have no entry and would not pay.
         weights : (m,) array
             Weights of the sites.
 
@@ -79,16 +81,33 @@ class PriceTable(NamedTuple):
         (p,) array, m
         """
         profits = np.empty(len(self.entry_starts) - 1)
-        _compute_profits(self, prices, weights, profits)
+        _write_profits(self, prices, weights, profits)
         return profits
+
+    def sum_paid_shares(self, prices: Array, shares: Array) -> Array:
+        """Compute the number of robots that each site pays for, if robots are divided among the positions.
+
+        A site pays for a robot if the price of the site is higher than its distance to the robot.
+
+        Parameters
+        ----------
+        prices : (m,) array, m
+            Prices of the sites, limited as in `compute_profits`.
+        shares : (p,) array
+            Number of robots at each position of the table, in general a fraction.
+
+        Returns
+        -------
+        (m,) array
+        """
+        paid_shares = np.zeros(len(prices))
+        _add_paid_shares(self, prices, shares, paid_shares)
+        return paid_shares
 
 
 @kernel
-def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: Array) -> None:
-    """Write the profit of each position: the sum over the sites of weight * max(price - distance, 0).
-
-    Sites that are too far away to pay for a robot at a position have no entry in the table.
-    """
+def _write_profits(table: SiteDistances, prices: Array, weights: Array, profits: Array) -> None:
+    """Write the profit of each position: the sum over the sites of weight * max(price - distance, 0)."""
     for position in range(len(profits)):
         profit = 0.0
         for entry in range(table.entry_starts[position], table.entry_starts[position + 1]):
@@ -98,22 +117,8 @@ def _compute_profits(table: PriceTable, prices: Array, weights: Array, profits: 
 
 
 @kernel
-def add_paid_shares(table: PriceTable, prices: Array, shares: Array, paid_shares: Array) -> None:
-    """Add up the shares of robots that each site pays for.
-
-    The smoothed search divides the robots among the positions of the table. A site pays for a robot if the
-    price of the site is higher than its distance to the robot.
-
-    Parameters
-    ----------
-    table : PriceTable
-    prices : (m,) array, m
-        Prices of the sites.
-    shares : (p,) array
-        Number of robots at each position of the table, in general a fraction.
-    paid_shares : (m,) array
-        Result: for each site, the sum of the shares is added to the value that it has on entry.
-    """
+def _add_paid_shares(table: SiteDistances, prices: Array, shares: Array, paid_shares: Array) -> None:
+    """Add the share at each position to the paid shares of all sites that pay for a robot there."""
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:
             for entry in range(table.entry_starts[position], table.entry_starts[position + 1]):
