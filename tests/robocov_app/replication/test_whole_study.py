@@ -330,7 +330,7 @@ class TestStopping:
         said, told = process.communicate(timeout=300)
         assert process.returncode == 130
         first = told.splitlines()[0]
-        assert first.startswith("paper (quick): 114 runs, about ")
+        assert first.startswith("paper (quick): 142 runs, about ")
         assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps finished runs" in first
         assert f"To resume: robocov paper --out {out} --quick --without-beyond" in said
         kept = count_finished_runs(out)
@@ -507,7 +507,7 @@ class TestPages:
                 "0.02 s",
                 "6 s each",
                 "(seeds 101, 102)",
-                "generated (seeds 1)",
+                "with polygons (seeds 1)",
                 "k_rep 0.3, 3 N m³",
                 "rho_0 2 m",
             ),
@@ -632,7 +632,7 @@ class TestCommand:
         out = tmp_path / "out"
         assert main(["paper", "--quick", "--figures-only", "--out", str(out), "--json"]) == 0
         answer = json.loads(capsys.readouterr().out)
-        assert (answer["runs"], answer["claims"]) == (8, [])
+        assert (answer["runs"], answer["claims"]) == (16, [])
         assert not (out / "claims.json").exists()
         assert len(list((out / "figures").glob("*.pdf"))) == 8
         content = (out / "index.html").read_text(encoding="utf-8")
@@ -650,7 +650,7 @@ class TestCommand:
         assert main(["paper", "--quick", "--beyond-only", "--out", str(out), "--json"]) == 0
         answer = json.loads(capsys.readouterr().out)
         found = json.loads((out / "claims.json").read_text())
-        assert answer["claims"] == found and answer["runs"] == study[2].runs + 8
+        assert answer["claims"] == found and answer["runs"] == study[2].runs + 16
         assert [claim["key"] for claim in found] == [claim.key for claim in judge_beyond_claims(study[2])]
         page = (out / "beyond.html").read_text(encoding="utf-8")
         front = (out / "index.html").read_text(encoding="utf-8")
