@@ -145,7 +145,7 @@ def call_controller_kernels() -> None:
 
 
 def call_planning_kernels() -> None:
-    """Call the kernels that only routes on large maps need."""
+    """Call the kernels of routes around walls, those of large maps included."""
     raster = planning_raster.Raster(Region(np.array(_SQUARE)), cell_size=0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)
     state[:34, 30] = WALL
@@ -153,7 +153,12 @@ def call_planning_kernels() -> None:
     middle = np.array([3.0, 3.0])
     window = Window.build_around(raster, middle, half_width=math.inf, max_nodes=16)
     planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)
-    planner.find_route(np.array([1.0, 1.0]), np.array([5.0, 1.0]))
+    goal = np.array([5.0, 1.0])
+    planner.find_route(np.array([1.0, 1.0]), goal)
+    # Numba compiles again for read-only arrays, such as the positions in observations.
+    observed_position = np.array([1.0, 2.0])
+    observed_position.setflags(write=False)
+    planner.find_route(observed_position, goal)
 
 
 COMMON_EXAMPLES: tuple[Example, ...] = (call_cost_kernels, call_step_kernels, call_summary_kernels)
