@@ -3,7 +3,7 @@
     python tests/bench/bench_atlas.py doors large-maps sizes ranges rest pace --controller atlas-shared
 
 - ``doors``: whether robots find narrow doors in walls of random direction
-- ``large-maps``: the same on larger maps, where nodes of planners are farther apart
+- ``large-maps``: the same in upright walls on larger maps, where nodes of planners are farther apart
 - ``sizes``: whether a larger team is ever worse than a smaller one
 - ``ranges``: gaps, rest and path lengths with limited ranges, beside `rapf`
 - ``rest``: whether a team that has rested for ten minutes responds to a failure and to an open door
@@ -144,20 +144,24 @@ def crosses_random_door(controller: str, seed: int) -> bool:
     """Return whether one of three robots passes through a random door in time."""
     rng = np.random.default_rng(seed)
     door_width = 2.0 * ROBOT_RADIUS_M * rng.uniform(*DOOR_WIDTH_RANGE)
-    return crosses_door(controller, rng, door_width, SQUARE_SIDE_M, MAX_CROSSING_TIME_S)
+    direction = rng.uniform(0.0, math.tau)
+    door_offset = rng.uniform(-MAX_DOOR_OFFSET_M, MAX_DOOR_OFFSET_M)
+    wall = build_wall(direction, door_offset, door_width, SQUARE_SIDE_M)
+    return crosses_wall(controller, wall, direction, SQUARE_SIDE_M, MAX_CROSSING_TIME_S)
 
 
-def crosses_door(
-    controller: str, rng: np.random.Generator, door_width: float, side: float, max_time: float
+def crosses_wall(
+    controller: str, wall: tuple[WallObstacle, WallObstacle], direction: float, side: float, max_time: float
 ) -> bool:
-    """Return whether one of three robots passes through a door at a random place in time.
+    """Return whether one of three robots gets to the other side of a wall with a door in time.
 
     Parameters
     ----------
     controller : str
-    rng : numpy.random.Generator
-        Draws the direction of the wall and the place of the door.
-    door_width : float, m
+    wall : tuple of two WallObstacle
+        The two halves of the wall.
+    direction : float, rad
+        Direction of the wall's normal vector, from +x. The robots start 2 m away, opposite to it.
     side : float, m
         Side of the square.
     max_time : float, s
@@ -166,9 +170,6 @@ def crosses_door(
     -------
     bool
     """
-    direction = rng.uniform(0.0, math.tau)
-    door_offset = rng.uniform(-MAX_DOOR_OFFSET_M, MAX_DOOR_OFFSET_M)
-    wall = build_wall(direction, door_offset, door_width, side)
     environment = build_divided_square("door", wall, side)
     normal = np.array([math.cos(direction), math.sin(direction)])
     center = 0.5 * side
@@ -192,7 +193,9 @@ def measure_doors(controller: str, count: int, pool: ProcessPoolExecutor) -> Ite
 def crosses_door_on_large_map(controller: str, case: tuple[float, float, int]) -> bool:
     """Return whether a robot passes through a door, for a side of the square, a width and a seed."""
     side, door_width, seed = case
-    return crosses_door(controller, np.random.default_rng(seed), door_width, side, MAX_LARGE_MAP_TIME_S)
+    rng = np.random.default_rng(seed)
+    wall = build_wall(0.0, rng.uniform(-MAX_DOOR_OFFSET_M, MAX_DOOR_OFFSET_M), door_width, side)
+    return crosses_wall(controller, wall, 0.0, side, MAX_LARGE_MAP_TIME_S)
 
 
 def measure_large_maps(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
