@@ -39,7 +39,7 @@ def test_bundled_maps_have_names_descriptions_and_starts(name: str) -> None:
     environment = load_map(name)
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", name)
     assert environment.name.lower().replace(" ", "-") == name
-    assert re.fullmatch(r"[A-Z][^.\n]+\.", environment.description)
+    assert re.fullmatch(r"[A-Z][^\n]+\.", environment.description)
     assert len(environment.starts) >= 2
     assert list(environment.starts)[-1] == "uniform"
     assert isinstance(environment.starts["uniform"], UniformStart)

@@ -152,7 +152,7 @@ def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None
             "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
         )
         before = driver.copy_frame()
-        driver.window.is_unattended = False
+        driver.window._status.can_suggest = True
         driver.settle()
         assert not driver.shows_frame(before)
         session.timeline.is_settled = False

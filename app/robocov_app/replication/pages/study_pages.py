@@ -219,7 +219,7 @@ def compute_balance_distance(k_rep: float, rho_0: float, force: float = 1.0) -> 
     Examples
     --------
     >>> round(compute_balance_distance(1.0, 2.0), 2)
-    0.83
+    0.84
     """
     # In terms of 1 / distance, the equation is the cubic k_rep (s - 1 / rho_0) s² = force.
     roots = np.roots([k_rep, -k_rep / rho_0, 0.0, -force])

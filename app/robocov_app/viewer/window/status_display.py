@@ -33,7 +33,7 @@ class StatusDisplay:
         self._viewer = viewer
         self._lesson = lesson
         self._hint = hint
-        self._can_suggest = can_suggest
+        self.can_suggest = can_suggest
 
     @property
     def seek_progress(self) -> float | None:
@@ -62,6 +62,6 @@ class StatusDisplay:
         progress = self.seek_progress
         if progress is not None and not is_error:
             message = f"Recomputing the session: {100 * progress:.0f} %"
-        if not message and self._can_suggest and self._lesson.shown is None:
+        if not message and self.can_suggest and self._lesson.shown is None:
             message = suggest_actions(viewer)
         draw_message(screen, message, layout.arena, theme, layout.scale, is_error=is_error)
