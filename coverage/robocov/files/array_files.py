@@ -115,6 +115,7 @@ class _LimitedReader:
         return getattr(self._file, name)
 
     def read(self, size: int = -1) -> bytes:
+        """Read up to `size` bytes, or the rest of the file."""
         # `zipfile` omits the size only near the end of the file, where at most 64 KiB follow.
         if size > _MAX_READ_BYTES:
             raise zipfile.BadZipFile("its directory is too large")

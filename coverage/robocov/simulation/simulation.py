@@ -545,24 +545,25 @@ class Simulation:
         changed.joined = self.joined
         changed.sent_bytes = self.sent_bytes
         if len(new_team) == len(self.team):
-            self._copy_knowledge_to(
-                changed, copy_messages=conditions is None, has_same_controller=controller is None
+            _copy_knowledge(
+                self, changed, copy_messages=conditions is None, has_same_controller=controller is None
             )
         return changed
 
-    def _copy_knowledge_to(
-        self, target: Simulation, *, copy_messages: bool, has_same_controller: bool
-    ) -> None:
-        """Copy the memory and the messages to a simulation of the same robots, unless they are invalid there.
 
-        Another controller would understand neither the memory nor the controller messages of this one.
-        """
-        if copy_messages:
-            target.inbox = self.inbox
-        if has_same_controller:
-            target.memory = deepcopy(self.memory)
-        elif target.inbox is not None:
-            target.inbox = target.inbox.drop_messages()
+def _copy_knowledge(
+    source: Simulation, target: Simulation, *, copy_messages: bool, has_same_controller: bool
+) -> None:
+    """Copy the memory and the messages to a simulation of the same robots, unless they are invalid there.
+
+    Another controller would understand neither the memory nor the controller messages.
+    """
+    if copy_messages:
+        target.inbox = source.inbox
+    if has_same_controller:
+        target.memory = deepcopy(source.memory)
+    elif target.inbox is not None:
+        target.inbox = target.inbox.drop_messages()
 
 
 def _check_robots_fit(
