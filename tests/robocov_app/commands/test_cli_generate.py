@@ -14,11 +14,11 @@ from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import dump_map, list_bundled_maps, load_map
 from robocov_app.cli import main
 from robocov_app.commands.maps.generate import KindName
-from robocov_app.replication.design.plan import QUICK
+from robocov_app.replication.design.plan import FAMILIES, QUICK
 from robocov_app.replication.design.study_maps import (
     build_claim_maps,
     build_convex_maps,
-    build_generated_maps,
+    build_tuning_maps,
 )
 
 
@@ -89,10 +89,12 @@ def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.slow
 def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
-    every = *build_claim_maps(QUICK), *build_generated_maps(QUICK.tuning), *build_convex_maps(QUICK)
+    every = *build_claim_maps(QUICK), *build_tuning_maps(QUICK), *build_convex_maps(QUICK)
     maps = {each.name: each.environment for each in every}
     drawn = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
-    assert len(drawn) == sum(map(len, (QUICK.generated, QUICK.tuning, QUICK.convex_generated)))
+    with_polygons = len(QUICK.generated) + len(QUICK.tuning) + len(QUICK.convex_generated)
+    of_other_kinds = len(FAMILIES) * (len(QUICK.families) + len(QUICK.tuning_families))
+    assert len(drawn) == with_polygons + of_other_kinds
     assert [Path(row["file"]).stem for row in rows] == list(drawn)
     for name, environment in drawn.items():
         assert load_map(tmp_path / f"{name}.json") == environment

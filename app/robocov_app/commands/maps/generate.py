@@ -241,11 +241,11 @@ def _list_study_tasks(*, is_quick: bool) -> list[_MapTask]:
     from robocov_app.replication.design.study_maps import (
         build_claim_maps,
         build_convex_maps,
-        build_generated_maps,
+        build_tuning_maps,
     )
 
     plan = QUICK if is_quick else FULL
-    study_maps = [*build_claim_maps(plan), *build_generated_maps(plan.tuning), *build_convex_maps(plan)]
+    study_maps = [*build_claim_maps(plan), *build_tuning_maps(plan), *build_convex_maps(plan)]
     bundled_maps = list_bundled_maps()
     return [
         _MapTask(study_map.name, partial(_get_environment, study_map))
