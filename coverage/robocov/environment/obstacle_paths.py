@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, Ring, compute_lengths
 
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
-"""How an obstacle continues at the end of a path: straight to the first point, or back along the path."""
+"""Motion of an obstacle at the end of a path: straight to the first point, or back along the path."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
 """The values of `Repeat`."""
 _PARALLEL_TOLERANCE_M2 = 1e-12

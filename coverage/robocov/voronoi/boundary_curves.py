@@ -110,7 +110,7 @@ class _Equation(NamedTuple):
 
 
 class _Intersection(NamedTuple):
-    """How two curves meet, in terms of the parameter t of the first one."""
+    """Intersection of two curves, in terms of the parameter t of the first one."""
 
     enter: float
     """Parameter t at which the first curve enters the cell's side of the second one, m; nan if the curves do

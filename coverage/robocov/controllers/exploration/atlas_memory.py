@@ -85,7 +85,7 @@ class OwnMotion:
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """How long a robot has been stuck among others, and until when it moves away from them."""
+    """Time since which a robot has been stuck among others, and time until which it moves away from them."""
 
     stuck_plans: int = 0
     """Number of consecutive plans during which it has been stuck."""
@@ -102,10 +102,10 @@ class PlannerState:
     next_plan_time: float
     """Time of the next plan, s."""
     knowledge: TeamKnowledge
-    """What it knows of the others."""
+    """Its knowledge of the other robots."""
     path: TraveledPath = TraveledPath()
     basis: PlanBasis | None = None
-    """What its last plan is based on; None before the first plan."""
+    """The knowledge on which its last plan is based; None before the first plan."""
     team_goals: TeamGoals | None = None
     """Result of the first stage of its last plan; None before the first plan."""
     motion: OwnMotion | None = None

@@ -30,7 +30,7 @@ class SightingReport(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sightings:
-    """What each robot knows of the last positions of all robots. Immutable.
+    """The last known positions of all robots, as known to each robot. Immutable.
 
     A robot is lost if it has been silent for long although it would certainly be heard at its last known
     position. Its position is nan from then on. Robots pass this on like any other position, until there is a

@@ -1,4 +1,4 @@
-"""What a robot with `Atlas` knows of the others when it plans: who they are, where, and whether they move."""
+"""Knowledge of the other robots when a robot with `Atlas` plans: positions, and whether they move."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one robot knows about each of the others: position, time of the last message, and time at rest."""
+"""A robot's knowledge of each of the others: position, time of the last message, and time at rest."""
 
 from __future__ import annotations
 

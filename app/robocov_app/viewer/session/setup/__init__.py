@@ -1,1 +1,1 @@
-"""What a session simulates: map, team, controllers and their gains."""
+"""Setup of a session: map, team, controllers and their gains."""
