@@ -119,11 +119,9 @@ class GridPlanner(MapWindow):
     @cached_property
     def _portals(self) -> Portals:
         """Paths through passages that the straight edges miss."""
-        rows, columns = np.indices((self.window.rows, self.window.columns)).reshape(2, -1)
-        stride = self.window.stride
         return find_portals(
             is_passable=self.is_free & ~self.is_near_wall,
-            node_cells=np.column_stack([rows, columns]) * stride + stride // 2,
+            node_cells=self.window.compute_node_cells(),
             graph=_build_graph(self._moves),
         )
 
@@ -371,8 +369,6 @@ class GridPlanner(MapWindow):
 
     def _expand_portals(self, path: Sequence[int]) -> Array:
         """Return the positions along a path of nodes, (k, 2) m, with those of the cells in its portals."""
-        if not len(self._portals.paths):
-            return np.asarray(self.nodes[path])
         raster = self.known_map.raster
         origin = np.array([self.window.first_row, self.window.first_column])
         positions = [self.nodes[path[:1]]]

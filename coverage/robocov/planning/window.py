@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 from robocov.planning.raster import Raster
 
 _MIN_HALF_WIDTH_CELLS = 4
@@ -120,8 +120,19 @@ class Window(NamedTuple):
         -------
         (m, 2) array, m
         """
-        row, column = np.mgrid[: self.rows, : self.columns].reshape(2, -1) * self.stride + self.stride // 2
+        row, column = self.compute_node_cells().T
         return raster.compute_centers(row + self.first_row, column + self.first_column)
+
+    def compute_node_cells(self) -> IntArray:
+        """Compute the row and column, within the window, of the cell in which each node lies.
+
+        Returns
+        -------
+        (m, 2) int array
+            Row by row.
+        """
+        blocks = np.mgrid[: self.rows, : self.columns].reshape(2, -1).T
+        return np.ascontiguousarray(blocks * self.stride + self.stride // 2)
 
 
 def _compute_stepped_interval(middle: int, half_width: int, count: int) -> tuple[int, int]:

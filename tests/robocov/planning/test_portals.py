@@ -87,8 +87,7 @@ def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_node
     window = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, max_nodes)
     planner = GridPlanner(build_map(*walls), window, 0.15)
     is_passable = planner.is_free & ~planner.is_near_wall
-    node_rows, node_columns = np.divmod(np.arange(len(planner.nodes)), window.columns)
-    cells = np.column_stack([node_rows, node_columns]) * window.stride + window.stride // 2
+    cells = np.column_stack(RASTER.find_cells(planner.nodes))
     check_portals(planner, cells, is_passable)
     _, pieces = connected_components(planner._graph, directed=True, connection="strong")
     areas, _ = ndimage.label(is_passable)

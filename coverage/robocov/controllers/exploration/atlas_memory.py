@@ -85,7 +85,7 @@ class OwnMotion:
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """Time since which a robot has been stuck among others, and time until which it moves away from them."""
+    """Number of plans for which a robot has been stuck among others, and end of its move away from them."""
 
     stuck_plans: int = 0
     """Number of consecutive plans during which it has been stuck."""
