@@ -151,13 +151,14 @@ def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) 
 
 
 def _build_tiles(sites: Sites, grid_positions: Array, components: IntArray) -> Tiles:
-    """Arrange the sites, which are at (m, 2) grid positions in components (m,), in square tiles.
+    """Arrange the sites in square tiles.
 
-    Each tile has as many slots as cells, so that kernels need no lists of varying length.
+    Each tile has one slot per cell, so that kernels can use arrays of fixed size. The m sites lie at the
+    given `grid_positions`, (m, 2), in `components`, (m,).
     """
     columns = sites.cells % sites.lattice
     rows = sites.cells // sites.lattice
-    # Sort the sites by tile, so that those of one tile are consecutive entries of `by_tile`.
+    # Sort the sites by tile, so that the sites of each tile are contiguous in `by_tile`.
     tile_numbers = compute_z_order(columns // TILE_SIDE, rows // TILE_SIDE)
     by_tile = np.argsort(tile_numbers, kind="stable")
     first_entries = find_run_starts(tile_numbers[by_tile])

@@ -115,22 +115,23 @@ class Density(ABC):
         areas : (n,) array, m²
             Areas of the cells.
         area_centroids : (n, 2) array, m
-            Centroids of the cells for density 1.
+            Centroids of the cells for a uniform density.
 
         Returns
         -------
         masses : (n,) array, m²
             Integral of φ over each cell.
         centroids : (n, 2) array, m
-            Center of mass of each cell. A cell without mass and area keeps its centroid for density 1.
+            Center of mass of each cell. For a cell without mass and area, it is that of `area_centroids`.
 
         Notes
         -----
-        If the mean density of a cell is below 1e-9 of the maximum, rounding could decide where the centroid
-        is. For the centroid, a uniform mass is therefore added to the cell, so that its mean density is 1e-9
-        of the maximum.
+        Where the mean density of a cell is below 1e-9 of the maximum, rounding errors would dominate the
+        centroid. The centroid is then computed as if uniform mass had been added up to this mean density.
+        The returned masses are not changed.
         """
         moments = self.compute_moments(edges, origins)
+        # Rounding can make the mass of a cell with hardly any density negative.
         masses = np.maximum(moments[:, MASS], 0.0)
         added_masses = np.maximum(_MIN_MEAN_DENSITY * self.max_value * areas - masses, 0.0)
         weights = masses + added_masses

@@ -324,14 +324,16 @@ class _Search:
         return [_spread_points(area, spacing) for area in areas]
 
     def run_restart(self, rng: np.random.Generator, heartbeat: Callable[[], None]) -> _Outcome:
-        """Find good sources of the table, and descend the exact cost from their positions.
+        """Choose starting positions by the distance table, and descend the exact cost from there.
+
+        Restarts that choose the same positions share one outcome.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Random numbers of this restart.
+            Random number generator of this restart.
         heartbeat : callable
-            Called regularly. It may raise an exception to stop.
+            Called regularly. It may raise an exception to stop the search.
 
         Returns
         -------

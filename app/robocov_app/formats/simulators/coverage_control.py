@@ -88,7 +88,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     gaussians: list[Gaussian] = []
     areas: list[UniformArea] = []
     while features.has_more:
-        features.read_feature(gaussians, areas)
+        if len(gaussians) + len(areas) >= MAX_FEATURES:
+            raise MapError(f"{features.where}: expected at most {MAX_FEATURES} features, got more")
+        feature = features.read_feature()
+        if isinstance(feature, Gaussian):
+            gaussians.append(feature)
+        else:
+            areas.append(feature)
     side = WORLD_CELLS * get_or_default(options.cell, DEFAULT_CELL_M)
     weights = _compute_weights(gaussians, areas, side, features.where)
     if not weights.max() > 0.0:
@@ -124,21 +130,19 @@ class _FeatureReader:
         """Whether there are more words."""
         return self._next < len(self._words)
 
-    def read_feature(self, gaussians: list[Gaussian], areas: list[UniformArea]) -> None:
-        """Read the next feature, and append it to one of the lists."""
+    def read_feature(self) -> Gaussian | UniformArea:
+        """Read the next feature."""
         kind = self._words[self._next]
         self._next += 1
-        if len(gaussians) + len(areas) >= MAX_FEATURES:
-            raise MapError(f"{self.where}: expected at most {MAX_FEATURES} features, got more")
         if kind == "CircularBND":
             x, y, sigma, mass = self._read_numbers(4, kind)
-            gaussians.append(self._build_gaussian(x, y, sigma, sigma, 0.0, mass))
-        elif kind == "BND":
-            gaussians.append(self._build_gaussian(*self._read_numbers(6, kind)))
-        elif kind == "Uniform":
-            areas.append(self._read_area())
-        else:
-            raise MapError(f"{self.where}: expected CircularBND, BND or Uniform, got {quote(kind)}")
+            return self._check_gaussian(Gaussian(x, y, sigma, sigma, 0.0, mass))
+        if kind == "BND":
+            x, y, sigma_x, sigma_y, correlation, mass = self._read_numbers(6, kind)
+            return self._check_gaussian(Gaussian(x, y, sigma_x, sigma_y, correlation, mass))
+        if kind == "Uniform":
+            return self._read_area()
+        raise MapError(f"{self.where}: expected CircularBND, BND or Uniform, got {quote(kind)}")
 
     def _read_numbers(self, count: int, kind: str) -> list[float]:
         """Return the next numbers, which belong to a feature of the given kind."""
@@ -149,10 +153,9 @@ class _FeatureReader:
             raise MapError(f"{self.where}: {kind}: expected {count} numbers, got {quote(' '.join(words))}")
         return numbers
 
-    def _build_gaussian(
-        self, x: float, y: float, sigma_x: float, sigma_y: float, correlation: float, mass: float
-    ) -> Gaussian:
-        """Build a Gaussian from its numbers."""
+    def _check_gaussian(self, gaussian: Gaussian) -> Gaussian:
+        """Return a Gaussian after a check of its numbers."""
+        x, y, sigma_x, sigma_y, correlation, mass = gaussian
         for value in (x, y):
             require_coordinate(value, self.where)
         is_valid = min(sigma_x, sigma_y) > 0.0 and abs(correlation) <= _MAX_CORRELATION and mass >= 0.0
@@ -161,7 +164,7 @@ class _FeatureReader:
                 f"{self.where}: Gaussian at {x:g}, {y:g}: expected sigmas above 0, a correlation between -1 "
                 f"and 1, and a mass of at least 0, got {sigma_x:g}, {sigma_y:g}, {correlation:g} and {mass:g}"
             )
-        return Gaussian(x, y, sigma_x, sigma_y, correlation, mass)
+        return gaussian
 
     def _read_area(self) -> UniformArea:
         """Read a polygon with its number of corners, its weight and its corners."""

@@ -109,9 +109,9 @@ def judge_against_lloyd(outcomes: Outcomes, gains: GainChoice = "shared", *, lim
         ratio_measure="median of J(RAPF) / J(Lloyd) at the end",
         wins_measure="runs in which RAPF's is lower",
         explain=lambda pairs: (
-            f"Lloyd's robots slide here along obstacles, which they touch in "
-            f"{_format_touching_fraction(outcomes, 'lloyd')} of the runs, RAPF's in "
-            f"{_format_touching_fraction(outcomes, f'rapf-{gains}')}. Median ratio per kind of map: "
+            f"With Lloyd's algorithm, robots slide along obstacles: they touch one in "
+            f"{_format_touching_fraction(outcomes, 'lloyd')} of the runs, compared with "
+            f"{_format_touching_fraction(outcomes, f'rapf-{gains}')} for RAPF. Median ratio per kind of map: "
             f"{list_ratios_by_map_kind(pairs)}."
         ),
         max_ratio=CLEARLY_BELOW,

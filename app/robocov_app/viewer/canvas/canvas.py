@@ -113,7 +113,7 @@ class ViewerCanvas:
         self.camera.zoom(factor, pane, (pixel[0] - left, pixel[1] - top))
 
     def follow_robot(self) -> None:
-        """Keep the robot that the camera follows in the middle of the view, as long as it is displayed."""
+        """Center the view on the robot that the camera follows; stop following it if it is not displayed."""
         viewer = self.viewer
         number = viewer.inspection.followed
         displayed = viewer.session.displayed

@@ -416,12 +416,12 @@ class ViewerWindow(CommandWindow):
         self.viewer.files.open_file(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Offer a key to the lesson as an answer, and then to the control with the focus.
+        """Offer a key to the lesson, the layer bar, the chart, the focused control and the selection, in turn.
 
         Returns
         -------
         bool
-            Whether it was used. Tab is not: its command moves the focus.
+            Whether the key was used. Tab never is: its command moves the focus.
         """
         name = get_key_name(event)
         if name in _FOCUS_KEYS:
