@@ -416,7 +416,7 @@ class ViewerWindow(CommandWindow):
         self.viewer.files.open_file(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
-        """Offer a key to the lesson, the layer bar, the chart, the focused control and the selection, in turn.
+        """Offer a key to the lesson, the layer bar, the chart, the focused control and the selection.
 
         Returns
         -------
