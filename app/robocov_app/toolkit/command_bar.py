@@ -132,11 +132,14 @@ class CommandBar(CommandPart):
         if ui.width < NARROW_PX:
             return [*cells, self.build_button("save", "Save", command=self.save_command)]
         buttons = self.list_file_buttons(ui)
-        free = min(width - measure_cells([*cells, *buttons]) - 2 * SPACE_PX, _MAX_NAME_PX)
+        free = min(width - measure_cells([*cells, *buttons]) - 3 * SPACE_PX, _MAX_NAME_PX)
         cells.append(build_space(SPACE_PX))
+        # The name is the last cell: buttons behind it would move under the pointer when it changes.
+        cells.extend(buttons)
         if free >= _MIN_NAME_PX:
+            cells.append(build_space(SPACE_PX))
             cells.append(self._build_file_name(ui, file, free))
-        return [*cells, *buttons]
+        return cells
 
     def list_file_buttons(self, ui: Ui) -> list[BarCell]:
         """Return the cells that open and save files, in bars that are not narrow."""

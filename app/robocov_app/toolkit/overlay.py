@@ -16,13 +16,14 @@ _SUPERSAMPLING = 4
 """Rounded boxes are drawn larger by this factor and then scaled down, which smooths their edges."""
 _BOX_CACHE_BYTES = 4_000_000
 _VEIL_ALPHA = 150
-_EDGE_STRENGTH = 0.14
 _FACT_SEPARATOR = "    "
 
 # Lengths in pixels at scale 1.
 _CARD_RADIUS_PX = 8
 _MESSAGE_TEXT_PX = 12.5
 _MESSAGE_LINE_PX = 18
+_MIN_MESSAGE_WIDTH_PX = 150
+"""Minimum width of the lines of a message; next to an open panel on a phone, the arena is narrower."""
 _MAX_MESSAGE_WIDTH_PX = 620
 _MESSAGE_MARGIN_PX = 14
 """Distance of the text of a message from the left and right edges of its box."""
@@ -208,6 +209,8 @@ def draw_message(
 ) -> None:
     """Draw a message at the bottom of the arena; nothing if the text is empty.
 
+    In an arena that is too narrow for words, the message extends beyond the arena, but not beyond the screen.
+
     Parameters
     ----------
     screen : pygame.Surface
@@ -225,6 +228,7 @@ def draw_message(
     size = round(_MESSAGE_TEXT_PX * scale)
     left, top, width, height = arena
     max_width = min(width - 2 * _MESSAGE_SIDE_PX * scale, _MAX_MESSAGE_WIDTH_PX * scale)
+    max_width = max(max_width, _MIN_MESSAGE_WIDTH_PX * scale)
     lines: list[str] = []
     for paragraph in text.split("\n"):
         lines += wrap_text(paragraph, size, max_width)
@@ -232,6 +236,7 @@ def draw_message(
     box_height = (len(lines) * _MESSAGE_LINE_PX + _MESSAGE_HEIGHT_PX) * scale
     box = Rect(0, 0, round(box_width), round(box_height))
     box.midbottom = round(left + width / 2), round(top + height - _MESSAGE_BOTTOM_PX * scale)
+    box.clamp_ip(screen.get_rect())
     fill = theme.panel
     edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
     if is_error:

@@ -12,9 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_sessions import RAPF
 
+from robocov_app.look.theme import LIGHT
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.commands import help_page
-from robocov_app.toolkit.overlay import wrap_text
+from robocov_app.toolkit.overlay import draw_message, wrap_text
+from robocov_app.toolkit.window.layout import Box
 from robocov_app.viewer.commands.viewer_commands import GROUPS
 from robocov_app.viewer.window.screen_video import copy_pixels
 
@@ -24,6 +26,17 @@ def test_wrapped_lines_fit_and_contain_all_words(text: str, width: int) -> None:
     lines = wrap_text(text, 12, width)
     assert "".join("".join(lines).split()) == "".join(text.split())
     assert all(measure_text(line, 12) <= width for line in lines)
+
+
+def test_a_message_in_a_narrow_arena_keeps_its_words_whole() -> None:
+    screen = pygame.Surface((390, 700))
+    arena = Box(40, 60, 90, 500)
+    draw_message(screen, "all controllers restart from the same starts", arena, LIGHT, 1.0, is_error=False)
+    mask = pygame.mask.from_threshold(screen, (0, 0, 0), (1, 1, 1))
+    mask.invert()
+    (box,) = mask.get_bounding_rects()
+    assert box.width > measure_text("all controllers", 12)
+    assert box.left > 0
 
 
 @pytest.mark.slow

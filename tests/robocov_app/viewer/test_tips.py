@@ -8,7 +8,7 @@ from driven_window import Driver
 
 from robocov_app.look.theme import LIGHT
 from robocov_app.toolkit.widgets import tool_tip
-from robocov_app.toolkit.widgets.tool_tip import draw_tool_tip
+from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, draw_tool_tip
 from robocov_app.viewer.panel.sketches import get_sketch
 
 WIDGET = pygame.Rect(100, 80, 36, 36)
@@ -70,3 +70,22 @@ def test_every_button_of_the_rail_shows_a_tip_with_its_key_beside_it(driver: Dri
         driver.window.draw()
         differs = (driver.copy_frame() != before).any(axis=2)
         assert differs[:, rail.box.right : rail.box.right + 60].any(), widget.key
+
+
+@pytest.mark.usefixtures("quick_tips")
+def test_a_message_does_not_cover_a_tip(driver: Driver) -> None:
+    """In a low window, the tips of the lowest tools reach the place of the message."""
+    rail = driver.window.tool_rail.ui
+    ruler = driver.get_widget("button", "tool:ruler")
+    driver.move(*ruler.rect.center)
+    driver.window.draw()
+    before = driver.copy_frame()
+    driver.viewer.message = "a message of many lines " * 60
+    driver.window.draw()
+    after = driver.copy_frame()
+    assert (after != before).any()
+    is_text = (before == TIP_TEXT_COLOR).all(axis=2)
+    is_text[:, : rail.box.right] = False
+    is_text[:, rail.box.right + 150 :] = False
+    assert is_text.any()
+    assert (after[is_text] == TIP_TEXT_COLOR).all()

@@ -36,6 +36,17 @@ def test_a_dot_marks_unsaved_edits_until_the_session_is_saved(driver: Driver) ->
     assert driver.get_widget("label", "file").text == driver.viewer.files.workspace.path.name
 
 
+def test_buttons_stay_in_place_when_the_name_of_the_file_changes(driver: Driver) -> None:
+    """With the name before them, the second click of a double click on Save opened the dialog of Open."""
+    before = driver.get_widget("button", "save:session").rect.copy()
+    driver.viewer.attempt(lambda: driver.session.fail_robot(1))
+    driver.run_frames(2)
+    assert driver.get_widget("button", "save:session").rect == before
+    driver.push_button("save:session")
+    driver.run_frames(2)
+    assert driver.get_widget("button", "save:session").rect == before
+
+
 @pytest.mark.parametrize("size", [(460, 620), (900, 600), (1280, 720), (2560, 1440)])
 def test_buttons_of_the_bar_lie_in_it_side_by_side(tmp_path: Path, size: tuple[int, int]) -> None:
     with open_viewer(tmp_path) as driver:

@@ -312,7 +312,7 @@ class EditorWindow(CommandWindow):
             part.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw the map, the status bar, the parts, the message and everything above the map."""
+        """Draw the map, the status bar, the message, the parts and everything above the map."""
         layout = self.layout
         theme = self.theme
         editor = self.editor
@@ -321,10 +321,10 @@ class EditorWindow(CommandWindow):
         draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
         if layout.has_panel:
             self.panel.draw(self.screen)
-        self.tool_rail.draw(self.screen)
-        self.top_bar.draw(self.screen)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
+        self.tool_rail.draw(self.screen)
+        self.top_bar.draw(self.screen)
         self.draw_above_map()
 
     def _attempt(self, action: Callable[[], object]) -> None:

@@ -382,10 +382,10 @@ class ViewerWindow(CommandWindow):
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
+        self._status.draw_message(self.screen, layout, self.theme)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         self.tool_rail.draw(self.screen)
         self.top_bar.draw(self.screen)
-        self._status.draw_message(self.screen, layout, self.theme)
         self.draw_above_map()
         self.video_recorder.add_frame(self.screen)
 
