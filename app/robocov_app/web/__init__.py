@@ -74,6 +74,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         echo(f"open {display.link}", flush=True)
         echo(f"to watch only: {display.watch_link}", flush=True)
         window.remote = display
+        window.hide_folder(folder)
         was_interrupted = False
 
         def close_window(number: int, frame: object) -> None:

@@ -337,6 +337,19 @@ def test_files_are_chosen_in_folders(screen: pygame.Surface, tmp_path: Any) -> N
     assert not dialogs.is_open
 
 
+def test_a_choice_of_files_can_hide_where_its_folder_is(tmp_path: Path) -> None:
+    for name in ("old.json", "new.json"):
+        (tmp_path / name).touch()
+    recent = (tmp_path / "old.json",)
+    choice = create_file_choice("Open", tmp_path, print, recent=recent, hides_folder=True)
+    texts = [choice.placeholder, *(option.text + option.completion for option in choice.options(""))]
+    assert "old.json" in texts[1]
+    assert not any(str(tmp_path.parent) in text for text in texts)
+    shown = create_file_choice("Open", tmp_path, print, recent=recent)
+    assert str(tmp_path) in shown.placeholder
+    assert shown.options("")[0].text == str(recent[0])
+
+
 def test_a_menu_stays_in_the_window_and_skips_disabled_commands(
     screen: pygame.Surface,
 ) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
+
 from robocov.errors import MapError
 from robocov_app.toolkit.window.window_model import MESSAGE_S, WindowModel
 
@@ -46,3 +50,29 @@ def test_actions_show_their_message_or_their_error() -> None:
     assert "map.json" in model.message
     model.attempt(lambda: None)
     assert "map.json" in model.message
+
+
+def test_messages_omit_the_hidden_folder_from_paths(tmp_path: Path) -> None:
+    model = WindowModel()
+    file = tmp_path / "lab" / "rooms-1.robocov"
+    model.show_message(f"session saved: {file}")
+    assert str(file) in model.message
+    model.hidden_folder = tmp_path
+    model.show_message(f"session saved: {file}")
+    assert model.message == "session saved: lab/rooms-1.robocov"
+    model.attempt(lambda: fail(MapError(f"{file}: not found")))
+    assert model.message == "lab/rooms-1.robocov: not found"
+
+
+def test_a_relative_hidden_folder_is_omitted_in_every_spelling(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = WindowModel()
+    for folder in (Path(), Path("lab"), tmp_path / "link"):
+        model.hidden_folder = folder
+        for spelling in (folder, folder.absolute(), folder.resolve()):
+            path = spelling / "rooms.json"
+            assert model.shorten_paths(f"map opened: {path}") == "map opened: rooms.json"
+    model.hidden_folder = Path()
+    assert model.shorten_paths("../other/rooms.json") == "../other/rooms.json"

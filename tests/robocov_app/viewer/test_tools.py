@@ -371,7 +371,8 @@ def test_the_eraser_deletes_obstacles():
     assert click(build_tools()["eraser"], session, (2.53, 3.0)) == "wall deleted"
     assert click(build_tools()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
     assert session.displayed.environment.obstacles == ()
-    assert click(build_tools()["eraser"], session, (4.2, 1.2)) is None
+    message = click(build_tools()["eraser"], session, (4.2, 1.2))
+    assert message == "nothing to delete here: choose an obstacle or a robot"
 
 
 def test_the_eraser_prefers_robots_to_obstacles():
@@ -399,7 +400,8 @@ def test_robots_join_at_clicks():
 def test_robots_fail_and_are_revived_by_clicks():
     tool = build_tools()["failure"]
     session = advance_session(start_session(RAPF, LLOYD), 5)
-    assert click(tool, session, (1.0, 1.0)) is None
+    assert click(tool, session, (1.0, 1.0)) == "no robot here: choose a robot to make it fail"
+    assert get_robot_numbers(session) == ((1, 2, 3), ())
     assert click(tool, session, (1.0, 1.0), number=2) == "robot 2 failed"
     assert get_robot_numbers(session) == ((1, 3), (2,))
     assert click(tool, session, (1.0, 1.0), number=2) == "robot 2 works again"
@@ -430,6 +432,12 @@ def test_the_ruler_measures_a_distance():
     assert tool.build_overlay(session) == ViewerToolOverlay()
     assert not tool.cancel(session)
     assert describe_state(session) == before
+
+
+def test_a_click_of_the_ruler_says_what_to_do():
+    assert (
+        click(RulerTool(), start_session(), (1.0, 1.0)) == "nothing measured: drag from one point to another"
+    )
 
 
 def test_messages_count_pushed_robots_and_name_covered_starts():

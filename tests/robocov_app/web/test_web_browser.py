@@ -119,6 +119,9 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         wait_for_rest(browser)
         press_with_control(browser, "s")
         browser.wait_until(lambda: browser.find_all("#saved a"))
+        message = browser.find("#status").get_property("textContent")
+        assert "saved" in message
+        assert str(tmp_path) not in message
         assert browser.find("#saved").get_property("open")
         browser.find("#saved a").click()
         browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))

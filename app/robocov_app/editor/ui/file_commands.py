@@ -146,7 +146,14 @@ class FileCommands:
         def choose(path: Path) -> None:
             self.editor.carry_out(lambda: action(path))
 
-        dialog = create_file_choice(title, self.editor.folder, choose, suffixes=suffixes, text=text)
+        dialog = create_file_choice(
+            title,
+            self.editor.folder,
+            choose,
+            suffixes=suffixes,
+            text=text,
+            hides_folder=self.editor.hidden_folder is not None,
+        )
         self.editor.dialogs.ask(dialog)
 
     def ask_recent(self) -> None:

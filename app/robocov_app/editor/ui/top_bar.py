@@ -35,9 +35,12 @@ class EditorTopBar(CommandBar):
         """Return the file of the map and its edits."""
         document = self._editor.document
         history = document.history
+        location = NO_FILE_TEXT
+        if document.path is not None:
+            location = self._editor.shorten_paths(str(document.path))
         return BarFile(
             name=document.title,
-            location=NO_FILE_TEXT if document.path is None else str(document.path),
+            location=location,
             has_unsaved_edits=history.has_unsaved_changes,
             can_undo=history.can_undo,
             can_redo=history.can_redo,

@@ -21,6 +21,7 @@ def create_file_choice(
     suffixes: Sequence[str] = (),
     recent: Sequence[Path] = (),
     text: str = "",
+    hides_folder: bool = False,
 ) -> Choice:
     """Create a dialog in which the user chooses a file.
 
@@ -37,12 +38,14 @@ def create_file_choice(
         Files that are listed before anything is typed.
     text : str
         Proposed name of a file to be saved; empty to choose an existing file.
+    hides_folder : bool
+        Whether the path of the folder is not shown, because the user of a browser cannot open it.
 
     Returns
     -------
     Choice
     """
-    browser = _FileBrowser(folder, tuple(suffixes), tuple(recent))
+    browser = _FileBrowser(folder, tuple(suffixes), tuple(recent), shows_names_only=hides_folder)
     saves = bool(text)  # A proposed name means that the dialog saves a file rather than opens one.
 
     def accept_text(typed: str, option: Option | None) -> object:
@@ -62,11 +65,14 @@ def create_file_choice(
     empty_text = Choice.empty_text
     if saves:
         empty_text = "Press Enter to save here"
+    placeholder = f"a path from {folder.absolute()}"
+    if hides_folder:
+        placeholder = "a file name"
     return Choice(
         title,
         browser.list_options,
         accept_text,
-        placeholder=f"a path from {folder.absolute()}",
+        placeholder=placeholder,
         hint=_HINT,
         empty_text=empty_text,
         text=text,
@@ -80,6 +86,7 @@ class _FileBrowser:
     folder: Path
     suffixes: tuple[str, ...]
     recent: tuple[Path, ...]
+    shows_names_only: bool
     _options: dict[str, list[Option]] = field(default_factory=dict)
 
     def resolve(self, text: str) -> Path:
@@ -106,7 +113,7 @@ class _FileBrowser:
         entries.sort(key=lambda path: (path not in subfolders, path.name.lower()))
         options = []
         if not text:
-            options += [Option(str(path), "recent", str(path), value=path) for path in self.recent]
+            options += [self._build_recent_option(path) for path in self.recent]
         for path in entries:
             is_file = path not in subfolders
             if not self._is_listed(path, name, is_file=is_file):
@@ -115,10 +122,15 @@ class _FileBrowser:
                 options.append(Option(path.name, completion=prefix + path.name, value=path))
             else:
                 options.append(Option(f"{path.name}/", "folder", f"{prefix}{path.name}/", value=path))
-        if not name:
+        if not name and not self.shows_names_only:
             parent = folder.resolve().parent.as_posix().rstrip("/")
             options.append(Option("../", "folder", f"{parent}/"))
         return options
+
+    def _build_recent_option(self, path: Path) -> Option:
+        """Build the option of a recent file."""
+        text = path.name if self.shows_names_only else str(path)
+        return Option(text, "recent", text, value=path)
 
     def _is_listed(self, path: Path, name: str, *, is_file: bool) -> bool:
         """Return whether a file or folder matches the typed part of its name."""

@@ -120,6 +120,10 @@ class CommandWindow(BaseWindow):
         """The status message."""
         return self.model.message
 
+    def hide_folder(self, folder: Path) -> None:
+        """Omit a folder from the paths in messages; see `BaseWindow`."""
+        self.model.hidden_folder = folder
+
     # Commands
 
     def do(self, name: str) -> None:

@@ -194,6 +194,9 @@ class BaseWindow:
     def reduce_motion(self, *, is_reduced: bool) -> None:
         """Adopt the setting of the user's system for reduced motion."""
 
+    def hide_folder(self, folder: Path) -> None:
+        """Omit a folder from the paths in messages, because a browser's user cannot open it."""
+
     def create_save_point(self) -> RollBack:
         """Return a function that reverts all later changes; it is called if handling an event raises."""
         return _revert_nothing

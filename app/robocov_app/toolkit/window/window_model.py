@@ -1,6 +1,7 @@
 """State that every window has: a status message, a clock, and actions whose errors are shown."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from robocov.errors import RobocovError
 from robocov_app.toolkit.window.exceptions import describe_os_error
@@ -24,6 +25,8 @@ class WindowModel:
         Whether the message reports an error.
     now : float
         Time since the window was opened, s.
+    hidden_folder : Path or None
+        Folder that messages omit from paths, because the user of a browser cannot open it.
     """
 
     error_message_s = MESSAGE_S
@@ -33,14 +36,27 @@ class WindowModel:
         self.message = ""
         self.has_error_message = False
         self.now = 0.0
+        self.hidden_folder: Path | None = None
         self._message_time = 0.0
 
     def show_message(self, text: str, *, is_error: bool = False) -> None:
         """Show a status message; if it is empty, the current message stays."""
         if text:
-            self.message = text
+            self.message = self.shorten_paths(text)
             self.has_error_message = is_error
             self._message_time = self.now
+
+    def shorten_paths(self, text: str) -> str:
+        """Remove the hidden folder from all paths in a text."""
+        folder = self.hidden_folder
+        if folder is None:
+            return text
+        for spelling in (folder.resolve(), folder.absolute(), folder):
+            prefix = spelling.as_posix().rstrip("/") + "/"
+            # The folder "." is not a part of its paths, and "./" may be a part of others.
+            if len(prefix) > len("./"):
+                text = text.replace(prefix, "")
+        return text
 
     def clear_message(self) -> None:
         """Remove the status message."""

@@ -6,6 +6,9 @@ from robocov_app.viewer.tools.tool import ViewerPointerEvent, ViewerTool, delete
 
 ERASE_REACH_FRACTION = 0.5  # fraction of the reach within which a click deletes an obstacle
 
+_NOTHING_TO_DELETE = "nothing to delete here: choose an obstacle or a robot"
+_NO_ROBOT_TO_FAIL = "no robot here: choose a robot to make it fail"
+
 
 class EraserTool(ViewerTool):
     """Deletes robots and obstacles."""
@@ -17,14 +20,14 @@ class EraserTool(ViewerTool):
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Delete the robot under the cursor; if there is none, delete the obstacle."""
+        """Delete the robot under the cursor, or else the obstacle; say what to do if there is neither."""
         if event.robot is not None:
             session.remove_robot(event.robot)
             return f"robot {event.robot} removed"
         reach = ERASE_REACH_FRACTION * event.reach
         index = map_edits.find_obstacle(session.displayed.environment, event.unsnapped_point, reach)
         if index is None:
-            return None
+            return _NOTHING_TO_DELETE
         return delete_obstacle(session, index)
 
 
@@ -51,7 +54,7 @@ class FailureTool(ViewerTool):
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Let the robot under the cursor fail, or revive it."""
+        """Let the robot under the cursor fail, or revive it; say what to do if there is none."""
         if event.robot is None:
-            return None
+            return _NO_ROBOT_TO_FAIL
         return toggle_failure(session, event.robot)

@@ -88,8 +88,10 @@ class RulerTool(SegmentTool):
     hint = "drag from one point to another"
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Keep the measurement visible until the next press."""
+        """Keep the measurement visible until the next press; after a click, say what to do."""
         self.segment.release()
+        if clicked:
+            return "nothing measured: drag from one point to another"
         return None
 
     def build_overlay(self, session: Session) -> ViewerToolOverlay:

@@ -14,18 +14,25 @@ from robocov_app.toolkit.dialogs import (
     create_list_choice,
     create_recovery_question,
 )
-from robocov_app.viewer.actions.files import FileActions
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
 
 
-def build_file_dialog(files: FileActions) -> Choice:
+def build_file_dialog(viewer: Presenter) -> Choice:
     """Return the dialog that opens a session or a map."""
+    files = viewer.files
     recent = [Path(name) for name in files.recent if Path(name).exists()]
     endings = (SUFFIX, ".json")
     title = "Open a session or a map"
-    return create_file_choice(title, files.folder, files.open_file, suffixes=endings, recent=recent)
+    return create_file_choice(
+        title,
+        files.folder,
+        files.open_file,
+        suffixes=endings,
+        recent=recent,
+        hides_folder=viewer.hidden_folder is not None,
+    )
 
 
 def build_branch_dialog(viewer: Presenter) -> Choice:

@@ -65,7 +65,9 @@ class TopBar(CommandBar):
         files = self._viewer.files
         path = files.workspace.path
         name = Path(files.map_name).stem if path is None else path.name
-        location = "This session has no file yet" if path is None else str(path)
+        location = "This session has no file yet"
+        if path is not None:
+            location = self._viewer.shorten_paths(str(path))
         node, _ = self._viewer.session.timeline.destination
         return BarFile(
             name=name,

@@ -196,7 +196,7 @@ class ViewerWindow(CommandWindow):
             save_screenshot=lambda: self.save_screenshot(self.viewer.files.folder),
             toggle_recording=lambda: self.video_recorder.toggle(self.screen),
             save_run=self.save_run,
-            open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer.files)),
+            open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer)),
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,

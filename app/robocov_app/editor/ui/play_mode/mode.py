@@ -60,6 +60,7 @@ class PlayMode:
         window.reduce_motion(is_reduced=self._is_motion_reduced)
         window.windowed_size = host.windowed_size
         window.cursor = host.cursor
+        window.model.hidden_folder = host.model.hidden_folder
         self.window = window
         host.replacement = window
 
