@@ -12,6 +12,7 @@ import pytest
 
 from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.viewer.canvas.layer_chips import build_layer_entries
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
 from robocov_app.viewer.session.session import Session
@@ -37,7 +38,8 @@ def find_chips(window: ViewerWindow) -> dict[str, pygame.Rect]:
 
 
 def list_texts(window: ViewerWindow) -> list[str]:
-    return [entry.text for chip, _ in window.layer_bar.chips for entry in chip.entries]
+    """Return the texts next to the symbols of the chips."""
+    return [text for chip, _ in window.layer_bar.chips if chip.entries for text in chip.texts]
 
 
 def click(window: ViewerWindow, box: pygame.Rect) -> None:
@@ -93,6 +95,27 @@ def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], pres
         assert all(first.right < second.left for first, second in itertools.pairwise(boxes))
         assert all(box.right <= left + width for _, box in window.layer_bar.rows)
         assert all(box.bottom <= size[1] for _, box in window.layer_bar.rows)
+
+
+def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path) -> None:
+    with open_window(tmp_path, size=(900, 600)) as window:
+        assert "Cell centroid" in list_texts(window)
+        window.do("tour")
+        for _ in range(10):
+            window.run_frame(1 / 30)
+        assert {"Attraction", "Robot repulsion", "Obstacle repulsion"} <= set(list_texts(window))
+
+
+@pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
+def test_every_unusual_symbol_has_a_chip_in_a_small_window(tmp_path: Path, preset) -> None:
+    """Chips that do not fit with their text remain with a tip; only standard layers are left out."""
+    with open_window(tmp_path, size=(900, 600)) as window:
+        window.do(f"preset:{preset.name}")
+        window.run_frame(1 / 30)
+        unusual = [layer for layer in window.canvas.layers if not layer.is_default]
+        explained = [layer for layer in unusual if build_layer_entries(layer, window.canvas.scenes)]
+        visible = {f"layer:{layer.name}" for layer in explained if layer.name in preset.layers}
+        assert visible <= set(find_chips(window))
 
 
 def test_presets_and_the_menu_have_every_layer(tmp_path: Path) -> None:

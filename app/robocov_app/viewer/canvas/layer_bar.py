@@ -16,6 +16,7 @@ from robocov_app.toolkit.tools.pointer import Pixel
 from robocov_app.toolkit.widgets.appearance import draw_ring
 from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
 from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.viewer.canvas.chip_fitting import fit_chips
 from robocov_app.viewer.canvas.layer_chips import (
     CHIP_HEIGHT_PX,
     Chip,
@@ -44,9 +45,6 @@ _MENU_ROW_PX = 21.0
 _MENU_HEADER_PX = 22.0
 _MENU_HEADER_TEXT_PX = 11.0
 _GROUP_GAP_PX = 6.0
-
-_DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
-"""Layers with symbols that need no explanation; their chips are left out first if space is short."""
 
 
 class LayerBar(BasicFocusGroup):
@@ -194,18 +192,22 @@ class LayerBar(BasicFocusGroup):
         if "legend" in self._view.layers:
             chips = self._list_layer_chips(layers, scenes)
             presets = self._list_preset_chips()
-        widths = {chip.command: measure_chip(canvas, chip) + gap for chip in [menu, *chips, *presets]}
-        space = width - 2 * margin - widths[menu.command] + gap
-        chips, presets = _select_fitting(chips, presets, widths, space)
+
+        def measure(chip: Chip) -> int:
+            return measure_chip(canvas, chip) + gap
+
+        space = width - 2 * margin - measure(menu) + gap
+        standard_commands = {f"layer:{layer.name}" for layer in layers if layer.is_default}
+        chips, presets = fit_chips(chips, presets, standard_commands, measure, space)
         placed = []
         x = left + margin
         for chip in [menu, *chips]:
-            placed.append((chip, Rect(x, y, widths[chip.command] - gap, height)))
-            x += widths[chip.command]
-        x = left + width - margin - sum(widths[chip.command] for chip in presets) + gap
+            placed.append((chip, Rect(x, y, measure(chip) - gap, height)))
+            x += measure(chip)
+        x = left + width - margin - sum(measure(chip) for chip in presets) + gap
         for chip in presets:
-            placed.append((chip, Rect(x, y, widths[chip.command] - gap, height)))
-            x += widths[chip.command]
+            placed.append((chip, Rect(x, y, measure(chip) - gap, height)))
+            x += measure(chip)
         return placed
 
     def _list_layer_chips(self, layers: Sequence[Layer], scenes: Sequence[Scene]) -> list[Chip]:
@@ -335,34 +337,6 @@ def _describe_chip(chip: Chip, tip: str) -> str:
         verb = "Hide" if chip.is_on else "Show"
         return f"{verb}: {tip}"
     return tip
-
-
-def _select_fitting(
-    chips: list[Chip], presets: list[Chip], widths: dict[str, int], space: int
-) -> tuple[list[Chip], list[Chip]]:
-    """Leave out chips until the others fit: known symbols first, then the presets, then the last ones.
-
-    Everything that is left out is also in the menu.
-    """
-
-    def fits(some_chips: list[Chip], some_presets: list[Chip]) -> bool:
-        return sum(widths[chip.command] for chip in [*some_chips, *some_presets]) <= space
-
-    remaining = list(chips)
-    if fits(remaining, presets):
-        return remaining, presets
-    for name in _DROPPED_FIRST:
-        remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
-        if fits(remaining, presets):
-            return remaining, presets
-    remaining = list(chips)
-    for name in _DROPPED_FIRST:
-        if fits(remaining, []):
-            return remaining, []
-        remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
-    while remaining and not fits(remaining, []):
-        remaining.pop()
-    return remaining, []
 
 
 def _divide_into_columns(groups: dict[str, list[Layer]], max_columns: int) -> list[list[str]]:

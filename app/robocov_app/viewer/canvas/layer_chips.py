@@ -52,6 +52,8 @@ class Chip:
         Text of a chip without entries.
     is_on : bool
         Whether its layers are visible.
+    has_text : bool
+        Whether the texts of the entries are shown next to their symbols.
     """
 
     kind: ChipKind
@@ -59,11 +61,16 @@ class Chip:
     entries: tuple[LegendEntry, ...] = ()
     label: str = ""
     is_on: bool = False
+    has_text: bool = True
 
     @property
-    def key(self) -> object:
-        """Value that differs between chips that look different."""
-        return self.kind, self.command, tuple(entry.key for entry in self.entries), self.label, self.is_on
+    def texts(self) -> list[str]:
+        """The texts that are shown on the chip."""
+        if not self.entries:
+            return [self.label]
+        if not self.has_text:
+            return []
+        return [entry.text for entry in self.entries]
 
 
 def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEntry, ...]:
@@ -101,10 +108,11 @@ def measure_chip(canvas: Canvas, chip: Chip) -> int:
     width = 2 * CHIP_PADDING_PX
     if chip.kind == "menu":
         width += _ICON_WIDTH_PX + SYMBOL_GAP_PX
-    width += len(chip.entries) * (SYMBOL_WIDTH_PX + SYMBOL_GAP_PX)
+    width += len(chip.entries) * SYMBOL_WIDTH_PX
     width += max(len(chip.entries) - 1, 0) * ENTRY_GAP_PX
-    texts = [entry.text for entry in chip.entries] or [chip.label]
-    text_width = sum(canvas.measure_text(text, CHIP_TEXT_PX) for text in texts)
+    if chip.has_text:
+        width += len(chip.entries) * SYMBOL_GAP_PX
+    text_width = sum(canvas.measure_text(text, CHIP_TEXT_PX) for text in chip.texts)
     return round(width * canvas.scale + text_width)
 
 
@@ -129,8 +137,10 @@ def draw_chip(canvas: Canvas, chip: Chip, box: Rect, *, is_hovered: bool) -> Non
         canvas.draw_text(chip.label, (x, box.centery), size=CHIP_TEXT_PX, color=ink)
     for entry in chip.entries:
         draw_symbol(canvas, entry, x, box.centery, fill, is_on=chip.is_on)
-        x += (SYMBOL_WIDTH_PX + SYMBOL_GAP_PX) * canvas.scale
-        x += canvas.draw_text(entry.text, (x, box.centery), size=CHIP_TEXT_PX, color=ink)
+        x += SYMBOL_WIDTH_PX * canvas.scale
+        if chip.has_text:
+            x += SYMBOL_GAP_PX * canvas.scale
+            x += canvas.draw_text(entry.text, (x, box.centery), size=CHIP_TEXT_PX, color=ink)
         x += ENTRY_GAP_PX * canvas.scale
 
 
