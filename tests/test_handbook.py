@@ -128,7 +128,7 @@ def test_nothing_in_a_terminal_is_answered_in_five_lines(
 def test_a_run_without_pictures_has_its_numbers(tmp_path: Path) -> None:
     out = tmp_path / "run"
     assert (
-        main(["run", "square", "--duration", "0.2", "--no-pictures", "--lattice", "16", "--out", str(out)])
+        main(["run", "square", "--duration", "0.2", "--no-figures", "--lattice", "16", "--out", str(out)])
         == 0
     )
     assert {file.name for file in out.iterdir()} == {".robocov.json", "run.json", "record.npz", "cost.csv"}

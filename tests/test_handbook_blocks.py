@@ -61,7 +61,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) -> None:
     text = page.read_text()
     if "first-run" in text and page.stem not in ("README", "package", "first-run"):
-        assert main(["run", "rooms", "--duration", "25", "--no-pictures", "--out", "first-run"]) == 0
+        assert main(["run", "rooms", "--duration", "25", "--no-figures", "--out", "first-run"]) == 0
     if page.stem == "python":
         (folder / "study.toml").write_text('maps = ["square"]\ncontrollers = ["rapf"]\nduration = 0.5\n')
         assert main(["sweep", "study.toml", "--out", "study"]) == 0

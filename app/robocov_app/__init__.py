@@ -1,1 +1,1 @@
-"""Application layer of robocov: command line, pictures, frames and films."""
+"""Application layer of robocov: command line, figures, frames and videos."""

@@ -214,3 +214,7 @@ def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
             driver.choose_option("way", word)
             assert driver.session.timeline.panes[0].controller.get_value("way") == word
             assert driver.get_widget("menu", "way").text == word
+
+
+def test_a_session_shows_the_value_of_a_gain_with_a_former_spelling() -> None:
+    assert ControllerChoice("poduri", {"neighbours": 5.0}).get_value("neighbors") == 5.0

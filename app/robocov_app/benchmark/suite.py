@@ -50,6 +50,8 @@ _BUNDLED = (
     "trap",
     "warehouse",
 )
+_FROZEN_START_NAMES = {"center": "centre"}
+"""Names of starts in the hashed maps that differ from those of the generators."""
 _LARGE_OBSTACLES = 24
 """Number of obstacles of maps for large teams."""
 _LARGE_SIDE_M = 20.0
@@ -188,6 +190,8 @@ def build_map(name: str) -> Environment:
 def compute_map_hash(environment: Environment) -> str:
     """Return the SHA-256 of the content of a map, apart from its description and the schema of its file."""
     document = {**to_json(environment), "$schema": None, "description": None}
+    starts = document.get("starts", {})
+    document["starts"] = {_FROZEN_START_NAMES.get(name, name): start for name, start in starts.items()}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
 

@@ -217,7 +217,7 @@ class VideoOptions(LayerOptions):
     """Save a video (H.264, MP4)."""
     fps: int = 30
     """Video frames per second."""
-    film_speed: float = 4.0
+    video_speed: float = 4.0
     """Simulated seconds per second of video."""
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
     """Colors (default: light; in a window, those of the last window)."""
@@ -228,7 +228,7 @@ class VideoOptions(LayerOptions):
 
     def __post_init__(self) -> None:
         require_number("--fps", self.fps, 1, 240)
-        require_number("--film-speed", self.film_speed, 0.01, 1e4)
+        require_number("--video-speed", self.video_speed, 0.01, 1e4)
         self.parse_size()
         if self.video:
             # If there is no encoder, fail now rather than after the run.
@@ -267,7 +267,7 @@ class VideoOptions(LayerOptions):
             frames=self.frames,
             video=self.video,
             fps=self.fps,
-            speed=self.film_speed,
+            speed=self.video_speed,
             theme=self.theme or "light",
             colors=self.colors,
             size=self.parse_size(),
@@ -329,7 +329,7 @@ class RunOptions(ScenarioOptions, JsonOption):
     """Folder for the results."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
-    no_pictures: bool = False
+    no_figures: bool = False
     """Write no figures, only data."""
     video: tyro.conf.OmitArgPrefixes[VideoOptions] = field(default_factory=VideoOptions)
 
@@ -455,7 +455,7 @@ class RunOptions(ScenarioOptions, JsonOption):
             lattice=self.lattice,
             record_every=self.record_every,
             overwrite=self.overwrite,
-            figures=not self.no_pictures,
+            figures=not self.no_figures,
             hide_progress=self.json,
             video=self.video.build_settings(),
         )

@@ -30,7 +30,7 @@ class Arguments(JsonOption, WebOptions):
     another controller or a new wall. A run of a controller outside robocov is shown from its record; the
     controller is only loaded if --controller names it.
 
-    Example: robocov replay rooms-rapf --video --show distances --out film
+    Example: robocov replay rooms-rapf --video --show distances --out rooms-video
     """
 
     run: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]

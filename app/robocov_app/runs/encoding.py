@@ -167,7 +167,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
 
 
 def find_encoder() -> str:
-    """Find the program ffmpeg, first that of the extra "film", then that on the PATH.
+    """Find the program ffmpeg, first that of the extra "video", then that on the PATH.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def find_encoder() -> str:
     program = shutil.which("ffmpeg")
     if program is None:
         raise OutputError(
-            'video: ffmpeg was not found; pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to its path'
+            'video: ffmpeg was not found; pip install "robocov[video]", or set IMAGEIO_FFMPEG_EXE to its path'
         )
     return program
 

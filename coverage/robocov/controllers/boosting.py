@@ -220,7 +220,7 @@ class Boosting(BaseController):
 
     - ``phi``: the weight κ Φ_i^γ w, larger for points that no other robot detects
     - ``p``: the weight κ (1 - Π (1 - p))^-γ w, larger for points that the whole team barely detects
-    - ``neighbours``: the weight w; in addition, each neighbor in range repels with κ / d^γ
+    - ``neighbors``: the weight w; in addition, each neighbor in range repels with κ / d^γ
 
     A robot follows it until it comes to rest, or for at most `patience`. A robot that has returned on its
     trail is not boosted again, so the result is no worse than without boosts, apart from changes by
@@ -252,9 +252,8 @@ class Boosting(BaseController):
     decay: float = gain(
         0.1, "1/m", "λ, rate at which detection decreases with distance", low=1e-3, high=100.0
     )
-    # British spelling here, because files of runs contain this name.
-    boost: str = choice("phi", ("phi", "p", "neighbours"), "boosting function")
-    kappa: float = gain(1.0, "1", "κ, factor of the boosting function; for neighbours in m^(1+γ)")
+    boost: str = choice("phi", ("phi", "p", "neighbors"), "boosting function")
+    kappa: float = gain(1.0, "1", "κ, factor of the boosting function; for neighbors in m^(1+γ)")
     gamma: float = gain(2.0, "1", "γ, exponent of the boosting function", high=20.0)
     boosts: float = gain(3.0, "times", "maximum number of boosts of a robot", whole=True, high=1e3)
     patience: float = gain(8.0, "s", "maximum duration of a boost")
@@ -337,7 +336,7 @@ class Boosting(BaseController):
         windows = find_windows(view, directions, max_distances, self.jump)
         boosted_weight = self._compute_boosted_weight(samples)
         boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, max_distances)
-        if self.boost == "neighbours":
+        if self.boost == "neighbors":
             repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
                 pairs.robot, repulsion[:, None] * pairs.offset, len(max_distances)

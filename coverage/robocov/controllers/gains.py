@@ -1,7 +1,7 @@
 """Gains of a controller, as dataclass fields: numbers with a unit and a range, or one of several choices."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
@@ -12,10 +12,24 @@ Value: TypeAlias = float | str | None
 """Value of a gain: a number, None for no limit, or one of the choices of an `Option`."""
 
 _METADATA_KEY = "gain"
+_FORMER_SPELLINGS = {"neighbours": "neighbors"}
+"""Spellings of gains and choices in files of earlier versions, with those of today."""
 _MAX_PLAIN_GAIN = 1e12
 """Limit of the absolute value of a number that a user's dataclass declares without `gain`."""
 _DIMENSIONLESS = "1"
 """Unit of dimensionless gains, which is not written after a number."""
+
+
+def update_spelling(name: str, known: Collection[str]) -> str:
+    """Return the present spelling of a gain or choice from a file, which may be of an earlier version.
+
+    Examples
+    --------
+    >>> update_spelling("neighbours", {"neighbors", "eta"}), update_spelling("eta", {"neighbors", "eta"})
+    ('neighbors', 'eta')
+    """
+    spelling = _FORMER_SPELLINGS.get(name, name)
+    return spelling if name not in known and spelling in known else name
 
 
 def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
@@ -100,7 +114,7 @@ class Option:
     optional: ClassVar[bool] = False
 
     def validate(self, value: object, controller_name: str) -> str:
-        """Return a value unchanged if it is one of the choices.
+        """Return a value in its present spelling if it is one of the choices.
 
         Parameters
         ----------
@@ -118,6 +132,7 @@ class Option:
             raise ParameterError(
                 f"{controller_name}.{self.name}: expected one of {expected}, got {quote(value)}"
             )
+        value = update_spelling(value, self.choices)
         if value not in self.choices:
             raise ParameterError(
                 f"{controller_name}.{self.name}: {describe_unknown_name('choice', value, self.choices)}"
@@ -338,9 +353,11 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     gains = get_gains(kind)
     controller_name = getattr(kind, "name", kind.__name__)
     checked_values = {}
-    for name, value in values.items():
+    for given_name, value in values.items():
         if not gains:
-            raise ParameterError(f"{controller_name}.{name}: controller {controller_name!r} has no gains")
+            place = f"{controller_name}.{given_name}"
+            raise ParameterError(f"{place}: controller {controller_name!r} has no gains")
+        name = update_spelling(given_name, gains)
         if name not in gains:
             raise ParameterError(f"{controller_name}: {describe_unknown_name('gain', name, gains)}")
         checked_values[name] = gains[name].validate(value, controller_name)

@@ -24,7 +24,7 @@ from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
 from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
-from robocov.controllers.gains import instantiate_controller
+from robocov.controllers.gains import Option, Value, get_gains, instantiate_controller, update_spelling
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.individual import to_team_controller
 from robocov.controllers.lloyd import Lloyd, RangeLimited
@@ -191,6 +191,35 @@ def _describe_unknown_controller(name: str) -> str:
     if file and class_name:
         return f"unknown controller {quote(name)}: for a class in a file, write {file}.py:{class_name}"
     return describe_unknown_name("controller", name, list_controller_classes())
+
+
+def update_gain_spellings(controller: str, gains: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the gains in a file with the present spellings of names and choices.
+
+    Parameters
+    ----------
+    controller : str
+        Name of the controller. The gains of controllers outside robocov are returned unchanged.
+    gains : mapping of str to float, str or None
+
+    Returns
+    -------
+    dict
+
+    Examples
+    --------
+    >>> update_gain_spellings("poduri", {"neighbours": 3.0})
+    {'neighbors': 3.0}
+    """
+    known = get_gains(CONTROLLERS.get(controller))
+    updated: dict[str, Value] = {}
+    for given_name, value in gains.items():
+        name = update_spelling(given_name, known)
+        declared = known.get(name)
+        if isinstance(declared, Option) and isinstance(value, str):
+            value = update_spelling(value, declared.choices)
+        updated[name] = value
+    return updated
 
 
 def make_controller(

@@ -351,8 +351,7 @@ class Poduri(BaseController):
     label = "Constrained coverage"
     summary = "spreads, but keeps at least K neighbors within R_c (Poduri and Sukhatme 2004)"
 
-    # British spelling here, because files of runs contain this name.
-    neighbours: float = gain(
+    neighbors: float = gain(
         2.0, "robots", "K, number of neighbors that each robot keeps", high=100.0, whole=True
     )
     link_range: float = gain(6.0, "m", "R_c, or the communication range if that is less", low=0.01, high=1e5)
@@ -364,7 +363,7 @@ class Poduri(BaseController):
     @property
     def _min_degree(self) -> float:
         """K, the number of neighbors that each robot keeps."""
-        return self.neighbours
+        return self.neighbors
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
         """Compute the forces F_cover + F_degree and the repulsion of the closest obstacle point."""

@@ -153,7 +153,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
 
     The free space of the map is connected and has no passage narrower than `gap`. The blocked fraction of the
     map's area differs from `area` by at most 0.005. The map has three starts: ``corner``, a disc in one of
-    the corners, ``centre``, a disc near the middle, and ``uniform``. Its attribute `extra` contains the
+    the corners, ``center``, a disc near the middle, and ``uniform``. Its attribute `extra` contains the
     parameters.
 
     Parameters
@@ -291,7 +291,7 @@ def _choose_starts(
     center_disc = _choose_center_disc(environment, request, corner_disc)
     if start_disc is None or center_disc is None:
         return None
-    return {"corner": start_disc, "centre": center_disc, "uniform": UniformStart()}
+    return {"corner": start_disc, "center": center_disc, "uniform": UniformStart()}
 
 
 def _shrink_corner_disc(

@@ -60,7 +60,7 @@ MAX_ROBOTS = {"atlas": 12, "atlas-shared": 12, **dict.fromkeys(SHARING, 3)}
 ALL_CONTROLLERS = [
     *(inform_controller(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
     Adaptive(estimate="gp"),
-    *(Boosting(boost=boost) for boost in ("p", "neighbours")),
+    *(Boosting(boost=boost) for boost in ("p", "neighbors")),
     *(Rapf(target=target, height=0.5) for target in ("sensing", "median")),
     Lloyd(target="median"),
     *(Rapf(cells="time", target=target) for target in ("centroid", "median")),

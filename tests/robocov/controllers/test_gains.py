@@ -9,8 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.controllers import CONTROLLERS, Rapf, get_gain_values, get_gains, make_controller
+from robocov.controllers import (
+    CONTROLLERS,
+    Boosting,
+    Poduri,
+    Rapf,
+    get_gain_values,
+    get_gains,
+    make_controller,
+)
 from robocov.controllers.gains import Gain, Option, choice, gain, instantiate_controller
+from robocov.controllers.registry import update_gain_spellings
 from robocov.errors import ParameterError
 
 
@@ -91,6 +100,21 @@ def test_gains_may_be_one_of_several_choices() -> None:
             Rapf(target=wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="default: expected one of left, right, got 'up'"):
         choice("up", ("left", "right"), "where to pass")
+
+
+def test_former_spellings_in_files_are_accepted() -> None:
+    assert make_controller("poduri", {"neighbours": 3.0}) == Poduri(neighbors=3.0)
+    assert make_controller("boosting", {"boost": "neighbours"}) == Boosting(boost="neighbors")
+    assert update_gain_spellings("boosting", {"boost": "neighbours"}) == {"boost": "neighbors"}
+    assert update_gain_spellings("mine.py:Mine", {"neighbours": 3.0}) == {"neighbours": 3.0}
+
+
+def test_gains_of_users_keep_their_spelling() -> None:
+    @dataclass(frozen=True)
+    class Mine:
+        neighbours: float = 2.0
+
+    assert instantiate_controller(Mine, {"neighbours": 5.0}) == Mine(neighbours=5.0)
 
 
 def test_plain_numbers_of_a_dataclass_are_gains_and_other_fields_are_not() -> None:

@@ -42,7 +42,7 @@ def count_links(positions: np.ndarray, link_range: float) -> np.ndarray:
 @pytest.mark.parametrize(("k", "min_distance"), [(1, 2.0), (3, 1.4)])
 def test_every_robot_keeps_k_neighbors_while_the_team_spreads(k: int, min_distance: float) -> None:
     """The claim of the paper, far from walls."""
-    simulation = Simulation(HALL, Poduri(neighbours=float(k), link_range=3.0, k_cover=1.0), CROWD)
+    simulation = Simulation(HALL, Poduri(neighbors=float(k), link_range=3.0, k_cover=1.0), CROWD)
     min_count = len(CROWD)
     for _ in range(60 * 15):
         simulation.step()
@@ -64,7 +64,7 @@ def test_robots_keep_two_neighbors_by_default(name: str) -> None:
 def test_robots_with_fewer_neighbors_spread_farther() -> None:
     spreads = []
     for k in (1.0, 6.0):
-        simulation = Simulation(HALL, Poduri(neighbours=k, link_range=3.0, k_cover=1.0), CROWD)
+        simulation = Simulation(HALL, Poduri(neighbors=k, link_range=3.0, k_cover=1.0), CROWD)
         for _ in range(60 * 6):
             simulation.step()
         spreads.append(float(simulation.positions.std()))
@@ -76,7 +76,7 @@ def test_robots_keep_their_neighbors_among_walls(seed: int) -> None:
     rooms = load_map("rooms")
     starts = rooms.start().sample(8, seed=seed)
     assert count_links(starts, 3.0).min() >= 2
-    simulation = Simulation(rooms, Poduri(neighbours=2.0, link_range=3.0, k_cover=1.0), starts)
+    simulation = Simulation(rooms, Poduri(neighbors=2.0, link_range=3.0, k_cover=1.0), starts)
     for _ in range(60 * 8):
         simulation.step()
         assert count_links(simulation.positions, 3.0).min() >= 2
@@ -119,7 +119,7 @@ def test_forces_follow_the_rules_for_each_robot(
     """With reported positions, which are the true ones here, the forces are the same."""
     n = 9
     positions = np.random.default_rng(seed).uniform(0, 8, size=(n, 2))
-    controller = Poduri(neighbours=float(k), link_range=3.5, eta=0.8, k_cover=0.5)
+    controller = Poduri(neighbors=float(k), link_range=3.5, eta=0.8, k_cover=0.5)
     seen = observe(positions, communication_range)
     if reports:
         _, neighbor = seen.neighbors.list_pairs()
@@ -136,7 +136,7 @@ def test_forces_follow_the_rules_for_each_robot(
 def test_the_two_forces_of_a_critical_link_are_equal_at_eta_times_its_range(
     distance: float, sign: int
 ) -> None:
-    controller = Poduri(neighbours=1.0, link_range=2.0, eta=0.75)
+    controller = Poduri(neighbors=1.0, link_range=2.0, eta=0.75)
     memory = controller.begin(HALL.region, Team.homogeneous(2))
     seen = observe(np.array([[20.0, 20.0], [20.0 + distance, 20.0]]))
     force = controller.decide(seen, memory).forces[0, 0]
@@ -144,8 +144,8 @@ def test_the_two_forces_of_a_critical_link_are_equal_at_eta_times_its_range(
 
 
 def test_k_is_a_whole_number() -> None:
-    with pytest.raises(ParameterError, match=r"poduri\.neighbours: .*whole number from 0 to 100.*2\.5"):
-        make_controller("poduri", {"neighbours": 2.5})
+    with pytest.raises(ParameterError, match=r"poduri\.neighbors: .*whole number from 0 to 100.*2\.5"):
+        make_controller("poduri", {"neighbors": 2.5})
 
 
 def test_runs_are_reproducible() -> None:

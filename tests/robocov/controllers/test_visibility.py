@@ -229,7 +229,7 @@ def test_boosts_lead_to_where_no_robot_detects() -> None:
     """Two robots next to each other are boosted away from each other."""
     seen = observe(np.array([[4.0, 4.0], [4.8, 4.0]]))
     view = View(np.full((2, 72), 3.0), np.zeros((2, 72), dtype=bool))
-    for boost in ("phi", "p", "neighbours"):
+    for boost in ("phi", "p", "neighbors"):
         contributions = Boosting(boost=boost).compute_contributions(seen, view, np.full(2, 3.0))
         assert not np.allclose(contributions.gradient, contributions.boosted_gradient)
         assert contributions.boosted_gradient[0, 0] < 0.0 < contributions.boosted_gradient[1, 0]

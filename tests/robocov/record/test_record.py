@@ -47,6 +47,14 @@ def test_a_saved_record_can_be_loaded(record: Record, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["record.npz", "run.json"]
 
 
+def test_gains_with_a_former_spelling_are_loaded_with_the_present_one(record: Record, tmp_path: Path) -> None:
+    record.save(tmp_path)
+    run = json.loads((tmp_path / "run.json").read_text())
+    run["controller"] = {"name": "poduri", "gains": {"neighbours": 3.0}}
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    assert Record.load(tmp_path).gains == {"neighbors": 3.0}
+
+
 def test_run_json_suffices_to_repeat_the_run(record: Record, tmp_path: Path) -> None:
     record.save(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())

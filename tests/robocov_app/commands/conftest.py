@@ -15,6 +15,6 @@ def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.fixture
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs are not drawn, which takes longer than the runs."""
     monkeypatch.setattr(artifacts, "save_figures", lambda *_, **__: None)

@@ -26,7 +26,7 @@ def test_layers_are_shown_and_hidden_in_films(words: tuple[str, ...], tmp_path: 
         ("bare", ("--hide", "cells", "grid")),
         ("warm", ("--show", "distances")),
     ):
-        options = (*SHORT, "--frames", "--fps", "2", "--film-speed", "1", "--out", str(tmp_path / name))
+        options = (*SHORT, "--frames", "--fps", "2", "--video-speed", "1", "--out", str(tmp_path / name))
         assert main([*words, *options, *more]) == 0
     plain = read_frames(tmp_path / "plain")
     bare = read_frames(tmp_path / "bare")

@@ -65,7 +65,7 @@ def test_a_lower_bound_is_proved_on_request(capsys: pytest.CaptureFixture[str]) 
     assert "m, no placement is more than 0." in said
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_the_gap_of_a_run_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
     assert main(["run", "trap", *SHORT, "--robots", "4", "--out", str(out)]) == 0
@@ -82,7 +82,7 @@ def test_the_gap_of_a_run_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert f"{run['gap']:.1%} above the best" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_comparison_has_a_gap_for_each_controller(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,7 +94,7 @@ def test_a_comparison_has_a_gap_for_each_controller(
     assert all(run["gap"] > 0.0 for run in row["runs"])
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     halves = Environment(
         "halves",

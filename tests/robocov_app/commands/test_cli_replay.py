@@ -17,7 +17,7 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window.window import ViewerWindow
 
 EMPTY = replace(HALL, obstacles=())
-SMALL = ("--size", "480x320", "--fps", "10", "--film-speed", "1")
+SMALL = ("--size", "480x320", "--fps", "10", "--video-speed", "1")
 
 
 @pytest.fixture(autouse=True)
@@ -111,7 +111,7 @@ def test_an_earlier_video_is_replaced_only_with_overwrite(
     answer(capsys, *words)
     (out / "notes.txt").write_text("mine")
     assert "is not empty" in read_complaint(capsys, *words)
-    answer(capsys, *words, "--overwrite", "--film-speed", "4")
+    answer(capsys, *words, "--overwrite", "--video-speed", "4")
     assert len(read_pictures(out)) == 2 + 2
     assert (out / "notes.txt").read_text() == "mine"
 

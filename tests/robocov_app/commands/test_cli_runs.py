@@ -18,7 +18,7 @@ def test_run_saves_everything_and_prints_the_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    words = "--frames --video --fps 10 --film-speed 1 --out".split()
+    words = "--frames --video --fps 10 --video-speed 1 --out".split()
     assert main(["run", "rooms", *SHORT, *words, str(out)]) == 0
     said = capsys.readouterr()
     assert str(out) in said.out
@@ -38,7 +38,7 @@ def test_run_saves_everything_and_prints_the_folder(
     assert len(Record.load(out)) == 61
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     row = answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(row)
@@ -71,7 +71,7 @@ def test_compare_gives_every_controller_the_same_starts(
     assert len((out / "comparison.csv").read_text().splitlines()) == 4
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_overwrite_removes_only_the_earlier_result(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -89,7 +89,7 @@ def test_overwrite_removes_only_the_earlier_result(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links of POSIX")
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_an_obstructed_result_keeps_the_earlier_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -108,7 +108,7 @@ def test_an_obstructed_result_keeps_the_earlier_one(
     assert list(elsewhere.iterdir()) == []
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     inner = tmp_path / "run" / "inner"
@@ -128,7 +128,7 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
     )
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
@@ -280,7 +280,7 @@ def test_a_controller_that_fails_is_named_with_its_line(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_records_of_large_teams_are_thinned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -196,6 +196,6 @@ def test_a_run_of_a_sweep_can_be_replayed(study: Path, capsys: pytest.CaptureFix
     content = json.loads((run / "run.json").read_text())
     assert content["record_hz"] == 2.0
     frames = study.parent / "frames"
-    words = ("replay", str(run), "--frames", "--fps", "4", "--film-speed", "1", "--size", "320x240")
+    words = ("replay", str(run), "--frames", "--fps", "4", "--video-speed", "1", "--size", "320x240")
     assert answer(capsys, *words, "--out", str(frames))["interrupted"] is False
     assert len(list((frames / "frames").iterdir())) == 4 + 1 + 4, "as many as of a run with all moments"

@@ -154,7 +154,7 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
     import imageio_ffmpeg
 
     out = tmp_path / "run"
-    words = "run square --duration 20 --lattice 16 --film-speed 0.01 --size 480x320".split()
+    words = "run square --duration 20 --lattice 16 --video-speed 0.01 --size 480x320".split()
     process = subprocess.Popen(
         [*COMMAND, *words, "--video", "--out", str(out)],
         stdout=subprocess.PIPE,
@@ -199,7 +199,7 @@ def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     assert (tmp_path / "run" / "trajectories.png").exists()
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_figures")
 def test_a_controller_for_the_whole_team_needs_no_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -71,7 +71,7 @@ def test_errors_are_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> 
 def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "x"
     words = "run forklifts --robots 2 --duration 0.4 --lattice 12 --frames --fps 3 --size 320x240"
-    said = answer(capsys, *words.split(), "--film-speed", "1", "--show", "distances", "--out", str(out))
+    said = answer(capsys, *words.split(), "--video-speed", "1", "--show", "distances", "--out", str(out))
     assert said["mean_distance_m"] > 0.0
     assert len(list((out / "frames").iterdir())) > 2
 
@@ -88,7 +88,7 @@ def test_a_robot_that_joins_outside_the_map_is_rejected(
 
 def test_a_robot_that_joins_elsewhere_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    words = ["run", "rooms", "--join", "6@0.5:1,8", "--duration", "1", "--lattice", "16", "--no-pictures"]
+    words = ["run", "rooms", "--join", "6@0.5:1,8", "--duration", "1", "--lattice", "16", "--no-figures"]
     assert main([*words, "--out", str(out)]) == 0
     note = "Robot 6 joined at 0.5 s at [1, 7.499], 0.5 m from [1, 8], which is too close to a wall"
     assert f"note: {note}" in capsys.readouterr().out

@@ -22,7 +22,7 @@ from robocov_app.viewer.session.setup.missing_controller import MissingControlle
 from robocov_app.viewer.window.window import ViewerWindow
 
 SHORT = ("--duration", "0.5", "--dt", "0.05", "--lattice", "8", "--robots", "2", "--size", "320x240")
-SMALL = ("--size", "320x240", "--fps", "2", "--film-speed", "1")
+SMALL = ("--size", "320x240", "--fps", "2", "--video-speed", "1")
 STUDY = """
 maps = ["room.json"]
 controllers = ["mine.py:Mine"]

@@ -29,7 +29,7 @@ class Mine:
             BODY
         return 0.0, 0.0
 """
-SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-pictures", "--out", "out"]
+SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-figures", "--out", "out"]
 RAISED = {
     "sys.exit()": "controller 'Mine': it ended Python with SystemExit (mine.py, line 16) for robot 1 at 0.",
     "sys.exit(0)": "controller 'Mine': it ended Python with SystemExit: 0 (mine.py, line 16)",

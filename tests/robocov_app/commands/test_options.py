@@ -70,7 +70,7 @@ def test_the_folder_of_a_served_window_is_created_later(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"size": "640"}, {"size": "1x1"}, {"size": "99999x99999"}, {"fps": 0}, {"film_speed": 0.0}]
+    "wrong", [{"size": "640"}, {"size": "1x1"}, {"size": "99999x99999"}, {"fps": 0}, {"video_speed": 0.0}]
 )
 def test_videos_out_of_range_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match=r"wanted|expected"):

@@ -222,7 +222,7 @@ class TestNonConvex:
         claim = judge_against_rpf(
             build_outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final"
         )
-        assert "corner 0.6, centre 0.7, uniform 1.2" in claim.explanation
+        assert "corner 0.6, center 0.7, uniform 1.2" in claim.explanation
         assert f"RAPF loses {MANY * 2} of {MANY * 6}" in claim.explanation
         assert "start uniform" in claim.explanation
 

@@ -239,7 +239,7 @@ class TestSaveFilm:
 
         monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", raise_missing)
         monkeypatch.setenv("PATH", str(tmp_path))
-        with pytest.raises(OutputError, match=r"pip install .robocov\[film\]., or set IMAGEIO_FFMPEG_EXE"):
+        with pytest.raises(OutputError, match=r"pip install .robocov\[video\]., or set IMAGEIO_FFMPEG_EXE"):
             save_video(tmp_path / "run.mp4", generate_frames(2))
         assert list(tmp_path.iterdir()) == []
         # before a run that would be in vain

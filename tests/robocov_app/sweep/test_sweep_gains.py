@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.controllers import Rapf, Rpf, get_gain_values, get_gains
+from robocov.controllers import Poduri, Rapf, Rpf, get_gain_values, get_gains
 from robocov.errors import ParameterError
 from robocov_app.sweep.study.gains import build_gains
 from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod
@@ -38,6 +38,11 @@ def test_sets_of_gains_are_taken_one_by_one() -> None:
     gains = build_gains(Rapf, [paper, {}], None)
     assert gains.choices == (get_gain_values(Rapf(**paper)), get_gain_values(Rapf()))
     assert build_gains(Rapf, gains, None) == gains
+
+
+def test_former_spellings_in_a_study_are_accepted() -> None:
+    gains = build_gains(Poduri, {"neighbours": [1, 2]}, None)
+    assert [choice["neighbors"] for choice in gains.choices] == [1.0, 2.0]
 
 
 @pytest.mark.parametrize("word", ["null", float("inf")])

@@ -45,11 +45,11 @@ RUN = ["--controller", "mine.py:Mine", "--robots", "2", "--duration", "0.2", "--
     "words",
     [
         ["check", "evil.json"],
-        ["run", "evil.json", *RUN, "--no-pictures"],
+        ["run", "evil.json", *RUN, "--no-figures"],
         ["run", "evil.json", *RUN, "--set", "fails=1"],
         ["run", "no\x1b[31m.json"],
         ["run", "evil.json", "--set", "k\x1b[31m=1"],
-        ["compare", "evil.json", "--controllers", "mine.py:Mine", "rpf", *RUN[2:], "--no-pictures"],
+        ["compare", "evil.json", "--controllers", "mine.py:Mine", "rpf", *RUN[2:], "--no-figures"],
         ["\x1b[31mrun"],
         ["run", "--\u202ebots"],
         ["convert", "evil\x1b.svg", "-o", "a.json"],

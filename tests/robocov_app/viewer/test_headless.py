@@ -66,7 +66,7 @@ def test_a_branch_is_saved_with_its_parts_costs_and_video(
     session = build_branched_session()
     out = tmp_path / "out"
     command = ["run", save_session_file(session, tmp_path), *SMALL, "--out", str(out), "--video", "--json"]
-    assert main([*command, "--fps", "10", "--film-speed", "1"]) == 0
+    assert main([*command, "--fps", "10", "--video-speed", "1"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert [part["words"] for part in answer["parts"]] == ["started", "circle drawn", "robot 4 joined"]
     assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])

@@ -61,7 +61,7 @@ def run_command(text: str, folder: Path) -> list[np.ndarray]:
         out = folder / f"out-{number}"
         if "--out" in words:
             del words[words.index("--out") :][:2]
-        assert main([*words, "--out", str(out), "--no-pictures", "--lattice", "16"]) == 0
+        assert main([*words, "--out", str(out), "--no-figures", "--lattice", "16"]) == 0
         folders = sorted(path.parent for path in out.rglob("record.npz"))
         finals += [Record.load(path).positions[-1] for path in folders]
     return finals

@@ -45,7 +45,7 @@ class Arguments(FigureOptions):
     """Generate random maps from a seed; the same options give the same map.
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
-    free space is connected, no passage is narrower than --gap, and the starts are corner, centre and
+    free space is connected, no passage is narrower than --gap, and the starts are corner, center and
     uniform. Without --out the map is printed.
 
     --count writes the maps of consecutive seeds to a folder, --study the random maps of robocov paper with

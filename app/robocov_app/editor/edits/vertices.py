@@ -111,7 +111,7 @@ def _reshape_circle(
     if vertex.index == 0:
         return replace(circle, center=position)
     radius = round_length(math.dist(circle.center, position))
-    require(radius >= MIN_SIZE_M, "a circle needs a radius: drag its rim away from its centre")
+    require(radius >= MIN_SIZE_M, "a circle needs a radius: drag its rim away from its center")
     return replace(circle, radius=radius)
 
 

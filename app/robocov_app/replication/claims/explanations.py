@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from robocov.arrays import Array
+from robocov_app.replication.design.plan import format_start
 from robocov_app.replication.design.study_maps import get_map_kind
 from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import PairedComparison
@@ -27,7 +28,7 @@ def describe_losses(pairs: PairedComparison, name: str) -> str:
 
 def list_ratios_by_start(pairs: PairedComparison) -> str:
     """Return the median ratio for each kind of starts: "corner 0.6, center 0.7"."""
-    return _list_ratios(pairs, pairs.outcomes.starts)
+    return _list_ratios(pairs, [format_start(kind) for kind in pairs.outcomes.starts])
 
 
 def list_ratios_by_map_kind(pairs: PairedComparison) -> str:

@@ -15,7 +15,8 @@ KINDS = ("corner", "centre", "uniform")
 """Kinds of starts, the same on all maps.
 
 "corner": a disc near the lower left corner, as in the paper's figures 4 and 6. "centre": a disc near the
-middle. "uniform": anywhere in the free space.
+middle. "uniform": anywhere in the free space. The names are part of the inputs by which finished runs are
+recognized, so the British spelling stays.
 """
 CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
 """Kinds of starts in convex regions. "tight": near the corner, the smallest disc for six robots."""
@@ -230,3 +231,14 @@ QUICK = Plan(
     ),
 )
 """The quick study, which takes four minutes: enough to check that everything works, but for few verdicts."""
+
+
+def format_start(kind: str) -> str:
+    """Return the name of a kind of starts as it is printed.
+
+    Examples
+    --------
+    >>> format_start("centre"), format_start("corner")
+    ('center', 'corner')
+    """
+    return "center" if kind == "centre" else kind

@@ -235,7 +235,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     }
     handles: list[Artist] = [
         arena.build_robot_handle("robot", theme.final, theme),
-        Line2D([], [], label="centre of mass of its cell", **dot_style),
+        Line2D([], [], label="center of mass of its cell", **dot_style),
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
         *arena.build_map_handles(environment, theme)[1:],
     ]

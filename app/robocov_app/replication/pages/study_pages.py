@@ -32,6 +32,7 @@ from robocov_app.replication.design.plan import (
     TEAM,
     UNSEEN,
     Plan,
+    format_start,
 )
 from robocov_app.replication.design.study_maps import build_tuning_maps
 from robocov_app.replication.evidence import (
@@ -337,6 +338,7 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     )
     environment.filters.update(
         span=format_span,
+        start_name=format_start,
         g="{:g}".format,
         amount=format_amount,
         hundredths=_format_hundredths,

@@ -17,6 +17,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_fraction
+from robocov_app.replication.design.plan import format_start
 
 
 class ProblemInstance(NamedTuple):
@@ -27,7 +28,7 @@ class ProblemInstance(NamedTuple):
     seed: int
 
     def __str__(self) -> str:
-        return f"{self.map}, start {self.start}, seed {self.seed}"
+        return f"{self.map}, start {format_start(self.start)}, seed {self.seed}"
 
 
 @dataclass(frozen=True, eq=False)

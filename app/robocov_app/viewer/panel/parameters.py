@@ -41,7 +41,7 @@ GAIN_LABELS: Mapping[str, str] = MappingProxyType(
         "k_robots": "Repulsion of robots",
         "k_obs": "Repulsion of obstacles",
         "friction": "Friction",
-        "neighbours": "Neighbors kept",
+        "neighbors": "Neighbors kept",
         "link_range": "Link range",
         "k_cover": "Spreading strength",
         "eta": "Balance distance",
