@@ -251,7 +251,7 @@ def test_docstrings_of_controllers_list_their_gains_with_units(name: str) -> Non
 
 def test_every_picture_is_drawn_by_a_script_that_the_handbook_names() -> None:
     page = (ROOT / "app/handbook/contributing.md").read_text()
-    _, _, section = page.partition("## Pictures and the video")
+    _, _, section = page.partition("## Images and the video")
     section = section.partition("\n## ")[0]
     rows = dict(re.findall(r"^\| `([\w.-]+)` \| `(.+)` \|$", section, re.M))
     pictures = {

@@ -53,7 +53,7 @@ class OracleMemory:
 
 @dataclass(frozen=True)
 class Oracle(BaseController):
-    """Moves to the best placement: a yardstick for the time and path length of robots that know the map.
+    """Moves to the best placement: a baseline for the time and path length of robots that know the map.
 
     Once in each `period`, goals are assigned to robots such that the sum of the squared geodesic distances is
     minimal. The robots follow the shortest paths among walls that are enlarged by their radius and

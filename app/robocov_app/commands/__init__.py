@@ -56,7 +56,7 @@ COMMANDS = {
     "benchmark": Subcommand(
         "benchmark", "rate a controller on frozen maps and tracks; verify and compare", uses_kernels=True
     ),
-    "bench": Subcommand("bench", "measure speed, as ratios to yardsticks in the same run"),
+    "bench": Subcommand("bench", "measure speed, as ratios to baselines in the same run"),
     "import": Subcommand("maps.import_map", "convert a foreign map file to a map of robocov"),
     "export": Subcommand("maps.export_map", "export a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
     "lesson": Subcommand("lesson", "check a lesson for the window: its format, and that chapters end"),

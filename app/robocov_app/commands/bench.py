@@ -64,9 +64,9 @@ _PACKAGES = ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")
 
 @dataclass
 class Arguments(FigureOptions):
-    """Measure speed on one thread, as ratios to yardsticks that are timed in alternation.
+    """Measure speed on one thread, as ratios to baselines that are timed in alternation.
 
-    Times on a shared machine mean little; ratios of medians from the same run are stable. The yardstick of
+    Times on a shared machine mean little; ratios of medians from the same run are stable. The baseline of
     the cost is scikit-fmm: pip install 'robocov[bench]'. All parts take a minute or two.
 
     Example: robocov bench step
@@ -108,7 +108,7 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
     Raises
     ------
     ParameterError
-        If the yardstick of the part is not installed.
+        If the baseline of the part is not installed.
     """
     names: list[str] = [part_name]
     if part_name == "all":
@@ -118,8 +118,8 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
     modules = {
         name: importlib.import_module(f"robocov_app.speed_benchmarks.{PARTS[name].module}") for name in names
     }
-    if "cost" in names and not modules["cost"].has_yardstick():
-        message = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
+    if "cost" in names and not modules["cost"].has_baseline():
+        message = "scikit-fmm, the baseline of the cost, is not installed: pip install 'robocov[bench]'"
         if part_name == "cost":
             raise ParameterError(message)
         echo(f"robocov: {message}", to_stderr=True)
@@ -169,7 +169,7 @@ def _print_machine(machine: dict[str, Any]) -> None:
 def _print_tables(rows: Sequence[Row]) -> None:
     """Print a table for each part."""
     columns: list[tuple[str, Any]] = [("", {}), ("", {})]
-    columns += [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
+    columns += [(title, RIGHT) for title in ("time", "baseline", "ratio", "before", "goal")]
     columns += [("", {"no_wrap": True}), ("", {})]
     for part_name, part_rows in groupby(rows, key=lambda row: row.part):
         cells = []
@@ -191,11 +191,11 @@ def _format_measurement(row: Row) -> list[str]:
     """Return the table cells with the numbers of a measurement."""
     return [
         format_duration(row.seconds),
-        format_duration(row.yardstick_seconds),
+        format_duration(row.baseline_seconds),
         _format_ratio(row.ratio),
         _format_ratio(row.earlier_ratio),
         format_goals(row),
-        "" if row.yardstick is None else f"/ {row.yardstick}",
+        "" if row.baseline is None else f"/ {row.baseline}",
         row.note,
     ]
 

@@ -1,1 +1,1 @@
-"""Benchmarks of speed: each time is compared with that of a yardstick, measured in alternation with it."""
+"""Benchmarks of speed: each time is compared with that of a baseline, measured in alternation with it."""

@@ -44,8 +44,8 @@ GOALS = {
 """Maximum ratios by lattice, vertices and robots."""
 BUILD_GOALS_S = {(128, 200): 0.15, (512, 1000): 8.0}
 """Maximum times to build the cost, by lattice and vertices."""
-YARDSTICK = "scikit-fmm, order 2"
-"""Name of the yardstick among random obstacles."""
+BASELINE = "scikit-fmm, order 2"
+"""Name of the baseline among random obstacles."""
 _OBSTACLE_CORNERS = 5
 """Number of corners of a random obstacle."""
 _BLOCKED_FRACTION = 0.23
@@ -62,7 +62,7 @@ _FULL_DURATION_S = 1.0
 """Minimum total time of the rounds of a case in the full benchmark."""
 
 TREE = "k-d tree of the robots"
-"""Name of the yardstick on bundled maps."""
+"""Name of the baseline on bundled maps."""
 EARLIER_RATIOS = {
     ("rooms", 64, 6): 4.5,
     ("rooms", 128, 6): 2.8,
@@ -109,7 +109,7 @@ def list_map_cases(*, quick: bool = False) -> list[Case]:
     return [partial(_measure_map, name, lattice, quick) for name, lattice in sizes]
 
 
-def has_yardstick() -> bool:
+def has_baseline() -> bool:
     """Return whether scikit-fmm is installed."""
     return find_spec("skfmm") is not None
 
@@ -180,12 +180,12 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
         if robots > len(cost.points):
             continue
         moving = MovingRobots(cost, robots)
-        yardstick = _measure_by_marching if has_yardstick() else None
-        times = _measure_costs(cost, moving, yardstick, quick)
+        baseline = _measure_by_marching if has_baseline() else None
+        times = _measure_costs(cost, moving, baseline, quick)
         row = Row("cost", "evaluated", size | {"robots": robots}, times["exact"])
-        if yardstick is not None:
+        if baseline is not None:
             max_ratio = GOALS.get((lattice, vertices, robots))
-            row = replace(row, yardstick=YARDSTICK, yardstick_seconds=times["yardstick"], max_ratio=max_ratio)
+            row = replace(row, baseline=BASELINE, baseline_seconds=times["baseline"], max_ratio=max_ratio)
         yield row
 
 
@@ -207,8 +207,8 @@ def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
             "evaluated",
             size,
             times["exact"],
-            yardstick=TREE,
-            yardstick_seconds=times["yardstick"],
+            baseline=TREE,
+            baseline_seconds=times["baseline"],
             max_ratio=earlier_ratio / speedup,
             earlier_ratio=earlier_ratio,
         )
@@ -217,13 +217,13 @@ def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
 def _measure_costs(
     cost: CoverageCost,
     moving: MovingRobots,
-    yardstick: Callable[[CoverageCost, MovingRobots], object] | None,
+    baseline: Callable[[CoverageCost, MovingRobots], object] | None,
     quick: bool,
 ) -> dict[str, float]:
-    """Return the median times, s, of the "exact" cost and, if given, of the "yardstick" in alternation."""
+    """Return the median times, s, of the "exact" cost and, if given, of the "baseline" in alternation."""
     calls: dict[str, Call] = {"exact": lambda: cost(moving.positions).mean_distance}
-    if yardstick is not None:
-        calls["yardstick"] = partial(yardstick, cost, moving)
+    if baseline is not None:
+        calls["baseline"] = partial(baseline, cost, moving)
     duration = _QUICK_DURATION_S if quick else _FULL_DURATION_S
     return measure_interleaved(calls, _MIN_ROUNDS, duration, before_round=moving.move)
 

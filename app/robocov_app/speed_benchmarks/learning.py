@@ -21,12 +21,12 @@ ENVIRONMENTS = 64
 """Number of environments that are stepped together in the vector environment."""
 SIDE_M = 20.0
 """Side of the square in which the point masses move."""
-YARDSTICK = f"{ROBOTS} point masses, gymnasium"
-"""Name of the yardstick."""
+BASELINE = f"{ROBOTS} point masses, gymnasium"
+"""Name of the baseline."""
 SINGLE_GOAL = 0.7
-"""Minimum number of steps per second of a single environment, divided by that of the yardstick."""
+"""Minimum number of steps per second of a single environment, divided by that of the baseline."""
 VECTOR_GOAL = 4.0
-"""Minimum number of steps per second of a vector environment, divided by that of the yardstick."""
+"""Minimum number of steps per second of a vector environment, divided by that of the baseline."""
 EARLIER_RATIO = 10.0
 """Earlier ratio; see `Row.earlier_ratio`."""
 _DT_S = 1.0 / 60.0
@@ -42,7 +42,7 @@ _FULL_ROUNDS = 200
 
 
 class PointMasses(gymnasium.Env[Any, Any]):
-    """Yardstick: point masses in numpy, with a reward that is computed from straight-line distances."""
+    """Baseline: point masses in numpy, with a reward that is computed from straight-line distances."""
 
     def __init__(self) -> None:
         self.action_space = Box(-_MAX_FORCE_N, _MAX_FORCE_N, (ROBOTS, 2), np.float32)
@@ -101,9 +101,9 @@ def _measure_environments(quick: bool) -> Iterator[Row]:
             "a step with reward",
             {"environments": count},
             seconds,
-            yardstick=YARDSTICK,
-            yardstick_seconds=times["plain"],
+            baseline=BASELINE,
+            baseline_seconds=times["plain"],
             max_ratio=1 / min_speed_ratio,
-            note=f"{times['plain'] / seconds:.2f} times the steps per second of the yardstick",
+            note=f"{times['plain'] / seconds:.2f} times the steps per second of the baseline",
             earlier_ratio=EARLIER_RATIO,
         )

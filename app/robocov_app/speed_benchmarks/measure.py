@@ -16,7 +16,7 @@ Case: TypeAlias = Callable[[], Iterable["Row"]]
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the benchmark: a median time, and the yardstick's time in the same measurement.
+    """A row of the benchmark: a median time, and the baseline's time in the same measurement.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ class Row:
         Varied parameters, for example ``{"robots": 50}``.
     seconds : float, s
         Median time.
-    yardstick : str, optional
-        Name of the yardstick.
-    yardstick_seconds : float, optional, s
-        Median time of the yardstick.
+    baseline : str, optional
+        Name of the baseline.
+    baseline_seconds : float, optional, s
+        Median time of the baseline.
     max_ratio : float, optional
-        Goal: maximum ratio of the time to that of the yardstick.
+        Goal: maximum ratio of the time to that of the baseline.
     max_seconds : float, optional, s
         Goal: maximum time.
     note : str
@@ -46,8 +46,8 @@ class Row:
     name: str
     parameters: Mapping[str, int | str]
     seconds: float
-    yardstick: str | None = None
-    yardstick_seconds: float | None = None
+    baseline: str | None = None
+    baseline_seconds: float | None = None
     max_ratio: float | None = None
     max_seconds: float | None = None
     note: str = ""
@@ -55,10 +55,10 @@ class Row:
 
     @property
     def ratio(self) -> float | None:
-        """Ratio of the time to that of the yardstick; None without a yardstick."""
-        if self.yardstick_seconds is None:
+        """Ratio of the time to that of the baseline; None without a baseline."""
+        if self.baseline_seconds is None:
             return None
-        return self.seconds / self.yardstick_seconds
+        return self.seconds / self.baseline_seconds
 
     @property
     def meets_goals(self) -> bool | None:
@@ -92,8 +92,8 @@ class Row:
             "name": self.name,
             "parameters": dict(self.parameters),
             "seconds": self.seconds,
-            "yardstick": self.yardstick,
-            "yardstick_seconds": self.yardstick_seconds,
+            "baseline": self.baseline,
+            "baseline_seconds": self.baseline_seconds,
             "goal": self.max_ratio,
             "goal_seconds": self.max_seconds,
             "note": self.note,

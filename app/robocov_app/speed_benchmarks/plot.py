@@ -75,7 +75,7 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     with plain_style():
         page = FigurePage((_WIDTH_PX, height), theme, scale=1.0)
         page.write(
-            "Time as a multiple of the yardstick's", _MARGIN_PX, _TITLE_CENTER_PX, points=HEADING, bold=True
+            "Time as a multiple of the baseline's", _MARGIN_PX, _TITLE_CENTER_PX, points=HEADING, bold=True
         )
         page.write(NOTE, _MARGIN_PX, _NOTE_CENTER_PX, color=theme.faint)
         top = float(_TITLE_HEIGHT_PX)
@@ -128,7 +128,7 @@ def _draw_row_texts(page: FigurePage, row: Row, y: float) -> None:
     """Draw the label of a row to the left of the axes, and its ratio to the right."""
     label = ", ".join(text for text in (row.name, row.case) if text)
     page.write(
-        f"{label}  /  {row.yardstick}",
+        f"{label}  /  {row.baseline}",
         _LEFT_PX - _TEXT_GAP_PX,
         y,
         points=SMALL,

@@ -13,8 +13,8 @@ from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
-YARDSTICK = "import numpy"
-"""Program of the yardstick, as for `python -c`."""
+BASELINE = "import numpy"
+"""Program of the baseline, as for `python -c`."""
 MAPS = ("rooms", "museum", "campus")
 """Maps of the sweep."""
 CONTROLLERS = ("rapf", "lloyd")
@@ -35,7 +35,7 @@ _QUICK_START_ROUNDS = 3
 """Number of rounds of the quick benchmark of command start-up."""
 _FULL_START_ROUNDS = 15
 """Number of rounds of the full benchmark of command start-up."""
-_YARDSTICK_REPEATS = 5
+_BASELINE_REPEATS = 5
 """Number of interpreters that are started in each round."""
 
 _IMPORT_EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
@@ -71,7 +71,7 @@ def _measure_sweep(seeds: int) -> Iterator[Row]:
         calls = {
             "sweep": lambda: sweep(study, f"{folder}/{next(numbers)}", workers=WORKERS, quiet=True),
             "numpy": lambda: [
-                subprocess.run([sys.executable, "-c", YARDSTICK]) for _ in range(_YARDSTICK_REPEATS)
+                subprocess.run([sys.executable, "-c", BASELINE]) for _ in range(_BASELINE_REPEATS)
             ],
         }
         # CPU time of all processes, because a sweep runs in several of them.
@@ -82,8 +82,8 @@ def _measure_sweep(seeds: int) -> Iterator[Row]:
         f"a run of {DURATION_S:g} s",
         {"runs": len(study), "workers": WORKERS},
         seconds,
-        yardstick=YARDSTICK,
-        yardstick_seconds=times["numpy"] / _YARDSTICK_REPEATS,
+        baseline=BASELINE,
+        baseline_seconds=times["numpy"] / _BASELINE_REPEATS,
         max_ratio=EARLIER_RATIO / _SWEEP_SPEEDUP,
         note=f"{WORKERS / seconds:.1f} runs per second, all cores free",
         earlier_ratio=EARLIER_RATIO,
@@ -99,7 +99,7 @@ def _get_processor_time() -> float:
 def _measure_starts(quick: bool) -> Iterator[Row]:
     """Measure the start-up time of each command."""
     run_silently = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
-    commands = {YARDSTICK: ("-c", YARDSTICK), **COMMANDS}
+    commands = {BASELINE: ("-c", BASELINE), **COMMANDS}
     calls = {
         name: partial(run_silently, [sys.executable, *arguments]) for name, arguments in commands.items()
     }
@@ -111,7 +111,7 @@ def _measure_starts(quick: bool) -> Iterator[Row]:
             name,
             {},
             times[name],
-            yardstick=YARDSTICK,
-            yardstick_seconds=times[YARDSTICK],
+            baseline=BASELINE,
+            baseline_seconds=times[BASELINE],
             max_ratio=START_GOALS.get(name),
         )

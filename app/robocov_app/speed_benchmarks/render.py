@@ -26,8 +26,8 @@ from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interl
 SIZE_PX = (1280, 720)
 FRAME_GOALS_S = {50: 4e-3}
 """Maximum time to draw a frame, by number of robots."""
-FRAME_YARDSTICK = "clear and flip"
-"""Name of the yardstick of drawing."""
+FRAME_BASELINE = "clear and flip"
+"""Name of the baseline of drawing."""
 _FRAME_CASES = (("rooms", 6), ("rooms", 50), ("campus", 200))
 """Map and number of robots of each case."""
 _QUICK_FRAME_ROUNDS = 40
@@ -62,14 +62,14 @@ def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
         "one frame",
         {"robots": robots, "map": name},
         times["frame"],
-        yardstick=FRAME_YARDSTICK,
-        yardstick_seconds=times["bare"],
+        baseline=FRAME_BASELINE,
+        baseline_seconds=times["bare"],
         max_seconds=FRAME_GOALS_S.get(robots),
     )
 
 
 def build_clearing_call(canvas: pygame.Surface | None) -> Call:
-    """Build the yardstick: a call that fills an empty surface and copies it to a canvas."""
+    """Build the baseline: a call that fills an empty surface and copies it to a canvas."""
     assert canvas is not None
     empty = pygame.Surface(SIZE_PX)
     return lambda: (empty.fill(_WHITE), canvas.blit(empty, (0, 0)))
@@ -96,8 +96,8 @@ def _measure_encoding(quick: bool) -> Iterator[Row]:
             name,
             {"frames": len(frames)},
             times[call],
-            yardstick="drawing the frames",
-            yardstick_seconds=times["draw"],
+            baseline="drawing the frames",
+            baseline_seconds=times["draw"],
             note=f"{len(frames) / times[call]:.0f} frames per second",
         )
 

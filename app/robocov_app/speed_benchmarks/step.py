@@ -1,6 +1,6 @@
 """Benchmark of a whole step (observations, cells, forces, physics).
 
-The yardsticks are Qhull's Delaunay triangulation of the robots, and a step of the bare physics engine.
+The baselines are Qhull's Delaunay triangulation of the robots, and a step of the bare physics engine.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interl
 
 
 class Ratios(NamedTuple):
-    """Ratios of the time of a step to the time of each yardstick."""
+    """Ratios of the time of a step to the time of each baseline."""
 
     triangulation: float
     physics: float
@@ -44,9 +44,9 @@ BATCH_GOAL = 5.0
 BATCH_ROBOTS = 6
 """Number of robots of each run in the batch."""
 BARE_PHYSICS = "bare Space.step"
-"""Name of a yardstick: the physics engine alone, with the same bodies in an empty space."""
+"""Name of a baseline: the physics engine alone, with the same bodies in an empty space."""
 TRIANGULATION = "Qhull's Delaunay"
-"""Name of a yardstick: the triangulation of the robots' positions."""
+"""Name of a baseline: the triangulation of the robots' positions."""
 WARM_UP_STEPS = 120
 """Steps before the measurement: two seconds of simulation time, after which the team is moving."""
 _MIN_SPEED = 60.0
@@ -67,7 +67,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 
 
 def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
-    """Measure a step of one simulation, compared with each of the two yardsticks."""
+    """Measure a step of one simulation, compared with each of the two baselines."""
     campus = load_map("campus")
     simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(robots, seed=0))
     space = _warm_up(simulation, robots)
@@ -88,8 +88,8 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         "one step",
         {"robots": robots},
         step,
-        yardstick=TRIANGULATION,
-        yardstick_seconds=times["delaunay"],
+        baseline=TRIANGULATION,
+        baseline_seconds=times["delaunay"],
         max_ratio=goals.triangulation,
         max_seconds=max_step_s,
         note=f"{simulation.dt / step:.0f} x real time",
@@ -100,8 +100,8 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         "one step",
         {"robots": robots},
         step,
-        yardstick=BARE_PHYSICS,
-        yardstick_seconds=times["space"],
+        baseline=BARE_PHYSICS,
+        baseline_seconds=times["space"],
         max_ratio=goals.physics,
         earlier_ratio=earlier_ratios.physics,
     )
@@ -133,8 +133,8 @@ def _measure_batch(quick: bool) -> Iterator[Row]:
         "one step per run",
         {"robots": BATCH_ROBOTS, "runs": BATCH_RUNS},
         times["step"] / BATCH_RUNS,
-        yardstick=BARE_PHYSICS,
-        yardstick_seconds=times["space"] / BATCH_RUNS,
+        baseline=BARE_PHYSICS,
+        baseline_seconds=times["space"] / BATCH_RUNS,
         max_ratio=BATCH_GOAL,
         earlier_ratio=EARLIER_RATIOS[BATCH_ROBOTS].physics,
     )

@@ -13,7 +13,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.speed_benchmarks.measure import Case, Row, measure_interleaved
-from robocov_app.speed_benchmarks.render import FRAME_YARDSTICK, SIZE_PX, build_clearing_call
+from robocov_app.speed_benchmarks.render import FRAME_BASELINE, SIZE_PX, build_clearing_call
 from robocov_app.toolkit.window.display import collect_garbage_rarely, open_display
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.viewer.costs.costs import Costs
@@ -95,8 +95,8 @@ def _measure_window(robots: int, seconds: float) -> Iterator[Row]:
             name,
             {"robots": robots},
             time,
-            yardstick=FRAME_YARDSTICK,
-            yardstick_seconds=bare,
+            baseline=FRAME_BASELINE,
+            baseline_seconds=bare,
             max_seconds=max_seconds,
             note=note,
         )

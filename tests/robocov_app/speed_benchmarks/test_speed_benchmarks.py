@@ -18,7 +18,7 @@ from robocov_app.commands import bench
 from robocov_app.speed_benchmarks import cost, learning, plot, processes, render, step, window
 from robocov_app.speed_benchmarks.measure import Row, measure_interleaved
 
-KEYS = ["part", "name", "parameters", "seconds", "yardstick", "yardstick_seconds", "goal"]
+KEYS = ["part", "name", "parameters", "seconds", "baseline", "baseline_seconds", "goal"]
 KEYS += ["goal_seconds", "note", "before", "ratio", "met"]
 
 
@@ -75,14 +75,14 @@ def test_rounds_continue_until_the_minimum_time():
     + [(2.0, 0.3, False), (2.0, 0.5, True)],
 )
 def test_a_goal_is_met_or_missed(goal, goal_seconds, met):
-    row = Row("step", "one step", {"robots": 6}, 0.4, "yardstick", 0.2, goal, goal_seconds)
+    row = Row("step", "one step", {"robots": 6}, 0.4, "baseline", 0.2, goal, goal_seconds)
     assert row.ratio == 2.0
     assert row.meets_goals is met
     assert ("missed" in bench.format_goals(row)) == (met is False)
     assert list(row.to_dict()) == KEYS
 
 
-def test_without_a_yardstick_there_is_no_ratio():
+def test_without_a_baseline_there_is_no_ratio():
     row = Row("cost", "evaluated", {"lattice": 128, "robots": 6}, 0.4, max_ratio=1.0)
     assert (row.ratio, row.meets_goals) == (None, None)
     assert bench.format_goals(row) == ""
@@ -129,12 +129,12 @@ def test_everything_is_measured_once(monkeypatch, capsys, tmp_path):
     for row in found["rows"]:
         assert list(row) == KEYS
         assert row["seconds"] > 0.0
-        if row["yardstick_seconds"] is not None:
-            assert row["ratio"] == pytest.approx(row["seconds"] / row["yardstick_seconds"])
+        if row["baseline_seconds"] is not None:
+            assert row["ratio"] == pytest.approx(row["seconds"] / row["baseline_seconds"])
     assert target.stat().st_size > 10_000
 
 
-def test_the_table_has_yardsticks_and_notes(monkeypatch, capsys):
+def test_the_table_has_baselines_and_notes(monkeypatch, capsys):
     shrink_parts(monkeypatch)
     assert main(["bench", "step", "--quick"]) == 0
     said = capsys.readouterr()
@@ -144,17 +144,17 @@ def test_the_table_has_yardsticks_and_notes(monkeypatch, capsys):
     assert re.search(r"measuring: 2 of 2 in", said.err)
 
 
-def test_the_cost_is_compared_with_its_yardstick(monkeypatch):
-    pytest.importorskip("skfmm", reason="the yardstick is an extra")
+def test_the_cost_is_compared_with_its_baseline(monkeypatch):
+    pytest.importorskip("skfmm", reason="the baseline is an extra")
     shrink_parts(monkeypatch)
     built, few, many = cost._measure_size(128, 200, quick=True)
-    assert built.yardstick is None
+    assert built.baseline is None
     assert (few.max_ratio, many.max_ratio) == (cost.GOALS[128, 200, 6], cost.GOALS[128, 200, 50])
     assert few.ratio is not None
 
 
 def test_fast_marching_measures_the_same_distances():
-    pytest.importorskip("skfmm", reason="the yardstick is an extra")
+    pytest.importorskip("skfmm", reason="the baseline is an extra")
     evaluated = cost.CoverageCost(build_small_map(20), 64)
     moving = cost.MovingRobots(evaluated, 6)
     exact = evaluated(moving.positions).mean_distance
@@ -172,7 +172,7 @@ def test_robots_of_the_benchmark_move_a_little_and_stay_free():
 
 
 @pytest.mark.slow
-def test_without_the_yardstick_the_message_says_how_to_install_it(monkeypatch, capsys):
+def test_without_the_baseline_the_message_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
     assert "pip install 'robocov[bench]'" in read_complaint(capsys, "bench", "cost")
     shrink_parts(monkeypatch)
@@ -191,7 +191,7 @@ def test_without_the_yardstick_the_message_says_how_to_install_it(monkeypatch, c
 
 def test_an_interruption_leaves_the_measured_rows(monkeypatch, capsys):
     def interrupt():
-        yield Row("step", "one step", {"robots": 7}, 1.0, "yardstick", 0.5)
+        yield Row("step", "one step", {"robots": 7}, 1.0, "baseline", 0.5)
 
     def stop():
         raise KeyboardInterrupt
@@ -216,7 +216,7 @@ ROWS = [
         for r in (6, 50)
     ),
     Row("cost", "built, once per map", {"lattice": 64, "vertices": 20}, 0.1),
-    Row("step", "one step", {"robots": 1000}, 3e-3, "a yardstick with a long name indeed", 1e-3, 1.2),
+    Row("step", "one step", {"robots": 1000}, 3e-3, "a baseline with a long name indeed", 1e-3, 1.2),
     Row("step", "one step", {"robots": 6}, 3e-4, "Qhull's Delaunay", 1e-3),
     Row("start", "robocov --help", {}, 0.2, "import numpy", 0.1, 2.0),
 ]
