@@ -34,6 +34,7 @@ USERS_FILE = "mine.py"
 DOTTED_NAME = re.compile(r"(?<![\w./-])robocov(?:_app)?(?:\.[A-Za-z_]\w*)+")
 NAME_IN_BACKTICKS = re.compile(r"(?<!`)`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)`(?!`)")
 MODULE_PATH = re.compile(r"(?<![\w./-])((?:[\w-]+/)+\w+\.(?:py|js))\b")
+SPLIT_KEYS = re.compile(r"\b(?:Ctrl|Shift|Alt)[ -](?:[A-Z←→↑↓](?!\w)|Shift\b|Delete\b|Enter\b)")
 SECTION = re.compile(r"^([A-Z][A-Za-z ]+)\n-{3,}$", re.M)
 
 PUBLIC = {
@@ -79,6 +80,15 @@ def test_dotted_names_in_texts_are_those_of_modules_and_attributes() -> None:
             names = [name for name in DOTTED_NAME.findall(line) if name not in LOGGERS]
             unknown += [f"{file.relative_to(ROOT)}:{number}: {name}" for name in names if not resolves(name)]
     assert not unknown, "\n".join(unknown)
+
+
+def test_keys_in_texts_are_joined_by_plus_signs() -> None:
+    """One spelling everywhere, as in Ctrl+Z."""
+    found = []
+    for file in list_texts():
+        for number, line in enumerate(file.read_text().splitlines(), 1):
+            found += [f"{file.relative_to(ROOT)}:{number}: {keys}" for keys in SPLIT_KEYS.findall(line)]
+    assert not found, "\n".join(found)
 
 
 def list_identifiers(tree: ast.Module) -> Iterator[str]:

@@ -29,7 +29,7 @@ from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.sweep.study.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
 from robocov_app.toolkit.commands.command import Command
-from robocov_app.toolkit.window.input import format_key, split_key_name
+from robocov_app.toolkit.window.input import format_key
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.files.models import build_session_schema
 from robocov_app.viewer.session.session import Session
@@ -146,7 +146,7 @@ def format_keys(command: Command) -> str:
         return f"Ctrl+K `{command.name}` *{command.argument.description}*"
     if not command.keys:
         return "Ctrl+K"
-    keys = ["+".join(format_key(key) for key in split_key_name(name)) for name in command.keys]
+    keys = [format_key(name) for name in command.keys]
     # There are two keys named Enter, which are listed once.
     return escape_cell(" or ".join(dict.fromkeys(keys))).replace("`", "\\`")
 

@@ -191,7 +191,7 @@ def _find_users_fault(error: BaseException) -> "RobocovError | None":
 
 
 def _is_users_interrupt(fault: "RobocovError | None") -> bool:
-    """Return whether a `KeyboardInterrupt` was Ctrl-C, rather than raised by a user's controller."""
+    """Return whether a `KeyboardInterrupt` was Ctrl+C, rather than raised by a user's controller."""
     from robocov_app.terminal.interruption import was_interrupted
 
     return was_interrupted() or fault is None
@@ -223,7 +223,7 @@ def _print_internal_error(error: BaseException) -> int:
 
 @contextmanager
 def _end_at_once_on_interrupt() -> Iterator[None]:
-    """End the process at Ctrl-C while modules are imported, when there are no results to keep.
+    """End the process at Ctrl+C while modules are imported, when there are no results to keep.
 
     During imports, Python sometimes ignores a `KeyboardInterrupt`.
     """

@@ -144,7 +144,7 @@ class Kernel:
         try:
             return dispatcher(*args, **kwargs)
         except SystemError as error:
-            # If Ctrl-C is pressed while numba inspects the arguments, numba raises a SystemError.
+            # If Ctrl+C is pressed while numba inspects the arguments, numba raises a SystemError.
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise KeyboardInterrupt from None
             raise

@@ -32,7 +32,7 @@ class Arguments(JsonOption):
     The folder contains index.html, a page with each figure next to the paper's claim about it and a plain
     verdict on each claim; beyond.html, with all registered controllers side by side and the questions that
     the paper leaves open; figures/ as PNG, SVG and PDF; claims.json; and studies/, all runs and their tables.
-    The command first prints how long it will take. Ctrl-C keeps finished runs; the same command resumes.
+    The command first prints how long it will take. Ctrl+C keeps finished runs; the same command resumes.
 
     Example: robocov paper --quick --out paper
     """
@@ -155,7 +155,7 @@ def _describe_forecast(expected: Forecast, workers: int, *, on_cluster: bool) ->
     time = f"{format_duration(expected.seconds)} on {workers} processes"
     if on_cluster:
         time = f"{format_duration(expected.seconds * workers)} of computing time on a Dask cluster"
-    return f"{counts}, about {time} (measured: {seconds_per_run} per run); Ctrl-C keeps finished runs"
+    return f"{counts}, about {time} (measured: {seconds_per_run} per run); Ctrl+C keeps finished runs"
 
 
 def _run_study(options: Arguments, plan: Plan, runner: RunnerOptions) -> _Outcome:

@@ -90,7 +90,7 @@ def serve(service: str) -> None:
 
 
 def _prepare_process() -> None:
-    """Report crashes, end when the parent program ends, and ignore Ctrl-C, which the parent handles."""
+    """Report crashes, end when the parent program ends, and ignore Ctrl+C, which the parent handles."""
     if sys.version_info >= (3, 14):
         # The C stack of the physics engine would hide the Python stack of a user's code.
         faulthandler.enable(c_stack=False)

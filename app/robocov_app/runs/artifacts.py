@@ -65,7 +65,7 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     run : Run
         The run, which has fewer steps if it was interrupted.
     is_interrupted : bool
-        Whether Ctrl-C ended the run early.
+        Whether Ctrl+C ended the run early.
 
     Raises
     ------
@@ -105,10 +105,10 @@ def execute_comparison(
     Returns
     -------
     runs : dict of str to Run
-        The runs, by the names of their subfolders. If Ctrl-C ended the comparison early, only those that
+        The runs, by the names of their subfolders. If Ctrl+C ended the comparison early, only those that
         were started.
     is_interrupted : bool
-        Whether Ctrl-C ended the comparison early.
+        Whether Ctrl+C ended the comparison early.
 
     Raises
     ------

@@ -136,7 +136,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
     """Run the encoder, and yield the pipe for raw frames; raise OutputError if the encoder fails."""
     command = build_encoder_command(temporary, size, fps)
     with tempfile.TemporaryFile() as error_output:
-        # The encoder gets a session of its own, so that it does not receive Ctrl-C from the terminal and can
+        # The encoder gets a session of its own, so that it does not receive Ctrl+C from the terminal and can
         # complete the video.
         process = subprocess.Popen(
             command,

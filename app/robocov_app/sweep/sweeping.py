@@ -105,7 +105,7 @@ def sweep(
     title : str
         Title of the progress display.
     stop : Interruption, optional
-        Ends the sweep early when it is requested; by default by Ctrl-C.
+        Ends the sweep early when it is requested; by default by Ctrl+C.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 - `arguments`: parses command lines
 - `output`, `progress`: answers, tables, small files and progress
-- `interruption`: handling of Ctrl-C that keeps the results so far
+- `interruption`: handling of Ctrl+C that keeps the results so far
 - `standard_streams`, `supervision`: protection against controllers that close streams or end Python
 - `file_watching`: files that are checked again when they change
 """

@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C that keeps the results so far."""
+"""Handling of Ctrl+C that keeps the results so far."""
 
 import os
 import signal
@@ -16,17 +16,17 @@ _received_signals: set[int] = set()
 
 
 def was_interrupted() -> bool:
-    """Return whether a `KeyboardInterrupt` was caused by Ctrl-C, and not raised by a user's controller."""
+    """Return whether a `KeyboardInterrupt` was caused by Ctrl+C, and not raised by a user's controller."""
     return bool(_received_signals)
 
 
 @contextmanager
 def note_interrupts() -> Iterator[None]:
-    """Record Ctrl-C for `was_interrupted` within the context, and raise `KeyboardInterrupt` as usual."""
+    """Record Ctrl+C for `was_interrupted` within the context, and raise `KeyboardInterrupt` as usual."""
     _received_signals.clear()
     is_main_thread = threading.current_thread() is threading.main_thread()
     if not is_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        # Signals cannot be observed here, so any KeyboardInterrupt is attributed to Ctrl-C.
+        # Signals cannot be observed here, so any KeyboardInterrupt is attributed to Ctrl+C.
         _received_signals.add(signal.SIGINT)
         yield
         return
@@ -44,7 +44,7 @@ def note_interrupts() -> Iterator[None]:
 
 
 class Interruption:
-    """Context in which the first Ctrl-C or SIGTERM only sets a flag, and a second one ends the command.
+    """Context in which the first Ctrl+C or SIGTERM only sets a flag, and a second one ends the command.
 
     Attributes
     ----------
@@ -72,11 +72,11 @@ class Interruption:
             raise KeyboardInterrupt
         self.requested = True
         with suppress(OSError):
-            os.write(2, b"\nstopping; press Ctrl-C again to stop immediately\n")
+            os.write(2, b"\nstopping; press Ctrl+C again to stop immediately\n")
 
 
 def block_interrupts() -> None:
-    """Block Ctrl-C while child processes are started, because a terminal sends it to all of them.
+    """Block Ctrl+C while child processes are started, because a terminal sends it to all of them.
 
     Children inherit the blocked signal.
     """

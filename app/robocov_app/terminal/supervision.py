@@ -105,7 +105,7 @@ def _forward_signals(child: subprocess.Popen[bytes]) -> Iterator[list[int]]:
 
     def forward(number: int, frame: FrameType | None) -> None:
         received_signals.append(number)
-        # Ctrl-C in a terminal reaches both processes without forwarding.
+        # Ctrl+C in a terminal reaches both processes without forwarding.
         if number != signal.SIGINT or not _is_in_foreground():
             with suppress(OSError):
                 child.send_signal(number)

@@ -8,6 +8,7 @@ from pygame import Rect, Surface
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.overlay import draw_edge
+from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.tools.tool import Tool, Toolbox
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
@@ -102,7 +103,7 @@ class ToolRail(CommandPart):
 
 def _build_tip(tool: Tool[Any, Any], command: Command) -> str:
     """Return the tool tip of a tool: its title with its key, and how it is used."""
-    return f"{tool.title} ({command.key_text})\n{tool.hint[:1].upper()}{tool.hint[1:]}"
+    return f"{tool.title} ({command.key_text})\n{to_sentence_case(tool.hint)}"
 
 
 def _show_line(ui: Ui) -> None:
@@ -119,10 +120,10 @@ def _show_line(ui: Ui) -> None:
 def _abbreviate_key(key_text: str) -> str:
     """Return a key that is short enough for the corner of a button; empty if it is too long.
 
-    >>> _abbreviate_key("Shift S")
+    >>> _abbreviate_key("Shift+S")
     '⇧S'
     """
-    short = key_text.replace("Shift ", _SHIFT_SYMBOL)
+    short = key_text.replace("Shift+", _SHIFT_SYMBOL)
     if len(short.lstrip(_SHIFT_SYMBOL)) == 1:
         return short
     return ""

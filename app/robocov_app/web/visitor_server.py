@@ -378,7 +378,7 @@ class VisitorServer:
 def _cancel_on_signals() -> None:
     """Make SIGINT and SIGTERM cancel the current task.
 
-    By default, Ctrl-C raises KeyboardInterrupt in the running task, which need not be this one.
+    By default, Ctrl+C raises KeyboardInterrupt in the running task, which need not be this one.
     """
     task = asyncio.current_task()
     assert task is not None

@@ -156,7 +156,7 @@ def test_watching_from_outside(file: Path, terminal: bool) -> None:
     )
     os.close(writer)
     try:
-        first = read_until(reader, b"Ctrl-C ends" if terminal else b"narrowest gap")
+        first = read_until(reader, b"Ctrl+C ends" if terminal else b"narrowest gap")
         assert (b"\x1b[2J" in first) == terminal
         start = time.monotonic()
         fresh = file.with_suffix(".new")

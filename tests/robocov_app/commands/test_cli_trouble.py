@@ -150,7 +150,7 @@ def test_ctrl_c_keeps_and_reports_partial_results(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
 def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
-    """In a terminal Ctrl-C goes to the whole process group, the encoder included."""
+    """In a terminal Ctrl+C goes to the whole process group, the encoder included."""
     import imageio_ffmpeg
 
     out = tmp_path / "run"

@@ -172,7 +172,7 @@ def test_commands_delete_and_duplicate(driver: EditorDriver) -> None:
     driver.press_key("delete")
     assert len(driver.shapes) == 5
     driver.press_key("delete")
-    assert driver.editor.has_error_message and "nothing is selected" in driver.message
+    assert driver.editor.has_error_message and "Nothing is selected" in driver.message
     driver.press_key("ctrl+a")
     driver.press_key("backspace")
     assert driver.shapes == []
@@ -281,7 +281,7 @@ def test_a_problem_is_fixed_by_the_button_next_to_it(driver: EditorDriver) -> No
     assert driver.editor.problem is not None and driver.editor.problem.kind == "outside"
     driver.wait()
     driver.push_button("fix:0")
-    assert driver.message == "circle “lamp” deleted"
+    assert driver.message == "Circle “lamp” deleted"
 
 
 def test_a_refused_command_stays_for_correction(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def test_a_polygon_is_closed_by_enter_a_double_click_or_its_first_corner(driver:
     driver.double_click(corners[2])
     driver.click_all(*corners, corners[0])
     assert driver.shapes == [PolygonObstacle(corners)] * 3
-    assert driver.message == "polygon drawn"
+    assert driver.message == "Polygon drawn"
 
 
 def test_drawing_snaps_to_the_grid_unless_ctrl_is_pressed(driver: EditorDriver) -> None:
@@ -284,7 +284,7 @@ def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:
     driver.press_key("m")
     driver.click_all((1, 1), (5, 2.5))
     driver.run_command("level")
-    assert driver.message == "map turned by -20.56°"
+    assert driver.message == "Map turned by -20.56°"
     (_, ay), (bx, by) = driver.shapes[0].points
     assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
     assert driver.editor.tool.build_overlay(driver.editor) == EditorToolOverlay()

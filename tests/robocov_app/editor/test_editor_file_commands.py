@@ -111,7 +111,7 @@ def test_discarding_removes_the_draft_and_keeps_files(driver: EditorDriver, tmp_
     driver.press_key("ctrl+n")
     driver.press_key("d")
     assert driver.shapes == [] and driver.editor.document.title == "Untitled"
-    assert driver.message.startswith("a new map: 10 x 10 m")
+    assert driver.message.startswith("A new map: 10 x 10 m")
     assert find_recoverable(tmp_path / "drafts") == ()
 
 
@@ -132,7 +132,7 @@ def test_maps_bundled_maps_and_other_files_can_be_opened(driver: EditorDriver, t
     driver.type("ell")
     driver.press_key("tab")
     driver.press_key("return")
-    assert driver.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in driver.message
+    assert driver.editor.document.path == tmp_path / "ell.json" and "Opened: ell.json" in driver.message
     driver.press_key("ctrl+shift+o")
     assert isinstance(driver.editor.dialogs.current, Choice)
     driver.type("rooms")
@@ -201,7 +201,7 @@ def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDrive
     assert driver.editor.dialogs.current.text == "untitled.svg"
     driver.press_key("return")
     first = (tmp_path / "untitled.svg").read_text()
-    assert "<svg" in first and "exported" in driver.message and driver.editor.document.path is None
+    assert "<svg" in first and "Exported" in driver.message and driver.editor.document.path is None
     driver.editor.apply(create.add_circle(driver.sketch, (2, 2), 0.5))
     driver.press_key("ctrl+e")
     driver.press_key("return")

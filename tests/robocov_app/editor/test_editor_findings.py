@@ -13,6 +13,7 @@ from robocov_app.editor.canvas.canvas import describe_map
 from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.look.theme import DARK, LIGHT
+from robocov_app.toolkit.sentence_case import to_sentence_case
 
 NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
 CROSSED = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
@@ -71,7 +72,9 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         at = x, y - STEM_PX
         assert count_pixels(draw_without_message(driver), at, LIGHT.trajectory, 6) > 40
         driver.click(*at)
-        assert driver.editor.problem is problems[0] and driver.message == problems[0].message
+        assert driver.editor.problem is problems[0] and driver.message == to_sentence_case(
+            problems[0].message
+        )
         driver.open_tab("problems")
         driver.window.canvas.zoom(8.0, (100.0, 100.0))
         driver.click(*driver.get_widget("option", f"problem:{len(problems) - 1}").rect.center)

@@ -156,7 +156,7 @@ def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path
         and driver.editor.document.title == "plan"
     )
     assert driver.sketch.build_environment().free_area == pytest.approx(56)
-    assert driver.message == "imported: plan.png, not saved yet"
+    assert driver.message == "Imported: plan.png, not saved yet"
 
 
 def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> None:

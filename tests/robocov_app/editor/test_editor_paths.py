@@ -144,7 +144,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         editor.snaps = set()
         driver.press_key("o")
         driver.click_all((4.0, 4.0))
-        assert "click the obstacle" in editor.message
+        assert "Click the obstacle" in editor.message
         driver.click_all((2.0, 2.0), (2.1, 2.1))
         assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(driver.sketch) == ()
         driver.click_all((6.0, 2.0), (6.0, 5.0))
@@ -194,7 +194,7 @@ def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: st
     still = build_sheet(CART)
     with open_editor(tmp_path, still, theme=theme) as driver:
         driver.press_key("l")
-        assert "no obstacle moves" in driver.editor.message
+        assert "No obstacle moves" in driver.editor.message
         driver.editor.message = ""
         driver.run_frames(2)
         before = driver.copy_frame()

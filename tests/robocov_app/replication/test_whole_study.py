@@ -331,7 +331,7 @@ class TestStopping:
         assert process.returncode == 130
         first = next(line for line in told.splitlines() if line.startswith("paper"))
         assert first.startswith("paper (quick): 142 runs, about ")
-        assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps finished runs" in first
+        assert "on 2 processes (measured: rapf 0." in first and "Ctrl+C keeps finished runs" in first
         assert f"To resume: robocov paper --out {out} --quick --without-beyond" in said
         kept = count_finished_runs(out)
         assert 12 <= kept < 142

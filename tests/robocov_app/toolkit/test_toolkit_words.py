@@ -25,6 +25,6 @@ def test_the_scale_is_limited_by_the_window_size(size: tuple[int, int], scale: f
 
 def test_keys_are_formatted_and_commands_split() -> None:
     keys = ("ctrl+shift+z", "page down", "f1", "space", "`", "left")
-    assert [format_key(key) for key in keys] == ["Ctrl Shift Z", "Page down", "F1", "Space", "`", "←"]
+    assert [format_key(key) for key in keys] == ["Ctrl+Shift+Z", "Page down", "F1", "Space", "`", "←"]
     assert split_command("k_rep = 0.5") == ("k_rep", "0.5")
     assert (split_command("map a=b.json"), split_command("robots")) == (("map", "a=b.json"), ("robots", ""))

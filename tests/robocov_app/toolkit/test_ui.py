@@ -106,7 +106,7 @@ def test_widgets_edit_their_values(page: EditedPage) -> None:
     page.press("button", "Go")
     page.press("button", "Stop")  # disabled, with the reason as tip
     assert page.pressed == 1
-    assert page.ui.widgets["button:Stop"].tip == "nothing goes"
+    assert page.ui.widgets["button:Stop"].tip == "Nothing goes"
     page.press("slider", "value", 0.9)
     assert 0.85 < page.value < 0.95
     page.press("check", "On")
@@ -263,7 +263,7 @@ def test_keys_run_commands_once_and_disabled_commands_report_why() -> None:
     recorded.commands.run("undo")
     assert recorded.done == ["pause"]
     assert recorded.errors == ["nothing to undo"]
-    assert recorded.commands["undo"].tip == "Undo (Ctrl Z)"
+    assert recorded.commands["undo"].tip == "Undo (Ctrl+Z)"
 
 
 def test_the_palette_completes_names_and_keeps_invalid_text(screen: pygame.Surface) -> None:

@@ -81,16 +81,16 @@ def test_a_new_layer_has_a_command_without_a_key(shared: Driver) -> None:
 @pytest.mark.parametrize(
     ("key", "text"),
     [
-        ("ctrl+shift+z", "Ctrl Shift Z"),
-        ("shift+=", "Shift ="),
-        ("ctrl++", "Ctrl +"),
+        ("ctrl+shift+z", "Ctrl+Shift+Z"),
+        ("shift+=", "Shift+="),
+        ("ctrl++", "Ctrl++"),
         ("+", "+"),
-        ("shift+left", "Shift ←"),
+        ("shift+left", "Shift+←"),
         ("return", "Enter"),
         ("enter", "Enter"),
         ("f12", "F12"),
         ("page down", "Page down"),
-        ("shift+/", "Shift /"),
+        ("shift+/", "Shift+/"),
         ("[", "["),
     ],
 )

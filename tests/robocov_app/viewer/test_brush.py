@@ -226,10 +226,10 @@ def test_the_brush_is_used_in_the_window(tmp_path):
         assert brush.radius < radius
         assert "radius" in driver.viewer.message
         driver.drag(*(driver.find_pixel((1.0 + 0.3 * k, 3.0)) for k in range(5)))
-        assert driver.viewer.message == "density raised"
+        assert driver.viewer.message == "Density raised"
         assert get_density(session, (1.6, 3.0)) > 1.1
         driver.drag(*(driver.find_pixel((4.5 + 0.2 * k, 3.2)) for k in range(4)), button=3)
-        assert driver.viewer.message == "density lowered"
+        assert driver.viewer.message == "Density lowered"
         assert get_density(session, (4.8, 3.2)) < 0.9
         assert not driver.shows_frame(plain)
         environments = {pane.setup.environment for pane in session.timeline.panes}

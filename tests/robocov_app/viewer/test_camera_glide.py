@@ -73,7 +73,7 @@ def test_reduced_motion_of_the_system_is_respected(driver: Driver) -> None:
     assert not canvas.camera.is_moving
     for _ in range(2):
         driver.window.do("motion")
-    assert driver.viewer.message == "zooming is instant, because the system asks for reduced motion"
+    assert driver.viewer.message == "Zooming is instant, because the system asks for reduced motion"
     driver.window.reduce_motion(is_reduced=False)
     driver.window.do("zoom:in")
     assert canvas.camera.is_moving

@@ -15,12 +15,13 @@ from robocov.conditions import Conditions
 from robocov.cost import CoverageCost
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
+from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.render.painter import Painter
 from robocov_app.render.scene import Scene
-from robocov_app.runs.saved_runs import load_saved_runs
+from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.pane import Continuation
 from robocov_app.viewer.session.recorded import build_replay_session
@@ -233,7 +234,37 @@ def test_a_saved_run_with_conditions_is_replayed_and_continued(tmp_path: Path) -
     assert session.displayed.numbers == (1, 2, 4)
     advance_session(session, 12)
     assert session.displayed.numbers == (1, 3, 4)
-    assert pane.simulation.conditions == CONDITIONS.drop_team_changes()
+
+
+FAILURES = Conditions(failures=((2, 0.75),), joins=((3, 1.0, (4.5, 2.0)),), seed=3)
+NOISE = replace(CONDITIONS, failures=(), joins=())
+
+
+@pytest.mark.parametrize("conditions", [FAILURES, NOISE, CONDITIONS], ids=["failures", "noise", "both"])
+@pytest.mark.parametrize("name", ["rapf", "atlas"])
+def test_a_record_is_continued_like_a_longer_run_bit_for_bit(name: str, conditions: Conditions) -> None:
+    """From the end of the record, before the failure, and between the failure and the joining robot."""
+    scenario = Scenario(
+        HALL,
+        name,
+        team=PROPERTIES.build_team((1, 2, 3, 4)),
+        starts=STARTS,
+        dt=DT,
+        duration=2.0,
+        conditions=conditions,
+    )
+    expected = scenario.run()
+    record = expected.until(1.2)
+    for time_s in (1.2, 0.4, 0.85):
+        session = build_replay_session([SavedRun(Path("saved"), record, None)])
+        session.show_time(time_s)
+        session.branch()
+        advance_session(session, round((2.0 - time_s) / DT))
+        pane = session.timeline.panes[0]
+        rows = np.flatnonzero(expected.working[-1])
+        assert [number - 1 for number in pane.numbers] == rows.tolist()
+        assert pane.positions.tobytes() == expected.positions[-1, rows].tobytes()
+        assert pane.velocities.tobytes() == expected.velocities[-1, rows].tobytes()
 
 
 @pytest.mark.slow

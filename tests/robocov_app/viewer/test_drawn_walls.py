@@ -29,7 +29,7 @@ def test_a_wall_that_ends_near_walls_closes_the_room(tmp_path: Path) -> None:
         environment = driver.session.displayed.environment
         assert len(environment.free.geoms) == 2
         assert environment.obstacles[-1].points == ((5.0, 0.0), (5.0, 6.0))
-        assert driver.viewer.message == "wall drawn; the team is split into 2 groups"
+        assert driver.viewer.message == "Wall drawn; the team is split into 2 groups"
 
 
 def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_a_wall_far_from_others_stays_where_it_is_drawn(tmp_path: Path) -> None:
         driver.press_key("return")
         wall = driver.session.displayed.environment.obstacles[-1]
         assert np.allclose(wall.points, ((5.0, 1.0), (5.0, 4.0)), atol=0.02)
-        assert driver.viewer.message == "wall drawn"
+        assert driver.viewer.message == "Wall drawn"
 
 
 def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
@@ -49,7 +49,7 @@ def test_a_wall_can_be_drawn_by_dragging(tmp_path: Path) -> None:
         driver.drag_at((5.0, 0.02), (5.0, 5.98))
         (wall,) = driver.session.displayed.environment.obstacles
         assert wall.points == ((5.0, 0.0), (5.0, 6.0))
-        assert driver.viewer.message.startswith("wall drawn; ")
+        assert driver.viewer.message.startswith("Wall drawn; ")
 
 
 def test_a_very_short_drag_counts_as_a_click(tmp_path: Path) -> None:

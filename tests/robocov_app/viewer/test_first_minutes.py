@@ -242,7 +242,7 @@ def test_a_scale_enlarges_the_window_or_is_reduced_with_a_message(
         assert window.screen.get_size() == (1350, 900)
     with build_visible_launcher(monkeypatch, tmp_path, scale=2.0).window() as window:
         assert window.layout.scale == 1.625
-        assert window.viewer.message == "scale 2 needs a window of 1800 × 1200; using 1.625"
+        assert window.viewer.message == "Scale 2 needs a window of 1800 × 1200; using 1.625"
 
 
 def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:

@@ -118,14 +118,14 @@ def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (1.0, 3.0)))
     driver.push_button("pane:add")
     message = driver.viewer.message
-    assert "not repeated: robot 2 failed, robot 1 was moved" in message
+    assert "Not repeated: robot 2 failed, robot 1 was moved. Ctrl+Z undoes the comparison." in message
     driver.press_key("ctrl+z")
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
 
 
 def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
     driver.push_button("pane:add")
-    assert driver.viewer.message == "all controllers restart from the same starts"
+    assert driver.viewer.message == "All controllers restart from the same starts."
 
 
 def test_a_curve_in_a_file_has_its_beginning() -> None:
@@ -192,7 +192,7 @@ def test_more_robots_than_fit_at_the_start_start_uniformly(driver: Driver) -> No
     assert driver.session.timeline.scenario.start_name == "uniform"
     assert (
         driver.viewer.message
-        == "no space for 40 robots at start “far”: they start anywhere in the free space"
+        == "No space for 40 robots at start “far”: they start anywhere in the free space"
     )
     driver.press_key("ctrl+z")
     assert driver.session.timeline.scenario.start_name == "far"

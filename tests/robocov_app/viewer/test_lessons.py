@@ -126,7 +126,7 @@ def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
         driver.run_frames(1)
         assert driver.window.lesson.player is None
         assert driver.viewer.selected_robot is None
-        assert driver.viewer.message.startswith("the lesson has ended")
+        assert driver.viewer.message.startswith("The lesson has ended")
 
 
 def click_area(driver: Driver, action: str, argument: int | None = None) -> None:
@@ -234,7 +234,7 @@ def test_answers_and_chapters_are_clicked(tmp_path: Path) -> None:
         driver.press_key("space")
         driver.run_frames(10)
         assert driver.session.displayed.time == 0.0
-        assert "answer first" in driver.viewer.message
+        assert "Answer first" in driver.viewer.message
         driver.click(*driver.window.lesson.click_areas[1][0].center)
         assert (lesson.answer, lesson.state) == (2, "playing")
         driver.run_frames(30)

@@ -60,7 +60,7 @@ def test_speed_steps_stop_at_both_ends() -> None:
         speeds.append(viewer.session.playback.clock.speed)
     assert speeds[:2] == [1.0, 2.0]
     assert speeds[-2:] == [math.inf, math.inf]
-    assert viewer.message == "speed max"
+    assert viewer.message == "Speed max"
     for _ in SPEEDS:
         run_command(viewer, "slower")
     assert viewer.session.playback.clock.speed == SPEEDS[0]
@@ -117,7 +117,7 @@ def test_more_and_fewer_robots() -> None:
         run_command(viewer, "fewer")
     assert viewer.session.timeline.scenario.robots == 1
     assert viewer.has_error_message
-    assert viewer.message == f"robots: expected a whole number from 1 to {MAX_ROBOTS}, got 0"
+    assert viewer.message == f"Robots: expected a whole number from 1 to {MAX_ROBOTS}, got 0"
 
 
 def test_too_many_robots_are_reported_and_change_nothing() -> None:
@@ -166,10 +166,10 @@ def test_a_user_map_is_offered_after_the_bundled_maps() -> None:
 def test_a_saved_map_contains_drawn_obstacles(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
     draw_circle(viewer, (1.0, 3.0), (1.3, 3.0))
-    assert viewer.message.startswith("circle drawn")
+    assert viewer.message.startswith("Circle drawn")
     run_command(viewer, "save:map")
     first = tmp_path / "hall-1.json"
-    assert viewer.message == f"map saved: {first}"
+    assert viewer.message == f"Map saved: {first}"
     assert viewer.files.map_name == str(first)
     assert load_map(str(first)).obstacles == viewer.session.displayed.environment.obstacles
     run_command(viewer, "save:map")
@@ -296,7 +296,7 @@ def test_robot_commands_require_a_selected_robot() -> None:
         viewer.has_error_message = False
         run_command(viewer, action)
         assert viewer.has_error_message
-        assert "no robot is selected" in viewer.message
+        assert "No robot is selected" in viewer.message
     viewer.inspection.selected = 2
     run_command(viewer, "robot:fail")
     assert viewer.session.displayed.numbers == (1, 3)
@@ -320,32 +320,32 @@ def test_undo_of_restarts_restores_the_map_name() -> None:
         ("4 robots", "hall"),
     ):
         run_command(viewer, "undo")
-        assert viewer.message == f"undone: {description}; back at 0.0 s"
+        assert viewer.message == f"Undone: {description}; back at 0.0 s"
         assert viewer.files.map_name == name
     run_command(viewer, "redo")
     run_command(viewer, "redo")
-    assert viewer.message == "redone: map Square"
+    assert viewer.message == "Redone: map Square"
     assert viewer.files.map_name == "square"
 
 
 def test_undo_and_redo_report_the_edit() -> None:
     viewer = build_presenter()
     run_command(viewer, "undo")
-    assert viewer.message == "nothing to undo"
+    assert viewer.message == "Nothing to undo"
     run_command(viewer, "redo")
-    assert viewer.message == "nothing to redo"
+    assert viewer.message == "Nothing to redo"
     viewer.session.add_robot((5.0, 3.0))
     run_command(viewer, "undo")
-    assert viewer.message == "undone: robot 4 joined; back at 0.0 s"
+    assert viewer.message == "Undone: robot 4 joined; back at 0.0 s"
     assert viewer.session.displayed.numbers == (
         1,
         2,
         3,
     )
     run_command(viewer, "undo")
-    assert viewer.message == "nothing to undo; Alt ← leads to other branches"
+    assert viewer.message == "Nothing to undo; Alt+← leads to other branches"
     run_command(viewer, "redo")
-    assert viewer.message == "redone: robot 4 joined"
+    assert viewer.message == "Redone: robot 4 joined"
     assert viewer.session.displayed.numbers == (1, 2, 3, 4)
 
 
@@ -378,6 +378,6 @@ def test_cancel_discards_the_drawing_then_returns_to_the_hand() -> None:
 def test_wall_width_changes_by_commands() -> None:
     viewer = build_presenter()
     run_command(viewer, "wider")
-    assert viewer.message == "new walls are 0.125 m wide"
+    assert viewer.message == "New walls are 0.125 m wide"
     run_command(viewer, "narrower")
-    assert viewer.message == "new walls are 0.1 m wide"
+    assert viewer.message == "New walls are 0.1 m wide"

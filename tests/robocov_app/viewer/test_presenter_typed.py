@@ -43,7 +43,7 @@ def test_messages_disappear_after_a_while() -> None:
     viewer = build_presenter()
     viewer.show_message("hello")
     viewer.pass_time(MESSAGE_S - 0.1)
-    assert viewer.message == "hello"
+    assert viewer.message == "Hello"
     viewer.pass_time(0.2)
     assert viewer.message == ""
 
@@ -52,7 +52,7 @@ def test_errors_are_shown_without_paths_in_files() -> None:
     viewer = build_presenter()
     viewer.attempt(lambda: viewer.comparison.set_parameter("team.radius", -1.0))
     assert viewer.has_error_message
-    assert viewer.message.startswith("radius: ")
+    assert viewer.message.startswith("Radius: ")
     assert simplify_message("obstacles: too many") == "too many"
 
 
@@ -124,7 +124,7 @@ def test_typed_commands_run(tmp_path: Path) -> None:
     run_text(viewer, "branch 1")
     run_text(viewer, f"save {tmp_path / 'story.robocov'}")
     run_text(viewer, f"open {tmp_path / 'story.robocov'}")
-    assert viewer.message.startswith("session opened: ")
+    assert viewer.message.startswith("Session opened: ")
     run_text(viewer, "map square")
     assert viewer.files.map_name == "square"
     commands = build_command_table(viewer).commands

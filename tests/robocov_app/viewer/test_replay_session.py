@@ -412,7 +412,7 @@ def test_the_window_displays_a_record_without_its_controller(
         for _ in range(40):
             window.run_frame(1 / 30)
         assert window.viewer.session.timeline.is_live
-        assert window.viewer.message.startswith("the record ends here")
+        assert window.viewer.message.startswith("The record ends here")
         window.do("pause")
         window.run_frame(1 / 30)
         assert "not resumed" in window.viewer.message

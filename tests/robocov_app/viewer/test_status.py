@@ -41,7 +41,7 @@ def test_an_old_cost_is_shown_with_its_time(viewer: Presenter) -> None:
 def test_the_status_line_contains_pauses_videos_and_delays(viewer: Presenter) -> None:
     viewer.session.playback.is_playing = False
     facts = list_facts(viewer, 60.0, 0.0, 12.4)
-    assert facts[0].startswith("paused · ")
+    assert facts[0].startswith("Paused · ")
     assert "● video 12 s" in facts
     viewer.session.playback.is_playing = True
     viewer.session.playback.clock.is_behind = True

@@ -68,7 +68,7 @@ def test_playback_stops_when_the_team_has_settled(tmp_path: Path) -> None:
             if not driver.session.playback.is_playing:
                 break
         assert driver.session.timeline.is_settled
-        assert driver.viewer.message.startswith("settled at ")
+        assert driver.viewer.message.startswith("Settled at ")
 
 
 def test_the_speed_multiplies_the_simulated_time(driver: Driver) -> None:
@@ -137,7 +137,7 @@ def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) 
     driver.run_frames(15)
     driver.press_key("f9")
     path = tmp_path / "robocov-1.mp4"
-    assert driver.viewer.message.startswith(f"video saved: {path}")
+    assert driver.viewer.message.startswith(f"Video saved: {path}")
     assert not driver.viewer.view.is_recording
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert seconds == pytest.approx(75 * FRAME, abs=0.15)
@@ -313,7 +313,7 @@ def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
     assert driver.window.lesson.player is None
     assert driver.viewer.view.layers == shown
     assert driver.viewer.session is driver.session
-    assert driver.viewer.message == "the lesson has ended; your session from before is back"
+    assert driver.viewer.message == "The lesson has ended; your session from before is back"
 
 
 def test_the_lesson_pauses_when_the_arena_is_clicked(driver: Driver) -> None:

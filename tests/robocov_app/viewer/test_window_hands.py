@@ -67,10 +67,10 @@ def test_moving_an_obstacle_can_be_undone_and_redone(driver: Driver) -> None:
     driver.drag_at((4.2, 1.2), (4.6, 1.6), (5.0, 1.8))
     (pillar, _) = driver.session.displayed.environment.obstacles
     assert pillar.center == pytest.approx((5.0, 1.8), abs=0.03)
-    assert driver.viewer.message.startswith("circle “pillar” moved")
+    assert driver.viewer.message.startswith("Circle “pillar” moved")
     driver.press_key("ctrl+z")
     assert driver.session.displayed.environment == before
-    assert driver.viewer.message.startswith("undone: ")
+    assert driver.viewer.message.startswith("Undone: ")
     driver.press_key("ctrl+y")
     assert driver.session.displayed.environment.obstacles[0] == pillar
     driver.press_key("ctrl+z")
@@ -108,7 +108,7 @@ def test_a_polygon_is_drawn_corner_by_corner_and_closed_by_enter(driver: Driver)
     driver.press_key("return")
     obstacle = driver.session.displayed.environment.obstacles[-1]
     assert np.allclose(obstacle.vertices, ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)), atol=0.02)
-    assert driver.viewer.message.startswith("polygon drawn")
+    assert driver.viewer.message.startswith("Polygon drawn")
 
 
 @pytest.mark.parametrize("gesture", ["double click", "first corner", "right click"])

@@ -104,7 +104,7 @@ def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
         advance_session(driver.session, 10).fail_robot(2)
         advance_session(driver.session, 10)
         driver.press_key("ctrl+z")
-        assert driver.viewer.message.startswith("undone: robot 2 failed; back at 0.2 s")
+        assert driver.viewer.message.startswith("Undone: robot 2 failed; back at 0.2 s")
         driver.session.fail_robot(1)
         driver.press_key("ctrl+s")
         (path,) = tmp_path.glob("*.robocov")
@@ -125,7 +125,7 @@ def test_branches_are_entered_by_keys(tmp_path: Path) -> None:
         driver.session.undo()
         driver.session.fail_robot(1)
         driver.press_key("alt+left")
-        assert driver.viewer.message == "branch 1 of 2: robot 2 failed"
+        assert driver.viewer.message == "Branch 1 of 2: robot 2 failed"
         assert driver.session.displayed.numbers == (1, 3)
         driver.press_key("alt+right")
         assert driver.session.displayed.numbers == (2, 3)

@@ -30,7 +30,7 @@ class Arguments(JsonOption):
     The exit status is 2 if one of them is not a valid map. Errors are reported with line and column, as in
     mine.json:14:9. Warnings, such as a gap narrower than a robot, do not make a map invalid.
 
-    With --watch the maps are checked again whenever they are saved, until Ctrl-C, and changes since the last
+    With --watch the maps are checked again whenever they are saved, until Ctrl+C, and changes since the last
     valid state are marked. With --json as well, each check is one JSON object on a line.
 
     Example: robocov check mine.json rooms
@@ -80,7 +80,7 @@ def _print_outcome(name: str, outcome: MapReport | InputError) -> None:
 
 
 def _watch(options: Arguments) -> None:
-    """Check the maps, and each again whenever it is saved, until Ctrl-C.
+    """Check the maps, and each again whenever it is saved, until Ctrl+C.
 
     Changes since the last valid state of a map are marked.
     """
@@ -128,7 +128,7 @@ def _display_outcomes(
         for name, outcome in outcomes.items():
             if name not in new_outcomes:
                 _display(console, name, outcome)
-        console.print("watching; Ctrl-C ends", style="dim")
+        console.print("watching; Ctrl+C ends", style="dim")
     console.file.flush()
 
 

@@ -37,7 +37,7 @@ class ReferenceImageTool(EditorTool):
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Start a click or a drag; raise MapError if there is no picture."""
         require(
-            context.sketch.background is not None, "there is no picture under the map: Ctrl B chooses one"
+            context.sketch.background is not None, "there is no picture under the map: Ctrl+B chooses one"
         )
         self.pressed = event
 

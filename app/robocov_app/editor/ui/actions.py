@@ -23,7 +23,7 @@ _SHAPES_WITH = {"width": (WallObstacle,), "radius": (CircleObstacle, DiscStart)}
 def require_selection(editor: Editor) -> Selection:
     """Return the selected objects and owners of selected vertices; raise MapError if there are none."""
     return require(
-        select_owners(editor.selection), "nothing is selected: click something first, or press Ctrl A"
+        select_owners(editor.selection), "nothing is selected: click something first, or press Ctrl+A"
     )
 
 

@@ -159,7 +159,7 @@ def _write_description(editor: Editor, text: str) -> None:
 
 
 def _require_picture(editor: Editor) -> Background:
-    return require(editor.sketch.background, "there is no picture under the map: Ctrl B chooses one")
+    return require(editor.sketch.background, "there is no picture under the map: Ctrl+B chooses one")
 
 
 def _read_picture_scale(editor: Editor) -> str:

@@ -304,7 +304,7 @@ class FileCommands:
         state = editor.document.check_disk(editor.now)
         title = editor.document.title
         if state == "gone":
-            editor.show_message(f"{title} no longer exists; Ctrl S writes it again", is_error=True)
+            editor.show_message(f"{title} no longer exists; Ctrl+S writes it again", is_error=True)
         elif state == "changed":
             text = f"Another program has changed {title}. Reloading can be undone."
             reload = ("Reload", "r", self.reload)

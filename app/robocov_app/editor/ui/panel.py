@@ -54,7 +54,7 @@ MAX_PROBLEMS = 200  # number of problems that are listed
 MAX_PROBLEM_COUNT = 99  # largest number of problems in the title of their page
 NOTHING_SELECTED = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
-    "Tab selects the next; Ctrl A selects all."
+    "Tab selects the next; Ctrl+A selects all."
 )
 
 

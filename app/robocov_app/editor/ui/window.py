@@ -42,7 +42,7 @@ from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
 from robocov_app.toolkit.window_part import WindowPart
 
-STATUS_HINT = "F5 try it · F1 keys"
+STATUS_HINT = "F5: try it · F1: keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 

@@ -27,7 +27,7 @@ _HEAD = {"format": "robocov-paper", "version": 1}
 
 
 class StudyInterrupted(Exception):  # noqa: N818 - it is no error
-    """The user has pressed Ctrl-C."""
+    """The user has pressed Ctrl+C."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
+from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.widgets.open_list import OpenList
 from robocov_app.toolkit.widgets.row_layout import RowLayout
 from robocov_app.toolkit.widgets.text_edit import TextEdit
@@ -302,7 +303,7 @@ class Page(RowLayout):
             self.focused_rect = widget.rect.copy()
         widget.rect = widget.rect.clip(self.clip)
         widget.enabled = not disabled_reason
-        widget.tip = ": ".join(text for text in (widget.tip, disabled_reason) if text)
+        widget.tip = to_sentence_case(": ".join(text for text in (widget.tip, disabled_reason) if text))
         self.widgets[f"{widget.kind}:{widget.key}"] = widget
 
     def add_clickable(self, widget: Widget, disabled_reason: str = "") -> bool:

@@ -106,10 +106,10 @@ def format_key(name: str) -> str:
     """Format the name of a key for display.
 
     >>> format_key("ctrl+shift+z")
-    'Ctrl Shift Z'
+    'Ctrl+Shift+Z'
     """
     parts = split_key_name(name)
-    return " ".join(_KEY_SYMBOLS.get(part, part[:1].upper() + part[1:]) for part in parts)
+    return "+".join(_KEY_SYMBOLS.get(part, part[:1].upper() + part[1:]) for part in parts)
 
 
 def get_wheel_notches(event: pygame.event.Event) -> float:

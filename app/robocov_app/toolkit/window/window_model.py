@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from robocov.errors import RobocovError
+from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.window.exceptions import describe_os_error
 
 MESSAGE_S = 5.0
@@ -40,9 +41,9 @@ class WindowModel:
         self._message_time = 0.0
 
     def show_message(self, text: str, *, is_error: bool = False) -> None:
-        """Show a status message; if it is empty, the current message stays."""
+        """Show a status message, in sentence case; if it is empty, the current message stays."""
         if text:
-            self.message = self.shorten_paths(text)
+            self.message = to_sentence_case(self.shorten_paths(text))
             self.has_error_message = is_error
             self._message_time = self.now
 

@@ -39,12 +39,12 @@ class ComparisonActions:
         dropped = [event.text for event in events if event.kind in _KINDS_NOT_REPEATED]
         session.add_pane(ControllerChoice(name))
         viewer.inspection.active_pane = len(session.timeline.panes) - 1
-        message = "all controllers restart from the same starts"
+        message = "all controllers restart from the same starts."
         if dropped:
             listed = ", ".join(dropped[:_MAX_LISTED_EVENTS])
             if len(dropped) > _MAX_LISTED_EVENTS:
                 listed += f" and {len(dropped) - _MAX_LISTED_EVENTS} more"
-            message += f"; not repeated: {listed}. Undo (Ctrl+Z) returns to them."
+            message += f" Not repeated: {listed}. Ctrl+Z undoes the comparison."
         viewer.show_message(message)
 
     def remove_pane(self) -> None:

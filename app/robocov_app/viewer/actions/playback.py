@@ -150,7 +150,7 @@ class PlaybackActions:
             time = step * session.timeline.scenario.dt
             self._viewer.show_message(f"undone: {description}; back at {time:.1f} s")
         elif session.timeline.document.nodes[1:]:
-            self._viewer.show_message("nothing to undo; Alt ← leads to other branches")
+            self._viewer.show_message("nothing to undo; Alt+← leads to other branches")
         else:
             self._viewer.show_message("nothing to undo")
 

@@ -14,6 +14,7 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
+from robocov_app.toolkit.sentence_case import to_sentence_case
 
 ChipKind: TypeAlias = Literal["menu", "layer", "preset", "row"]
 """The button that opens the menu, a layer in the bar, a preset, or a layer in the menu."""
@@ -93,14 +94,9 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
     if len(entries) == 1 and len(texts[0]) > MAX_ENTRY_CHARS:
         texts = [layer.title]
     return tuple(
-        LegendEntry(_capitalize(text), entry.draw, entry.style)
+        LegendEntry(to_sentence_case(text), entry.draw, entry.style)
         for text, entry in zip(texts, entries, strict=True)
     )
-
-
-def _capitalize(text: str) -> str:
-    """Return a text in sentence case; only its first letter changes."""
-    return text[:1].upper() + text[1:]
 
 
 def measure_chip(canvas: Canvas, chip: Chip) -> int:

@@ -46,7 +46,7 @@ def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> No
     color = mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH)
     pygame.draw.rect(canvas.surface, color, bar, border_radius=thickness)
     title_position = (_TITLE_LEFT_PX * frame.scale, middle)
-    canvas.draw_text("time", title_position, color=theme.faint, size=theme.small_text)
+    canvas.draw_text("Time", title_position, color=theme.faint, size=theme.small_text)
     _draw_state(canvas, frame, times.right + _STATE_GAP_PX * frame.scale, middle)
 
 
@@ -55,14 +55,14 @@ def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -
     theme = frame.theme
     size = theme.small_text
     if not frame.timeline.is_live:
-        canvas.draw_text("past", (left, middle), color=theme.accent, bold=True, size=size)
+        canvas.draw_text("Past", (left, middle), color=theme.accent, bold=True, size=size)
         return
     if not frame.timeline.history.thinned:
-        canvas.draw_text("live", (left, middle), color=theme.start, bold=True, size=size)
+        canvas.draw_text("Live", (left, middle), color=theme.start, bold=True, size=size)
         return
-    text = "live · past thinned"
+    text = "Live (older history is coarser)"
     if left + canvas.measure_text(text, size=size) > frame.layout.time_slider.width:
-        text = "thinned"
+        text = "Live (coarser)"
     canvas.draw_text(text, (left, middle), color=theme.start, size=size)
 
 

@@ -17,6 +17,7 @@ from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
+from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.viewer.explanation.explain import RobotReport
@@ -390,13 +391,14 @@ def show_report(ui: Ui, report: RobotReport) -> None:
     """Show the explanation of a robot, with an arrow for each force."""
     ui.paragraph(report.title, size=14, bold=True)
     ui.space(3)
-    ui.paragraph(report.verdict, size=12.5, bold=True, color=ui.theme.accent)
+    ui.paragraph(to_sentence_case(report.verdict), size=12.5, bold=True, color=ui.theme.accent)
     ui.space(4)
     sizes = [float(np.hypot(*line.vector)) for line in report.lines if line.vector is not None]
     largest = max(sizes, default=1.0)
     for line in report.lines:
         _draw_force(ui, line, largest)
-        ui.paragraph(line.text, size=11.5, indent=_REPORT_INDENT_PX if line.vector is not None else 0.0)
+        indent = 0.0 if line.vector is None else _REPORT_INDENT_PX
+        ui.paragraph(to_sentence_case(line.text), size=11.5, indent=indent)
         ui.space(3)
 
 

@@ -10,7 +10,7 @@ from robocov.errors import RobocovError
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Snapshot
 from robocov_app.viewer.session.pane import Pane, resume_simulation, select_working
-from robocov_app.viewer.session.past.decision_replay import rebuild_snapshot
+from robocov_app.viewer.session.past.decision_replay import has_same_forces, rebuild_snapshot
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ
 from robocov_app.viewer.session.timeline import Timeline
@@ -68,7 +68,9 @@ class DisplayedState:
         if state.setup.follows_schedule:
             with suppress(RobocovError):
                 simulation = resume_simulation(state, dt, round(self.time / dt))
-                return select_working(simulation.observe_and_decide(), state.setup)
+                snapshot = select_working(simulation.observe_and_decide(), state.setup)
+                if state.recorded is None or has_same_forces(snapshot.decision, state.recorded):
+                    return snapshot
             # The memory and the messages are those of all robots.
             state = state._replace(memory=None, inbox=None)
         return rebuild_snapshot(state, self.time, dt)

@@ -16,8 +16,13 @@ from robocov.record import Record
 from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
-from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup
-from robocov_app.viewer.session.past.history import MAX_HISTORY_BYTES, RunHistory
+from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup, keeps_a_robot
+from robocov_app.viewer.session.past.history import MAX_HISTORY_BYTES, RunHistory, estimate_state_bytes
+from robocov_app.viewer.session.past.recorded_knowledge import (
+    Knowledge,
+    build_team_state,
+    recompute_knowledge,
+)
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState, RunState
 from robocov_app.viewer.session.past.trails import rebuild_trail
 from robocov_app.viewer.session.present import Present
@@ -29,9 +34,7 @@ from robocov_app.viewer.session.setup.scenario import MAX_PANES, SessionScenario
 from robocov_app.viewer.session.timeline import Timeline
 
 MAX_RECORD_BYTES = 400_000_000
-"""Maximum memory for states of records, without their arrays; of longer records, older states are thinned."""
-STATE_BYTES = 1500
-"""Approximate memory for the state of one pane, without the arrays of the record."""
+"""Maximum memory for states of records; of longer records, older states are thinned."""
 _PERIOD_TOLERANCE = 1e-6
 _TIME_TOLERANCE = 1e-6
 """Relative tolerance of the times of a record, which are rounded."""
@@ -163,15 +166,16 @@ def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunH
         roster = build_roster(record)
         setup = PaneSetup(scenario.environment, choice, scenario.properties, roster.numbers, roster.failed)
         pane_states.append(_build_states(record, setup))
-    # Enough memory that the record is not thinned, up to `MAX_RECORD_BYTES`.
-    # The arrays of a state are its positions and velocities.
-    state_bytes = STATE_BYTES + 2 * first.positions[0].nbytes
-    needed_bytes = len(first) * len(records) * state_bytes
-    history = RunHistory(dt, MAX_HISTORY_BYTES + min(needed_bytes, MAX_RECORD_BYTES))
     steps_between_states = round(first.dt / dt)
+    run_states: list[RunState] = []
     for index in range(len(first)):
         states = {pane: states[index] for pane, states in enumerate(pane_states)}
-        history.append(RunState(index * steps_between_states, states, scenario))
+        run_states.append(RunState(index * steps_between_states, states, scenario))
+    # Enough memory that the record is not thinned, up to `MAX_RECORD_BYTES`.
+    needed_bytes = sum(map(estimate_state_bytes, run_states))
+    history = RunHistory(dt, MAX_HISTORY_BYTES + min(needed_bytes, MAX_RECORD_BYTES))
+    for state in run_states:
+        history.append(state)
     return history
 
 
@@ -191,7 +195,7 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
     velocities = np.broadcast_to(record.velocities, record.velocities.shape)
     forces = np.broadcast_to(record.forces, record.forces.shape)
     goals = np.broadcast_to(record.goals, record.goals.shape)
-    memories = _recompute_memories(record, setup.controller)
+    knowledge = _recompute_knowledge(record, setup.controller)
     setups = _build_setups(record, setup)
     states = []
     for index in range(len(record)):
@@ -206,9 +210,11 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
                 setups[index],
                 positions[index][rows],
                 velocities[index][rows],
-                memories[index],
+                knowledge[index].memory,
                 decision,
+                inbox=knowledge[index].inbox,
                 steering=steering,
+                all_robots=build_team_state(record, index) if setups[index].follows_schedule else None,
             )
         )
     return states
@@ -220,6 +226,10 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
         return [setup] * len(record)
     setup_by_robots: dict[bytes, PaneSetup] = {}
     conditions = record.conditions.drop_team_changes()
+    scheduled_robots = 0
+    if _can_follow_schedule(record, setup):
+        conditions = record.conditions
+        scheduled_robots = len(record.team)
     setups = []
     for positions, working, present in zip(record.positions, record.working, record.present, strict=True):
         key = working.tobytes() + present.tobytes()
@@ -229,9 +239,29 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
             for row in np.flatnonzero(present & ~working):
                 failed[setup.numbers[row]] = tuple(positions[row].tolist())
             numbers = tuple(setup.numbers[row] for row in np.flatnonzero(working))
-            setup_by_robots[key] = replace(setup, numbers=numbers, failed=failed, conditions=conditions)
+            setup_by_robots[key] = replace(
+                setup,
+                numbers=numbers,
+                failed=failed,
+                conditions=conditions,
+                scheduled_robots=scheduled_robots,
+            )
         setups.append(setup_by_robots[key])
     return setups
+
+
+def _can_follow_schedule(record: Record, setup: PaneSetup) -> bool:
+    """Return whether the simulation itself lets robots of a record fail and join when it is continued."""
+    if record.conditions is None or not keeps_a_robot(record.conditions, len(record.team)):
+        return False
+    return not setup.failed and setup.numbers == tuple(range(1, len(record.team) + 1))
+
+
+def _recompute_knowledge(record: Record, choice: ControllerChoice) -> list[Knowledge]:
+    """Recompute the memory of the controller and the messages at each state; None where it is impossible."""
+    if record.conditions is not None:
+        return recompute_knowledge(record, choice, get_control_period(record))
+    return [Knowledge(memory, None) for memory in _recompute_memories(record, choice)]
 
 
 def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:

@@ -8,7 +8,7 @@ from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.clock import format_speed
 from robocov_app.viewer.session.pane import Pane
 
-HINT = "Space pause · F1 keys"
+HINT = "Space: pause · F1: keys"
 
 MAX_SUGGESTIONS = 3
 _MAX_COST_LAG_S = 0.05  # if the displayed cost is older than this, its time is shown, too
@@ -44,7 +44,7 @@ def list_facts(
     """
     session = viewer.session
     time = session.displayed.time
-    paused = "" if session.playback.is_playing else "paused · "
+    paused = "" if session.playback.is_playing else "Paused · "
     facts = [f"{paused}t = {time:.2f} s"]
     known_cost = viewer.costs.known.get(viewer.pane.number)
     if known_cost is not None:

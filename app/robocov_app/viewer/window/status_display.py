@@ -11,7 +11,7 @@ from robocov_app.viewer.lessons.guide import LessonGuide
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.window.status import suggest_actions
 
-_LESSON_HINT = "F2 back to the lesson · Esc ends it"
+_LESSON_HINT = "F2: back to the lesson · Esc: end it"
 
 
 class StatusDisplay:
@@ -51,7 +51,7 @@ class StatusDisplay:
         if self._lesson.is_waiting:
             hint = _LESSON_HINT
         elif not self._viewer.session.playback.is_playing:
-            hint = hint.replace("Space pause", "Space play")
+            hint = hint.replace("Space: pause", "Space: play")
         draw_status(screen, layout.status, theme, layout.scale, facts=facts, hint=hint)
 
     def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> None:

@@ -48,7 +48,7 @@ class PlayWindow(ViewerWindow):
 
     viewer: PlayPresenter
     top_bar_class = PlayTopBar
-    hint = "F5 back to the editor · F1 keys"
+    hint = "F5: back to the editor · F1: keys"
 
     def __init__(
         self,

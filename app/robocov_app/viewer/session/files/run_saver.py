@@ -116,7 +116,7 @@ class RunSaver:
                 with suppress(subprocess.TimeoutExpired):
                     job.process.wait(FIRST_WAIT_S)
                 if index == 0 and job.process.poll() is None:
-                    echo("saving runs; press Ctrl-C to cancel", to_stderr=True)
+                    echo("saving runs; press Ctrl+C to cancel", to_stderr=True)
                 job.process.wait()
         except BaseException:
             for job in self._jobs:

@@ -175,5 +175,5 @@ class PlottedQuantity(NamedTuple):
     unit: str
 
 
-DISTANCE = PlottedQuantity("distance", "Mean distance to the nearest robot", "mean distance", "m")
-TIME = PlottedQuantity("time", "Mean time until the first robot is there", "mean time", "s")
+DISTANCE = PlottedQuantity("distance", "Mean distance to the nearest robot", "Mean distance", "m")
+TIME = PlottedQuantity("time", "Mean time until the first robot is there", "Mean time", "s")

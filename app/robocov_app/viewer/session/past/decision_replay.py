@@ -54,7 +54,7 @@ def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) ->
         true_positions = state.positions
     _, seen = _build_radio(state.setup, dt).receive_messages(inbox, round(time / dt), seen)
     decision = _decide(seen, state)
-    if state.recorded is not None and not _has_same_forces(decision, state.recorded):
+    if state.recorded is not None and not has_same_forces(decision, state.recorded):
         # The controller has changed since the record was made, or it cannot be loaded.
         decision = _complete_recorded_decision(state)
     return Snapshot(seen, decision, true_positions)
@@ -74,7 +74,8 @@ def _observe(state: PaneState, time: float) -> Observations:
     return replace(seen, density=environment.density, steering=state.steering)
 
 
-def _has_same_forces(decision: Decision, recorded: Decision) -> bool:
+def has_same_forces(decision: Decision, recorded: Decision) -> bool:
+    """Return whether a decision agrees with the recorded one."""
     return np.allclose(decision.forces, recorded.forces, rtol=RECORD_TOLERANCE, atol=RECORD_TOLERANCE)
 
 

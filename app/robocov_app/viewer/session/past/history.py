@@ -80,7 +80,7 @@ class RunHistory:
 
     def append(self, state: RunState) -> None:
         """Append a newer state; thin the older ones if the memory limit is exceeded."""
-        size = _estimate_state_bytes(state)
+        size = estimate_state_bytes(state)
         self.states.append(state)
         self._sizes.append(size)
         self._bytes += size
@@ -169,7 +169,8 @@ def _has_new_setup(before: RunState, after: RunState) -> bool:
     )
 
 
-def _estimate_state_bytes(state: RunState) -> int:
+def estimate_state_bytes(state: RunState) -> int:
+    """Estimate the memory that a state needs, in bytes."""
     total = 0
     for pane_state in state.states.values():
         total += _PANE_OVERHEAD_BYTES
