@@ -243,7 +243,7 @@ def read(path: Path, seconds: float) -> Cost:
         import_map(small_path, options=small_options)
     importer = detect_format(path)
     options = ReadOptions(**{name: 1.0 for name in ("cell", "scale") if name in importer.options})
-    if importer.name == "picture":
+    if importer.name == "image":
         options = ReadOptions(cell=0.1)
     initial_mb = read_peak_mb()
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))

@@ -508,7 +508,7 @@ SEEDS: dict[str, list[Case]] = {
     "check": _build_cases("map.json", json.dumps(MAP, indent=1)),
     "study": _build_cases("study.toml", STUDY, 'maps = "*"\ncontrollers = ["rpf"]\n'),
     "movingai": _build_cases("plan.map", f"type octile\nheight 9\nwidth 12\nmap\n{PLAN}\n"),
-    "picture": [
+    "image": [
         *_build_cases(
             "plan.png",
             build_png(GRAY),
@@ -603,7 +603,7 @@ TOKENS: dict[str, list[str]] = {
     "study": ["[", "]", "{", "}", "=", '"*"', "[[gains.rapf]]", "[team]", "inf", "nan", "seeds",
         "1979-05-27", "'''", "low"],
     "movingai": ["type", "octile", "height", "width", "map", "@", ".", "T", "W", "S", "G", "\r\n", "\t", "?"],
-    "picture": ["P2", "P5", "P6", "#", "\n", "255", "65535", "IHDR", "IDAT", "PLTE", "tRNS", "iCCP", "zTXt"],
+    "image": ["P2", "P5", "P6", "#", "\n", "255", "65535", "IHDR", "IDAT", "PLTE", "tRNS", "iCCP", "zTXt"],
     "ros": [
         *("image:", "resolution:", "origin:", "negate:", "mode: raw", "mode: trinary", "free_thresh:",
             "---\n"),

@@ -76,7 +76,7 @@ _SHAPING: dict[str, list[Any]] = {
 }
 
 
-_REQUIRED_OPTIONS = {"picture": "cell", "svg": "scale"}
+_REQUIRED_OPTIONS = {"image": "cell", "svg": "scale"}
 """Options without which the seeds are refused."""
 
 

@@ -82,8 +82,8 @@ _IMPORTERS = (
         options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
     ),
     Importer(
-        name="picture",
-        title="picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
+        name="image",
+        title="image: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
         suffixes=(".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
         sniff=picture.sniff,
         reader=picture.read,
@@ -173,8 +173,8 @@ _EXPORTERS = (
         options=frozenset({"cell"}),
     ),
     Exporter(
-        name="picture",
-        title="picture: PNG in black and white, with its scale and place",
+        name="image",
+        title="image: PNG in black and white, with its scale and place",
         suffixes=(".png",),
         write=picture.write,
         options=frozenset({"cell"}),

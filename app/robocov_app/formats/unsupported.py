@@ -41,7 +41,7 @@ _KINDS = [
     (r"AC1[0-9.][0-9.]\d|AC2\.\d", "a DWG", "save it as DXF, or dwg2dxf {name}"),
     (r"%PDF-", "a PDF", "pdftocairo -svg {name} out.svg, or pdftoppm -png for a scan"),
     (r"%!PS", "PostScript", "ps2pdf {name}, then pdftocairo -svg"),
-    (r"GIF8|RIFF.{4}WEBP|\0\0\0.jP  |.{4}ftyp(?:heic|avif|mif1)|8BPS|gimp xcf", "a picture", _PNG),
+    (r"GIF8|RIFF.{4}WEBP|\0\0\0.jP  |.{4}ftyp(?:heic|avif|mif1)|8BPS|gimp xcf", "an image", _PNG),
     (r"\x80[\x02-\x05][\x95\x8c\]}(cK]", "a Python pickle", "save its polygons as GeoJSON or WKT"),
     (r"\x93NUMPY", "a NumPy array", "save it as an image"),
     (r"version https://git-lfs", "a Git LFS pointer, not the file itself", "git lfs pull"),

@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, Union, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 
 from robocov import density, environment
 from robocov.density import MAX_RASTER_SIZE, MAX_WEIGHT, Interpolation
@@ -282,11 +282,19 @@ class RasterModel(Model, title="raster density"):
         "Bilinear between the centers of the cells, or constant in each cell", "bilinear", "bilinear"
     )
     rows: Rows | None = _build_field("Rows of numbers, the top one first", [[1, 1, 2], [1, 4, 2]], None)
-    picture: FileName | None = _build_field(
+    image: FileName | None = _build_field(
         "Instead of rows, a gray PNG or PGM file in the folder of the map", "density.png", None
     )
     black: Weight | None = _build_field("Weight of black; 0 by default", 0.1, None)
     white: Weight | None = _build_field("Weight of white; 1 by default", 5, None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _rename_picture(cls, content: Any) -> Any:
+        """Rename the key ``picture``, as ``image`` is called in files of earlier versions."""
+        if not isinstance(content, dict) or "picture" not in content or "image" in content:
+            return content
+        return {"image" if key == "picture" else key: value for key, value in content.items()}
 
 
 _CLASSES: dict[str, dict[str, Any]] = {

@@ -22,7 +22,7 @@ from robocov.errors import (
     to_one_line,
 )
 from robocov.files.strictjson import locate_issues, parse_json, read_bytes, require_json
-from robocov.mapfile.density_pictures import read_gray_levels, read_picture_file
+from robocov.mapfile.density_images import read_gray_levels, read_image_file
 from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import NO_WEIGHT, validate_document
@@ -257,13 +257,13 @@ def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, sou
 
 def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> Array:
     """Read the weights of the pixels of an image, (rows, columns), the top row first."""
-    path = ("density", "picture")
+    path = ("density", "image")
     black = 0.0 if model.black is None else model.black
     white = 1.0 if model.white is None else model.white
     try:
-        gray_levels = read_gray_levels(read_picture_file(str(model.picture), folder))
+        gray_levels = read_gray_levels(read_image_file(str(model.image), folder))
     except InputError as error:
-        issue = Issue.at_path(path, f"{quote_json(model.picture)}: {error}")
+        issue = Issue.at_path(path, f"{quote_json(model.image)}: {error}")
         raise MapError.from_issues(source_name, [issue]) from None
     weights = np.round(black + (white - black) * gray_levels, _WEIGHT_DECIMALS)
     if not weights.max() > 0.0:

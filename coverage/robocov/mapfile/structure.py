@@ -55,7 +55,7 @@ _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {
         f"a list of 1 to {MAX_RASTER_SIZE} numbers",
         WEIGHT_EXPECTED,
     ),
-    "picture": ("the name of a file",),
+    "image": ("the name of a file",),
     "black": (WEIGHT_EXPECTED,),
     "white": (WEIGHT_EXPECTED,),
 }
@@ -196,7 +196,7 @@ def _describe_choice(model: Model, first: str, second: str) -> str | None:
 
 def _find_raster_issues(model: RasterModel) -> Iterator[Issue]:
     """Yield the issues in the keys and rows of a raster density."""
-    choice_message = _describe_choice(model, "rows", "picture")
+    choice_message = _describe_choice(model, "rows", "image")
     if choice_message is not None:
         yield Issue.at_path(("density",), choice_message)
         return
@@ -207,7 +207,7 @@ def _find_raster_issues(model: RasterModel) -> Iterator[Issue]:
         return
     for key in ("black", "white"):
         if getattr(model, key) is not None:
-            yield Issue.at_path(("density", key), "expected only with a picture, got it with rows")
+            yield Issue.at_path(("density", key), "expected only with an image, got it with rows")
     width = len(model.rows[0])
     for k, row in enumerate(model.rows):
         if len(row) != width:

@@ -14,7 +14,7 @@ from PIL import Image
 from robocov.density import MAX_RASTER_SIZE, Gaussians, Raster, Uniform, WeightedPolygons
 from robocov.environment import Environment
 from robocov.errors import MapError
-from robocov.mapfile import MAX_PICTURE_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
+from robocov.mapfile import MAX_IMAGE_BYTES, dump_map, from_json, load_map, parse_map, save_map, to_json
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 PLAIN = to_json(Environment("plain", RING))
@@ -118,10 +118,10 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
             },
             "density: expected at least one weight above 0, got none in the free space",
         ),
-        ({"kind": "raster"}, "density: expected one of rows and picture, got neither"),
+        ({"kind": "raster"}, "density: expected one of rows and image, got neither"),
         (
-            {"kind": "raster", "rows": [[1]], "picture": "a.png"},
-            "density: expected one of rows and picture, got both",
+            {"kind": "raster", "rows": [[1]], "image": "a.png"},
+            "density: expected one of rows and image, got both",
         ),
         (
             {"kind": "raster", "rows": []},
@@ -148,10 +148,10 @@ AREA = {"vertices": [[1, 1], [2, 1], [2, 3]], "weight": 5}
             {"kind": "raster", "rows": [[1]], "interpolation": "cubic"},
             'density.interpolation: expected "bilinear" or "cells", got "cubic"',
         ),
-        ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: expected only with a picture"),
+        ({"kind": "raster", "rows": [[1]], "white": 2}, "density.white: expected only with an image"),
         (
-            {"kind": "raster", "picture": "a.png"},
-            'density.picture: "a.png": image densities require a map loaded from a file',
+            {"kind": "raster", "image": "a.png"},
+            'density.image: "a.png": image densities require a map loaded from a file',
         ),
     ],
     ids=lambda value: str(value)[:40],
@@ -195,9 +195,9 @@ def test_tiny_weights_are_read_as_zero():
 # Images
 
 
-def write_map(folder: Path, picture: str, **more) -> Path:
+def write_map(folder: Path, image: str, **more) -> Path:
     path = folder / "mine.json"
-    path.write_text(json.dumps(build_document({"kind": "raster", "picture": picture, **more})))
+    path.write_text(json.dumps(build_document({"kind": "raster", "image": image, **more})))
     return path
 
 
@@ -222,11 +222,25 @@ def test_images_next_to_the_map_are_read_as_rasters(tmp_path):
     assert load_map(write_map(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
 
 
+def test_images_of_earlier_versions_have_the_key_picture(tmp_path):
+    write_image(tmp_path / "phi.png", [[0, 255]])
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(build_document({"kind": "raster", "picture": "phi.png"})))
+    assert load_map(path) == load_map(write_map(tmp_path, "phi.png"))
+
+
+def test_the_former_key_of_an_image_has_messages_with_a_path(tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(build_document({"kind": "raster", "picture": "none.png"}), indent=1))
+    with pytest.raises(MapError, match=r'density\.image: "none\.png"'):
+        load_map(path)
+
+
 def test_images_are_written_as_rows(tmp_path):
     write_image(tmp_path / "phi.png", [[0, 200], [7, 102]])
     environment = load_map(write_map(tmp_path, "phi.png", black=0.1, white=5))
     document = to_json(environment)
-    assert "picture" not in document["density"]
+    assert "image" not in document["density"]
     assert from_json(document) == environment
     save_map(environment, tmp_path / "again.json")
     (tmp_path / "phi.png").unlink()
@@ -260,7 +274,7 @@ def test_unusable_images_are_rejected(tmp_path):
         assert "\n" not in str(caught.value)
         return str(caught.value)
 
-    assert 'density.picture: "none.png": no such file' in get_error("none.png")
+    assert 'density.image: "none.png": no such file' in get_error("none.png")
     (tmp_path / "text.png").write_text("not a picture")
     assert "cannot be read as PNG or PGM" in get_error("text.png")
     write_image(tmp_path / "whole.png", np.arange(10_000).reshape(100, 100) % 251)
@@ -273,9 +287,9 @@ def test_unusable_images_are_rejected(tmp_path):
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
     assert "got 100000 x 100000" in get_error("bomb.pgm") or "PNG or PGM" in get_error("bomb.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:
-        file.truncate(MAX_PICTURE_BYTES + 1)
+        file.truncate(MAX_IMAGE_BYTES + 1)
     assert "expected at most 8 MB, got more" in get_error("heavy.png")
     write_image(tmp_path / "black.png", [[0, 0]])
-    assert "density.picture: expected at least one weight above 0, got none" in get_error("black.png")
+    assert "density.image: expected at least one weight above 0, got none" in get_error("black.png")
     (tmp_path / "folder.png").mkdir()
     assert "no such file" in get_error("folder.png")

@@ -44,7 +44,7 @@ def test_a_density_survives_editing_and_saving(density, tmp_path):
 def test_a_picture_is_read_when_the_map_is(tmp_path):
     Image.fromarray(np.array([[0, 255], [51, 102]], dtype=np.uint8)).save(tmp_path / "phi.png")
     document = to_json(Environment("heavy", RING)) | {
-        "density": {"kind": "raster", "picture": "phi.png", "white": 5}
+        "density": {"kind": "raster", "image": "phi.png", "white": 5}
     }
     path = tmp_path / "heavy.json"
     path.write_text(json.dumps(document))
@@ -53,7 +53,7 @@ def test_a_picture_is_read_when_the_map_is(tmp_path):
     write_sketch(sketch, tmp_path / "elsewhere.json")
     (tmp_path / "phi.png").unlink()
     assert load_map(tmp_path / "elsewhere.json").density == sketch.density
-    with pytest.raises(MapError, match=r"heavy.json:.*density.picture: .phi.png.: no such file"):
+    with pytest.raises(MapError, match=r"heavy.json:.*density.image: .phi.png.: no such file"):
         read_sketch(path)
 
 

@@ -98,14 +98,14 @@ def save_picture(folder: Path) -> Path:
 
 
 def test_colors_of_a_picture_ignore_soft_edges(tmp_path: Path) -> None:
-    color_sheet = build_color_sheet(IMPORTERS["picture"].read(save_picture(tmp_path), ReadOptions(cell=0.1)))
+    color_sheet = build_color_sheet(IMPORTERS["image"].read(save_picture(tmp_path), ReadOptions(cell=0.1)))
     assert color_sheet is not None
     names = {(255, 255, 255), (160, 192, 255), (0, 0, 0), (255, 0, 0)}
     assert set(color_sheet.colors) == names
     assert color_sheet.find_color(5.0, 8.0) == (160, 192, 255)
     assert color_sheet.find_color(5.0, 12.0 - 35.0 / 4) == (255, 0, 0)
     assert color_sheet.find_color(25.0, 5.0) is None and color_sheet.find_color(5.0, -0.01) is None
-    import_dialog = build_dialog(save_picture(tmp_path), "picture")
+    import_dialog = build_dialog(save_picture(tmp_path), "image")
     import_dialog.form.set_text("cell", "0.1")
     split = free_area(import_dialog)
     import_dialog.form.cycle_color((255, 0, 0))

@@ -37,7 +37,7 @@ def plan(tmp_path: Path) -> Path:
 
 def build_dialog(path: Path, worker: Any = None, call: Any = None) -> ImportDialog:
     worker = worker or DirectWorker(ImportService())
-    return ImportDialog(path, IMPORTERS["picture"], worker, call)
+    return ImportDialog(path, IMPORTERS["image"], worker, call)
 
 
 def compute_free_area(dialog: ImportDialog) -> float:
@@ -230,7 +230,7 @@ def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
         driver.press_key("escape")
-        driver.window.documents.ask_import(plan, IMPORTERS["picture"])
+        driver.window.documents.ask_import(plan, IMPORTERS["image"])
         driver.type("0.1")
         dialog, view = get_dialog(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]

@@ -46,7 +46,7 @@ def import_file(case: Case, name: str, folder: Path, **options: Any) -> tuple[En
 
 @pytest.mark.parametrize("name", IMPORTERS)
 def test_seeds_of_every_format_are_clean(name: str, tmp_path: Path) -> None:
-    options = {"picture": {"cell": 0.5}, "svg": {"scale": 0.5}}.get(name, {})
+    options = {"image": {"cell": 0.5}, "svg": {"scale": 0.5}}.get(name, {})
     for k, case in enumerate(SEEDS[name]):
         try:
             environment, report = import_file(case, name, tmp_path / str(k), **options)

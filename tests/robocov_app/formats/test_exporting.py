@@ -91,7 +91,7 @@ def build_slanted_room(slant: float, obstacles: list[Obstacle]) -> Environment:
 @settings(deadline=None, max_examples=50)
 @given(
     st.floats(0, 1.5), st.lists(obstacles, max_size=5), st.sampled_from([0.05, 0.08]),
-    st.sampled_from(["ros", "scale", "raw", "png-of-ros", "movingai", "picture"]),
+    st.sampled_from(["ros", "scale", "raw", "png-of-ros", "movingai", "image"]),
 )  # fmt: skip
 def test_out_and_in_again_changes_less_than_a_row_of_cells(
     tmp_path_factory: pytest.TempPathFactory,

@@ -22,7 +22,7 @@ def test_every_format_has_a_name_and_a_title() -> None:
         assert one.suffixes or one.name in ("irsim", "coverage-control")
         assert one.options <= known, name
         assert get_importer(name) is one
-    assert {"ros", "movingai", "picture"} <= IMPORTERS.keys()
+    assert {"ros", "movingai", "image"} <= IMPORTERS.keys()
 
 
 def test_no_format_accepts_noise(tmp_path: Path) -> None:
@@ -44,7 +44,7 @@ def test_no_format_accepts_noise(tmp_path: Path) -> None:
 
 def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
     (tmp_path / "plan.map").write_bytes(build_pgm(draw_pixels(PLAN)))
-    assert detect_format(tmp_path / "plan.map").name == "picture"
+    assert detect_format(tmp_path / "plan.map").name == "image"
     assert detect_format(write_ros_map(tmp_path, draw_pixels(PLAN))).name == "ros"
     (tmp_path / "half.yaml").write_text("image: plan.map\n")
     assert detect_format(tmp_path / "half.yaml").name == "ros"
@@ -73,9 +73,9 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     image = path.with_suffix(".pgm").rename(tmp_path / "image.bin")
     environment, report, foreign = import_map(
-        image, format="picture", options=ReadOptions(cell=0.25, threshold=0.9)
+        image, format="image", options=ReadOptions(cell=0.25, threshold=0.9)
     )
-    assert (report.format, foreign.cell) == ("picture", 0.25)
+    assert (report.format, foreign.cell) == ("image", 0.25)
     assert environment.free_area == pytest.approx(68 / 16)
     with pytest.raises(MapError):
         import_map(image, format="movingai")

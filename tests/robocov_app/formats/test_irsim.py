@@ -154,7 +154,7 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: expected a picture, got 'perlin'"),
+        ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: expected an image, got 'perlin'"),
         ("  mdownsample: 0\n  obstacle_map: a.pgm", "world.mdownsample: expected a number from 1"),
         ("obstacle: 5", "obstacle: expected a mapping"),
         ("obstacle:\n  - {shape: {name: blob}}", "obstacle[0].shape.name: expected circle, rectangle"),
@@ -255,7 +255,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
     assert compute_obstacles(foreign).equals(box(-1, 7, 0, 8))
     assert "world.obstacle_map: 'cave.png' read from the installed ir-sim" in foreign.notes
     with pytest.raises(
-        MapError, match=r"got 'hall.png'. The installed IR-SIM has no such picture \(it has cave.png\)"
+        MapError, match=r"got 'hall.png'. The installed IR-SIM has no such image \(it has cave.png\)"
     ):
         read(tmp_path, "  obstacle_map: hall.png\n")
     # A picture next to the file has priority.
@@ -268,7 +268,7 @@ def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(MapError) as caught:
         read(tmp_path, BUNDLED)
     place = f"{tmp_path / 'world.yaml'}: world.obstacle_map: "
-    expected = "expected a picture next to the file, or a picture of IR-SIM, got 'cave.png'. "
+    expected = "expected an image next to the file, or an image of IR-SIM, got 'cave.png'. "
     assert str(caught.value) == place + expected + "IR-SIM is not installed (pip install ir-sim)."
 
 

@@ -13,7 +13,7 @@ from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 from robocov_app.formats.raster.picture import GEOREFERENCE_CHUNK
 
-IMPORTER = IMPORTERS["picture"]
+IMPORTER = IMPORTERS["image"]
 
 LEVELS = np.array([[0, 127, 128, 255], [255, 255, 255, 255]], dtype=np.uint8)
 
@@ -100,7 +100,7 @@ def test_position_and_scale_in_the_file_are_used(tmp_path: Path) -> None:
 def test_a_picture_without_a_scale_requires_one(tmp_path: Path, chunk: str | None) -> None:
     path = save_picture(tmp_path, LEVELS, chunk)
     with pytest.raises(
-        MapError, match=r"plan.png: a picture has no scale, expected --cell, the meters per pixel"
+        MapError, match=r"plan.png: an image has no scale, expected --cell, the meters per pixel"
     ):
         read(path)
     assert read(path, cell=1.0).bounds == (0.0, 0.0, 4.0, 2.0)

@@ -251,7 +251,7 @@ def test_the_picture_must_be_next_to_the_file(tmp_path: Path) -> None:
     (maps / "secret.pgm").symlink_to(tmp_path / "secret.pgm")
     for image in ("../secret.pgm", str(tmp_path / "secret.pgm"), "link.pgm", "away/secret.pgm", "secret.pgm"):
         path = write_ros_map(maps, b"", image=image)
-        with pytest.raises(MapError, match=r"expected a picture in it .--anywhere allows it."):
+        with pytest.raises(MapError, match=r"expected the image in it .--anywhere allows it."):
             read(path)
         assert read(path, anywhere=True).area > 0
     # a link to the whole folder is no way out of it

@@ -147,7 +147,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
     assert read(folder, 'include "near.inc"\nroom ( )').free.area == pytest.approx(100)
     far = 'window ( )\ninclude "../far.inc"\nroom ( )'
     with pytest.raises(
-        MapError, match=r"hall.world:2: .../far.inc. is outside the folder of the file, expected a"
+        MapError, match=r"hall.world:2: .../far.inc. is outside the folder of the file, expected the"
     ):
         read(folder, far)
     assert read(folder, far, anywhere=True).free.area == pytest.approx(100)
@@ -194,7 +194,7 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected
 
 def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
     (tmp_path / "a.pgm").write_bytes(build_pgm(draw_pixels("...\n...")))
-    with pytest.raises(MapError, match=r"a\.pgm: expected a picture with dark walls, got only light pixels"):
+    with pytest.raises(MapError, match=r"a\.pgm: expected an image with dark walls, got only light pixels"):
         read(tmp_path, 'model ( bitmap "a.pgm" )')
     (tmp_path / "a.pgm").write_bytes(build_pgm(draw_pixels("###\n###")))
     foreign = read(tmp_path, ROOM + 'room ( ) model ( bitmap "a.pgm" size [2 1] pose [5 -3 0 0] )')

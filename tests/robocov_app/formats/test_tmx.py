@@ -208,7 +208,7 @@ def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
     far = '<tileset firstgid="1" source="../far.tsx"/>'
     assert are_equal(compute_obstacles(read(folder, near, build_tiles("a"))), WALLS)
     with pytest.raises(
-        MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected a"
+        MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected the"
     ):
         read(folder, far, build_tiles("a"))
     assert are_equal(compute_obstacles(read(folder, far, build_tiles("a"), anywhere=True)), WALLS)

@@ -98,7 +98,7 @@ def test_names_that_yaml_would_misread_are_quoted(tmp_path: Path) -> None:
 
 def test_the_picture_is_not_written_over_the_yaml(tmp_path: Path) -> None:
     with pytest.raises(
-        OutputError, match=r"corner\.pgm: expected another name for the YAML than for the picture"
+        OutputError, match=r"corner\.pgm: expected another name for the YAML than for the image"
     ):
         export_map(CORNER, tmp_path / "corner.pgm", format="ros")
     assert not list(tmp_path.iterdir())

@@ -24,7 +24,7 @@ class Arguments(JsonOption):
       wkt        .wkt: the free space as polygons with holes, as in JuPedSim; --digits
       ros        .yaml: a map of ROS map_server, with its image; --cell --mode --image
       movingai   .map: a grid of the Moving AI benchmarks; --cell
-      picture    .png: an image with black obstacles; --cell
+      image      .png: an image with black obstacles; --cell
 
     Example: robocov export office -o office.svg
     """

@@ -24,7 +24,7 @@ class Arguments(JsonOption):
 
       ros        YAML of ROS map_server with its PGM or PNG: --unknown --threshold --anywhere
       movingai   .map of the Moving AI benchmarks: --cell --trees --water
-      picture    PNG, JPEG, BMP, TIFF, PGM or PPM of a plan, dark pixels are obstacles: --cell --threshold
+      image      PNG, JPEG, BMP, TIFF, PGM or PPM of a plan, dark pixels are obstacles: --cell --threshold
                  --invert --unknown --min-stroke --free-color --solid-color --ignore-color
       stage, argos, irsim
                  worlds of these simulators, robots become a start: --only --skip --anywhere
@@ -37,7 +37,7 @@ class Arguments(JsonOption):
       imdf       a floor of an indoor map, zip or folder: --level --thickness --only --skip
       wkt, geojson, svg, dxf, rings
                  drawings and geometries: --scale --thickness --outlines --boundary --around and others;
-                 svg also accepts the color options of picture
+                 svg also accepts the color options of image
 
     --ignore-layer (or --skip) and --only select by the name of a layer, group, class or shape. Options with
     several values can be repeated.

@@ -70,7 +70,7 @@ def find_named_file(
     name : str
         Name, relative to the folder of `path`.
     kind : str
-        Kind of the file, such as "picture", for messages.
+        Kind of the file, such as "image", for messages.
     place : str
         Place of the name, for messages.
     notes : list of str
@@ -84,7 +84,7 @@ def find_named_file(
         If the name is empty, too long or invalid, or if the file must be in the folder but is not.
     """
     if not name:
-        raise MapError(f"{place}: empty, expected the name of a {kind}")
+        raise MapError(f"{place}: empty, expected the name of the {kind}")
     if len(name) > _MAX_PATH_CHARACTERS:
         raise MapError(f"{place}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
@@ -102,7 +102,7 @@ def find_named_file(
     except (OSError, ValueError, RuntimeError) as error:
         raise MapError(f"{place}: {quote(name)}: {_describe_name_error(error)}") from None
     if not is_allowed:
-        expected = f"expected a {kind} in it (--anywhere allows it)"
+        expected = f"expected the {kind} in it (--anywhere allows it)"
         raise MapError(f"{place}: {quote(name)} is outside the folder of the file, {expected}")
     return named
 

@@ -184,7 +184,7 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
     edge_share = edge_lengths[0] / page.length
     if edge_share < _MIN_PAGE_EDGE_SHARE:
         return None
-    edge = f"{100 * edge_share:.0f} % of the edge of the picture"
+    edge = f"{100 * edge_share:.0f} % of the edge of the image"
     description = f"{format_area(largest.area, 3)}, runs along {edge}"
     enclosed = [k for k, length in enumerate(edge_lengths) if length == 0.0]
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:

@@ -57,7 +57,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if options.cell is not None:
         cell = options.cell
     if cell is None:
-        raise MapError(f"{where}: a picture has no scale, {_describe_missing_scale(path)}")
+        raise MapError(f"{where}: an image has no scale, {_describe_missing_scale(path)}")
     cells, notes = classify_pixels(picture, options)
     unknown = options.unknown or "obstacle"
     if options.unknown is None and is_on_transparent_ground(cells):
@@ -73,7 +73,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         GridFrame(cell, origin),
         where,
         name=picture.texts.get(TITLE_CHUNK, "").strip() or path.stem,
-        description=f"A picture of {cell:g} m a pixel, imported.",
+        description=f"An image of {cell:g} m a pixel, imported.",
         unknown=unknown,
         unknown_name="transparent",
         noise_cells=_JPEG_NOISE_CELLS if picture.lossy else 0.0,

@@ -1,4 +1,4 @@
-"""Writing the free cells of maps as black-and-white pictures."""
+"""Writing the free cells of maps as black-and-white images."""
 
 import json
 from pathlib import Path
@@ -28,4 +28,4 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     texts.add_text(GEOREFERENCE_CHUNK, json.dumps({"cell_m": grid.cell, "origin_m": list(grid.origin)}))
     with replace_file(path) as temporary:
         Image.fromarray(free[::-1]).save(temporary, format="PNG", pnginfo=texts)
-    return build_grid_report("picture", (path,), environment, grid, free)
+    return build_grid_report("image", (path,), environment, grid, free)

@@ -50,7 +50,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     image = files.find_named_file(
         path,
         metadata.image,
-        "picture",
+        "image",
         place=f"{where}: image",
         notes=repaired,
         allow_anywhere=options.anywhere,

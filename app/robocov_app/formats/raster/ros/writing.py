@@ -87,7 +87,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
 def _quote_image_name(path: Path, image: Path) -> str:
     """Return the name of the picture as written in the YAML file `path`, in quotes if necessary."""
     if image == path:
-        raise OutputError(f"{to_one_line(path)}: expected another name for the YAML than for the picture")
+        raise OutputError(f"{to_one_line(path)}: expected another name for the YAML than for the image")
     try:
         image.name.encode()
     except UnicodeEncodeError:

@@ -42,7 +42,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     file = files.find_named_file(
         path,
         source.get_text(),
-        "picture",
+        "image",
         place=source.place,
         notes=shapes.notes,
         allow_anywhere=shapes.options.anywhere,
@@ -70,7 +70,7 @@ def _get_source(obstacle_map: Node) -> Node:
         return obstacle_map
     if obstacle_map["name"].get_text() != "image":
         name = quote(obstacle_map["name"].value)
-        raise MapError(f"{obstacle_map.place}: expected a picture, got {name}, which IR-SIM generates")
+        raise MapError(f"{obstacle_map.place}: expected an image, got {name}, which IR-SIM generates")
     return obstacle_map["path"]
 
 
@@ -85,9 +85,7 @@ def _find_packaged_picture(source: Node) -> Path:
         If IR-SIM is not installed, or has no such picture.
     """
     name = source.get_text()
-    missing = (
-        f"{source.place}: expected a picture next to the file, or a picture of IR-SIM, got {quote(name)}"
-    )
+    missing = f"{source.place}: expected an image next to the file, or an image of IR-SIM, got {quote(name)}"
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:
         raise MapError(f"{missing}. IR-SIM is not installed (pip install ir-sim).")
@@ -96,5 +94,5 @@ def _find_packaged_picture(source: Node) -> Path:
     if name not in pictures:
         listed = ", ".join(sorted(pictures)[:_MAX_LISTED_PICTURES])
         known = f" (it has {listed})" if pictures else ""
-        raise MapError(f"{missing}. The installed IR-SIM has no such picture{known}.")
+        raise MapError(f"{missing}. The installed IR-SIM has no such image{known}.")
     return pictures[name]

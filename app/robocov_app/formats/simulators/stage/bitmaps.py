@@ -74,7 +74,7 @@ class BitmapReader:
             if is_dark.any():
                 shade = "dark"
             cause = f": {transparency}" if transparency else ""
-            raise MapError(f"{where}: expected a picture with dark walls, got only {shade} pixels{cause}")
+            raise MapError(f"{where}: expected an image with dark walls, got only {shade} pixels{cause}")
         row = np.flatnonzero(is_dark.any(axis=1))
         column = np.flatnonzero(is_dark.any(axis=0))
         is_free = ~is_dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]

@@ -182,7 +182,7 @@ class ModelPlacer:
 
     def _add_bitmap(self, entity: Entity, box: _ModelBox, size: Array, labels: tuple[str, ...]) -> None:
         """Add a model with a bitmap to the floor plans."""
-        file = self._find_file(entity.get_text("bitmap"), "picture", place=f"{entity.place}: bitmap")
+        file = self._find_file(entity.get_text("bitmap"), "image", place=f"{entity.place}: bitmap")
         bitmap = self._bitmaps.read(file)
         self._shapes.count_vertices(count_polygon_vertices(bitmap.free))
         cell = float(max(size[0] / bitmap.columns, size[1] / bitmap.rows))

@@ -135,7 +135,7 @@ class RunSaver:
         with suppress(OSError), job.temporary as folder:
             lines = Path(folder, _ERROR_FILE).read_text("utf-8", "replace").strip().splitlines()
         if job.process.returncode == 0:
-            self._messages.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
+            self._messages.append((f"run saved: {job.target}/ (record, cost, figures)", False))
             return
         reason = "the process has ended"
         if lines:

@@ -9,7 +9,7 @@ from robocov.arrays import Array
 from robocov.density import MAX_RASTER_SIZE
 from robocov.errors import InputError, describe_error, to_one_line
 
-MAX_PICTURE_BYTES = 8_000_000
+MAX_IMAGE_BYTES = 8_000_000
 """Largest size of an image file."""
 _WHITE_8_BIT = 255.0
 """Gray level of white in images with 8 bits per pixel."""
@@ -17,7 +17,7 @@ _WHITE_16_BIT = 65535.0
 """Gray level of white in images with 16 bits per pixel."""
 
 
-def read_picture_file(name: str, folder: Path | None) -> bytes:
+def read_image_file(name: str, folder: Path | None) -> bytes:
     """Read an image file in the folder of a map, or in a folder inside it.
 
     Parameters
@@ -44,11 +44,11 @@ def read_picture_file(name: str, folder: Path | None) -> bytes:
         if not path.is_file():
             raise InputError("no such file")
         with path.open("rb") as file:
-            content = file.read(MAX_PICTURE_BYTES + 1)
+            content = file.read(MAX_IMAGE_BYTES + 1)
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {describe_error(error)}") from None
-    if len(content) > MAX_PICTURE_BYTES:
-        raise InputError(f"expected at most {MAX_PICTURE_BYTES / 1e6:g} MB, got more")
+    if len(content) > MAX_IMAGE_BYTES:
+        raise InputError(f"expected at most {MAX_IMAGE_BYTES / 1e6:g} MB, got more")
     return content
 
 
