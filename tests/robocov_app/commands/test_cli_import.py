@@ -88,7 +88,7 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.yaml", "--cell 1", "--cell: no option of the format ros"),
         ("plan.yaml", "--invert", "--invert: no option of the format ros"),
         ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
-        ("plan.pgm", "--trees obstacle", "--trees: no option of the format picture"),
+        ("plan.pgm", "--trees obstacle", "--trees: no option of the format image"),
         ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml next to it)"),
         ("plan.pgm", "--cell nan", "--cell: expected a number from 1e-06 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "--threshold: expected a number from 0 to 1"),
