@@ -72,9 +72,8 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         at = x, y - STEM_PX
         assert count_pixels(draw_without_message(driver), at, LIGHT.trajectory, 6) > 40
         driver.click(*at)
-        assert driver.editor.problem is problems[0] and driver.message == to_sentence_case(
-            problems[0].message
-        )
+        assert driver.editor.problem is problems[0]
+        assert driver.message == to_sentence_case(problems[0].message)
         driver.open_tab("problems")
         driver.window.canvas.zoom(8.0, (100.0, 100.0))
         driver.click(*driver.get_widget("option", f"problem:{len(problems) - 1}").rect.center)

@@ -103,3 +103,28 @@ def test_icons_have_ink_and_stay_within_their_square(name: str) -> None:
     assert mask.width >= 18
     assert mask.height >= 18
     assert image.get_rect().inflate(-1, -1).contains(mask.inflate(-1, -1))
+
+
+FIRST_ACTIONS = {
+    "pause": "Play",
+    "tool:wall": "Wall",
+    "tool:failure": "Failure",
+    "pane:add": "Compare",
+    "undo": "Undo",
+    "save:session": "Save",
+    "share": "Share",
+    "tour": "lesson",
+}
+"""Commands that a new user looks for, with a word by which they are found."""
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1920, 1080), (2560, 1440)])
+def test_first_actions_have_visible_buttons_with_words(tmp_path: Path, size: tuple[int, int]) -> None:
+    with open_viewer(tmp_path, size=size) as driver:
+        window_box = driver.window.screen.get_rect()
+        for command, word in FIRST_ACTIONS.items():
+            button = driver.find_widget("button", command)
+            assert button is not None, command
+            assert window_box.contains(button.rect), command
+            assert min(button.rect.size) >= 24, command
+            assert word.lower() in f"{button.text} {button.tip}".lower(), command
