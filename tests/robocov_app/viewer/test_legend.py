@@ -106,6 +106,17 @@ def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path)
         assert {"Attraction", "Robot repulsion", "Obstacle repulsion"} <= set(list_texts(window))
 
 
+def test_chips_of_a_lesson_disappear_with_it(tmp_path: Path) -> None:
+    with open_window(tmp_path) as window:
+        before = find_chips(window)
+        window.do("tour")
+        window.run_frame(1 / 30)
+        assert find_chips(window) != before
+        window.do("cancel")
+        window.run_frame(1 / 30)
+        assert find_chips(window) == before
+
+
 @pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
 def test_every_unusual_symbol_has_a_chip_in_a_small_window(tmp_path: Path, preset) -> None:
     """Chips that do not fit with their text remain with a tip; only standard layers are left out."""

@@ -79,7 +79,8 @@ class LayerBar(BasicFocusGroup):
         self._run_command = run_command
         self._menu_box = Rect(0, 0, 0, 0)
         self._hovered = ""
-        self._offered: set[str] = set()  # layers with a chip: visible now, or hidden since the last preset
+        self._offered: set[str] = set()  # layers with a chip: visible now, or hidden one by one
+        self._visible: set[str] = set()  # layers that were visible when the bar was drawn last
         self._preset: object = None
         self._tool_tip = ToolTip()
         self._theme = LIGHT
@@ -211,12 +212,16 @@ class LayerBar(BasicFocusGroup):
         return placed
 
     def _list_layer_chips(self, layers: Sequence[Layer], scenes: Sequence[Scene]) -> list[Chip]:
-        """Return a chip for each layer with a symbol that is visible, or was hidden since the last preset."""
+        """Return a chip for each layer with a symbol that is visible, or was hidden by itself."""
         visible = self._view.layers
         preset = find_preset(visible)
-        if preset is not None and preset is not self._preset:
+        is_new_preset = preset is not None and preset is not self._preset
+        # A click changes one layer; presets and lessons change several, and hide what was there before.
+        has_many_changes = len(visible ^ self._visible) > 1
+        if is_new_preset or has_many_changes:
             self._offered = set()
         self._preset = preset
+        self._visible = set(visible)
         self._offered |= visible
         by_name = {layer.name: layer for layer in layers}
         chips = []
