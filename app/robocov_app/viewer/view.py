@@ -27,6 +27,8 @@ class ViewState:
         Whether the camera glides when the zoom changes, as far as the user of this window has chosen.
     is_motion_reduced : bool
         Whether the user's system asks for reduced motion, so that the camera does not glide.
+    is_compact : bool
+        Whether the window is on a phone, whose page has the buttons of the bar and of the rail.
     is_recording : bool
         Whether a video of the window is being recorded.
     """
@@ -38,6 +40,7 @@ class ViewState:
     has_suggestions: bool = True
     has_motion: bool = True
     is_motion_reduced: bool = False
+    is_compact: bool = False
     is_recording: bool = False
 
     def toggle_layer(self, name: str) -> None:

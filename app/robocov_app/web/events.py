@@ -9,10 +9,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
 from pygame.event import Event
 
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.input import COMMAND_EVENT
 
 MIN_PAGE_SIDE_PX = 200
 NARROW_PAGE_PX = 700
-"""Page width below which a page is narrow, in CSS pixels."""
+"""Width in CSS pixels below which a page is small."""
+LOW_PAGE_PX = 440
+"""Height in CSS pixels below which a page is small."""
 MAX_PAGE_SIDE_PX = 7680
 MAX_PAGE_PIXELS = 4096 * 2304
 MAX_UPLOAD_BYTES = 1 << 24
@@ -121,6 +124,14 @@ class PointerLeft(_Message):
     held: Literal[0] = 0
 
 
+class CommandChosen(_Message):
+    """A button of the page has been pressed that runs a command of the window."""
+
+    kind: Literal["command"]
+    name: Annotated[str, Field(min_length=1, max_length=40), _Line]
+    held: Literal[0] = 0
+
+
 class FocusLost(_Message):
     """The page has lost the keyboard focus."""
 
@@ -129,7 +140,10 @@ class FocusLost(_Message):
 
 
 class PageChanged(_Message):
-    """The page reports its size in device pixels, device pixels per CSS pixel, and the user's preferences."""
+    """The page reports its size in device pixels, device pixels per CSS pixel, and the user's preferences.
+
+    `touch` tells whether the main pointer is a finger.
+    """
 
     kind: Literal["page"]
     width: int = Field(ge=MIN_PAGE_SIDE_PX, le=MAX_PAGE_SIDE_PX)
@@ -137,11 +151,17 @@ class PageChanged(_Message):
     ratio: float = Field(ge=0.25, le=8.0)
     dark: bool
     reduced_motion: bool = False
+    touch: bool = False
 
     @property
-    def is_narrow(self) -> bool:
-        """Whether the page is that of a phone held upright, for example."""
-        return self.width < NARROW_PAGE_PX * self.ratio
+    def is_small(self) -> bool:
+        """Whether the page is that of a phone, upright or not, for example."""
+        return self.width < NARROW_PAGE_PX * self.ratio or self.height < LOW_PAGE_PX * self.ratio
+
+    @property
+    def is_compact(self) -> bool:
+        """Whether the page is that of a phone, which has buttons for the window."""
+        return self.touch and self.is_small
 
 
 class FrameShown(_Message):
@@ -181,7 +201,15 @@ class Uploaded(_Message):
 
 
 InputMessage = (
-    PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | PointerLeft | FocusLost
+    PointerMoved
+    | ButtonChanged
+    | WheelTurned
+    | KeyChanged
+    | TextTyped
+    | TextPasted
+    | CommandChosen
+    | PointerLeft
+    | FocusLost
 )
 """Messages with input for a window."""
 Message = InputMessage | PageChanged | FrameShown | ControlPassed | NameEntered | UploadStarted
@@ -253,6 +281,8 @@ class EventTranslator:
                 yield from _press_key("v", held=_CTRL)
             case Uploaded():
                 yield Event(pygame.DROPFILE, file=message.path)
+            case CommandChosen():
+                yield Event(COMMAND_EVENT, name=message.name)
             case PointerLeft():
                 yield Event(pygame.WINDOWLEAVE)
             case FocusLost():

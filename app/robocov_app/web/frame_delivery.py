@@ -40,7 +40,7 @@ class FrameDelivery:
     newest : Frame or None
         The newest frame of the window; set by the window's thread.
     maps : MapFrames
-        The map in the sizes of phones, which show it instead of the window.
+        The map in the sizes of the pages that show it instead of the window.
     has_work : asyncio.Event
         Set when there is a newer frame, or when a page has connected, disconnected, or shown a frame.
     bases : BaseFrames
@@ -97,7 +97,7 @@ class FrameDelivery:
         return to_controlling
 
     def _switch_pages(self) -> None:
-        """Switch phones between the map and the window, whose frames are not based on each other."""
+        """Switch pages between the map and the window, whose frames are not based on each other."""
         for page in self._pages:
             shown_map = page.map_size if page.map_size in self.maps.frames else None
             if shown_map != page.shown_map:

@@ -1,4 +1,4 @@
-"""The map of a window in the sizes of the phones that show it."""
+"""The map of a window in the sizes of the pages that show it."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ if TYPE_CHECKING:
 
 MAP_FRAME_INTERVAL_S = 1 / 15
 """Minimum time between two pictures of the map in one size."""
+MAX_TIME_FRACTION = 0.25
+"""Maximum fraction of the time of the window's thread in which these pictures are drawn."""
 
 
 class MapFrames:
-    """Draws the map in all requested sizes, not more often than phones need it.
+    """Draws the map in all requested sizes, not more often than those who watch need it.
 
     The server's thread sets `requested_sizes` and reads `frames`, the window's thread calls `update`.
 
     Attributes
     ----------
     requested_sizes : frozenset of MapSize
-        Sizes of the phones that show the map.
+        Sizes of the pages that show the map.
     frames : dict of MapSize to Frame
-        The newest picture of each size; empty while phones have to show the window itself.
+        The newest picture of each size; empty while all pages have to show the window itself.
     """
 
     def __init__(self) -> None:
@@ -56,10 +58,10 @@ class MapFrames:
             Whether `frames` has changed.
         """
         sizes = self.requested_sizes
+        start_time = monotonic()
         is_up_to_date = window_frame is self._drawn_window and sizes == self._drawn_sizes
-        if is_up_to_date or monotonic() < self._next_time:
+        if is_up_to_date or start_time < self._next_time:
             return False
-        self._next_time = monotonic() + MAP_FRAME_INTERVAL_S
         self._drawn_window = window_frame
         self._drawn_sizes = sizes
         frames: dict[MapSize, Frame] = {}
@@ -73,6 +75,8 @@ class MapFrames:
             frame = Frame.from_surface(picture, create_number())
             is_same = previous is not None and np.array_equal(previous.pixels, frame.pixels)
             frames[size] = previous if previous is not None and is_same else frame
+        duration = monotonic() - start_time
+        self._next_time = start_time + max(MAP_FRAME_INTERVAL_S, duration / MAX_TIME_FRACTION)
         has_changed = frames != self.frames
         self.frames = frames
         return has_changed

@@ -55,7 +55,13 @@ class SharedWindow:
     folder: Path
     file_executor: Executor
     state: dict[str, Any] = field(
-        default_factory=lambda: {"cursor": "default", "title": "robocov", "saved": (), "status": ""}
+        default_factory=lambda: {
+            "cursor": "default",
+            "title": "robocov",
+            "saved": (),
+            "status": "",
+            "controls": None,
+        }
     )
     uploads: dict[str, float] = field(default_factory=dict)
 

@@ -23,9 +23,13 @@ MAX_VIEWERS = 100
 MAX_CONTROL_PAGES = 16
 """Maximum number of pages opened with the control link. If one more is opened, the oldest is closed."""
 MAX_MAP_SIZES = 3
-"""Maximum number of sizes in which the map is drawn for phones; other phones scale one of these pictures."""
+"""Maximum number of sizes in which the map is drawn for pages; other pages scale one of these pictures."""
 MAX_MAP_PIXELS = 1_000_000
-"""Maximum number of pixels of the map that is drawn for a phone."""
+"""Maximum number of pixels of the map that is drawn for a page."""
+MAX_ASPECT_RATIO = 1.2
+"""A page whose aspect differs from that of the window by more than this factor shows the map instead."""
+MAX_SHRINKAGE = 1.6
+"""A page on which the window would be smaller than in its own size by more than this factor, too."""
 MAX_NOTICES = 8
 """Maximum number of notices waiting to be sent to a page."""
 MAX_FRAMES_IN_FLIGHT = 2
@@ -33,7 +37,7 @@ MAX_FRAMES_IN_FLIGHT = 2
 
 
 class MapSize(NamedTuple):
-    """Size in which the map is drawn for a phone.
+    """Size in which the map is drawn for a page that shows it instead of the window.
 
     Attributes
     ----------
@@ -71,7 +75,7 @@ class Page:
     settings : PageChanged or None
         Its size and color scheme, once it has reported them.
     map_size : MapSize or None
-        Size of the map that it should show instead of the window, which would be too small on its screen.
+        Size of the map that it should show instead of the window, which does not suit its screen.
     shown_map : MapSize or None
         Size of the map that it shows; None while it shows the window.
     upload : Upload or None
@@ -256,23 +260,21 @@ class Pages:
         controlling = self.controlling
         if controlling is None or controlling.settings is None:
             return None
-        wide = [page for page in self._pages if page.settings is not None and not page.settings.is_narrow]
-        if not controlling.settings.is_narrow or not wide:
+        wide = [page for page in self._pages if page.settings is not None and not page.settings.is_small]
+        if not controlling.settings.is_small or not wide:
             return controlling.settings
         # Prefer pages that may control: they are more likely on the projector.
         return min(wide, key=lambda page: (not page.may_control, page.number)).settings
 
     def update_map_sizes(self) -> None:
-        """Choose in which size each phone shows the map; None for pages that show the window.
-
-        Phones show the map while the window has the size of a wide page.
-        """
+        """Choose in which size each page shows the map; None for pages that show the window."""
         window = self.display_settings
-        has_wide_window = window is not None and not window.is_narrow
         sizes: list[MapSize] = []
         for page in self._pages:
             page.map_size = None
-            if has_wide_window and page.settings is not None and page.settings.is_narrow:
+            if window is None or page.settings is None or page.settings is window:
+                continue
+            if _needs_own_picture(page.settings, window):
                 page.map_size = _choose_map_size(page.settings, sizes)
 
     def wake(self) -> None:
@@ -320,6 +322,24 @@ class Pages:
             for page in self._pages
         ]
         self.wake()
+
+
+def _needs_own_picture(settings: PageChanged, window: PageChanged) -> bool:
+    """Return whether a page shows the map in its own size, because the window does not suit its screen.
+
+    Parameters
+    ----------
+    settings : PageChanged
+        Size of the page.
+    window : PageChanged
+        Size of the page that determines the size of the window.
+    """
+    aspect_ratio = (settings.width / settings.height) / (window.width / window.height)
+    if max(aspect_ratio, 1 / aspect_ratio) > MAX_ASPECT_RATIO:
+        return True
+    # Both widths are in CSS pixels, in which texts have the same size on all screens.
+    shrinkage = (window.width / window.ratio) / (settings.width / settings.ratio)
+    return shrinkage > MAX_SHRINKAGE
 
 
 def _choose_map_size(settings: PageChanged, sizes: list[MapSize]) -> MapSize:

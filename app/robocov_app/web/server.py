@@ -12,6 +12,7 @@ import secrets
 import threading
 from collections.abc import Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from hashlib import sha256
 from http import HTTPStatus
 from pathlib import Path
@@ -129,6 +130,7 @@ class WebDisplay:
         self._is_relayed = is_relayed
         self._offer: dict[str, Any] = {"number": 0, "name": ""}
         self._status = ""
+        self._controls: dict[str, Any] | None = None
         self._window: BaseWindow | None = None
         self._last_frame_number = 0
         self._files_listed_at = 0.0
@@ -163,6 +165,8 @@ class WebDisplay:
         """Fit the window to the controlling page, and post that page's input as events."""
         self._window = window
         self._status = window.status_text
+        controls = (window.replacement or window).controls
+        self._controls = None if controls is None else asdict(controls)
         self.shared.window_input.post(window)
 
     @property
@@ -195,6 +199,7 @@ class WebDisplay:
             "cursor": _CSS_CURSORS.get(cursor, "default"),
             "title": next(iter(pygame.display.get_caption()), "robocov"),
             "status": self._status,
+            "controls": self._controls,
             "saved": self.saved_files,
             "copied": self.clipboard.get()[:MAX_COPIED_CHARACTERS],
             "offer": self._offer,

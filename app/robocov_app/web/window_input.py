@@ -44,7 +44,7 @@ class WindowInput:
         self._page: PageChanged | None = None
         self._fitted_page: PageChanged | None = None
         self._map_size: MapSize | None = None
-        self._is_narrow = False
+        self._is_small = False
         self._translator = EventTranslator(clipboard)
         self._held = 0
         self._has_arrived = threading.Event()
@@ -118,11 +118,12 @@ class WindowInput:
             pygame.display.set_mode(size, pygame.RESIZABLE)
             pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
         theme = "dark" if page.dark else "light"
-        # Show or hide the panel only when a page becomes wide or narrow, so that the user's choice is kept.
-        is_narrow = page.is_narrow
+        # Show or hide the panel only when a page becomes large or small, so that the user's choice is kept.
+        is_small = page.is_small
         shows_panel: bool | None = None
-        if is_narrow != self._is_narrow:
-            shows_panel = not is_narrow
-        self._is_narrow = is_narrow
+        if is_small != self._is_small:
+            shows_panel = not is_small
+        self._is_small = is_small
         window.set_appearance(page.ratio, theme, panel=shows_panel)
+        window.set_compact(is_compact=page.is_compact)
         window.reduce_motion(is_reduced=page.reduced_motion)

@@ -45,6 +45,8 @@ def test_times_do_not_overlap_in_a_narrow_chart(
 
     monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
     with open_viewer(tmp_path, size=(width, 1200), scale=3.0) as driver:
+        driver.viewer.view.has_panel = False
+        driver.settle()
         ends.clear()
         driver.window.chart._page = None
         driver.run_frames(1)

@@ -132,7 +132,7 @@ def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
 def click_area(driver: Driver, action: str, argument: int | None = None) -> None:
     """Click the area of the page that calls a method of the lesson."""
     driver.window.draw()
-    for box, call in driver.window.lesson.click_areas:
+    for box, call, _ in driver.window.lesson.click_areas:
         function = getattr(call, "func", call)
         arguments = getattr(call, "args", ())
         if function.__name__ == action and (argument is None or arguments == (argument,)):
@@ -255,7 +255,7 @@ def test_every_chapter_fits_on_its_page(tmp_path: Path, size: tuple[int, int]) -
         assert lesson is not None
         for _ in LESSON.chapters:
             driver.settle()
-            boxes = [box for box, _ in driver.window.lesson.click_areas]
+            boxes = [area.box for area in driver.window.lesson.click_areas]
             panel = pygame.Rect(driver.window.layout.panel)
             assert all(panel.contains(box) for box in boxes)
             for first, second in itertools.combinations(boxes, 2):

@@ -1,5 +1,6 @@
-"""The panes without controls, in the size of a phone."""
+"""The window without its buttons, in the size of a phone."""
 
+import pygame
 import pytest
 from driven_window import Driver, get_position
 
@@ -36,7 +37,8 @@ def test_points_that_the_window_does_not_show_stay_off_its_controls(driver: Driv
     driver.turn_wheel(*driver.find_robot_pixel(2), 8)
     driver.window.map_pictures.draw(PHONE, SCALE)
     left, top, width, height = driver.window.layout.panes[0]
-    for pixel in ((0, 0), (PHONE[0] - 1, PHONE[1] - 1)):
+    arena = pygame.Rect(driver.window.map_pictures._pictures[PHONE]._canvas.layout.arena)
+    for pixel in (arena.topleft, (arena.right - 1, arena.bottom - 1)):
         x, y = driver.window.map_pictures.find_window_pixel(PHONE, pixel)
         assert left <= x < left + width
         assert top <= y < top + height
@@ -49,6 +51,46 @@ def test_each_controller_of_a_comparison_has_its_place(driver: Driver) -> None:
     boxes = driver.window.map_pictures._pictures[PHONE]._canvas.layout.panes
     assert len(boxes) == 2
     assert boxes[1].top >= boxes[0].top + boxes[0].height, "one above the other on an upright screen"
+
+
+def test_a_lesson_is_read_and_done_in_a_picture(driver: Driver) -> None:
+    driver.window.lesson.is_unattended = False
+    driver.press_key("f2")
+    player = driver.window.lesson.player
+    assert player is not None
+    pictures = driver.window.map_pictures
+    for name, number in (("next", 1), ("next", 2), ("back", 1)):
+        driver.settle()
+        assert pictures.draw(PHONE, SCALE) is not None
+        areas = pictures._pictures[PHONE]._lesson_areas
+        box = next(area.box for area in areas if area.name == name)
+        assert box.height >= 48 * pictures._pictures[PHONE]._canvas.layout.scale
+        driver.click(*pictures.find_window_pixel(PHONE, box.center))
+        assert player.number == number
+    text = pygame.Rect(pictures._pictures[PHONE]._canvas.layout.panel)
+    driver.click(*pictures.find_window_pixel(PHONE, (text.left + 3, text.top + 3)))
+    assert driver.window.lesson.shown is player, "a tap on the text does not leave the lesson"
+
+
+def test_a_finger_on_the_time_slider_of_a_picture_moves_that_of_the_window(driver: Driver) -> None:
+    for _ in range(60):
+        driver.session.playback.step()
+    driver.settle()
+    pictures = driver.window.map_pictures
+    pictures.draw(PHONE, SCALE)
+    chart = pictures._pictures[PHONE]._chart
+    time = 0.5 * driver.session.timeline.end_time
+    slider = pygame.Rect(chart.layout.time_slider)
+    driver.click(*pictures.find_window_pixel(PHONE, (chart.to_column(time), slider.centery)))
+    assert driver.session.displayed.time == pytest.approx(time, abs=0.1)
+
+
+def test_a_message_is_shown_in_a_picture(driver: Driver) -> None:
+    pictures = driver.window.map_pictures
+    driver.viewer.clear_message()
+    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB")
+    driver.viewer.show_message("robot 2 failed")
+    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB") != before
 
 
 def test_help_and_dialogs_are_shown_as_in_the_window(driver: Driver) -> None:

@@ -82,6 +82,68 @@ def test_phones_show_the_map_while_the_window_is_wide():
     assert [phone.map_size for phone in phones] == [None, None], "the window has the size of a phone"
 
 
+@pytest.mark.parametrize(
+    ("size", "has_own_picture"),
+    [
+        ((1920, 1080), False),
+        ((1600, 900), False),
+        ((1366, 768), False),
+        ((2560, 1440), False),
+        ((1024, 768), True),
+        ((768, 1024), True),
+        ((2560, 1080), True),
+        ((960, 540), True),
+    ],
+)
+def test_a_viewer_whose_screen_has_another_shape_gets_a_picture_of_its_own(size, has_own_picture):
+    pages = Pages(lambda previous, page: None)
+    teacher = open_page(pages, may_control=True)
+    report_size(teacher, 1920, 1080)
+    viewer = open_page(pages, may_control=False)
+    report_size(viewer, *size)
+    pages.update_map_sizes()
+    assert teacher.map_size is None
+    assert (viewer.map_size is not None) == has_own_picture
+    if viewer.map_size is not None:
+        assert viewer.map_size.width / viewer.map_size.height == pytest.approx(size[0] / size[1], abs=0.01)
+
+
+def test_viewers_with_sharp_screens_are_compared_by_the_size_of_texts():
+    pages = Pages(lambda previous, page: None)
+    report_size(open_page(pages, may_control=True), 1280, 720)
+    sharp = open_page(pages, may_control=False)
+    report_size(sharp, 2560, 1440, ratio=2.0)
+    tiny = open_page(pages, may_control=False)
+    report_size(tiny, 1280, 720, ratio=2.0)
+    pages.update_map_sizes()
+    assert sharp.map_size is None
+    assert tiny.map_size is not None
+
+
+def test_a_phone_on_its_side_does_not_shrink_the_projector():
+    pages = Pages(lambda previous, page: None)
+    projector = open_page(pages, may_control=True)
+    report_size(projector, 1280, 720)
+    phone = open_page(pages, may_control=False)
+    report_size(phone, 1688, 676, ratio=2.0)
+    pages.give_control(phone)
+    pages.update_map_sizes()
+    assert pages.display_settings is projector.settings
+    assert phone.map_size is not None
+
+
+def test_only_small_screens_with_touch_have_the_buttons_of_the_window():
+    def is_compact(width, height, ratio=1.0, *, touch=True):
+        settings = PageChanged(kind="page", width=width, height=height, ratio=ratio, dark=False, touch=touch)
+        return settings.is_compact
+
+    assert is_compact(780, 1584, 2.0)
+    assert is_compact(1688, 676, 2.0)
+    assert not is_compact(768, 972)
+    assert not is_compact(1536, 1944, 2.0)
+    assert not is_compact(390, 800, touch=False)
+
+
 def test_the_number_of_sizes_of_the_map_is_limited():
     pages = Pages(lambda previous, page: None)
     report_size(open_page(pages, may_control=True), 1920, 1080)

@@ -667,6 +667,7 @@ class FakeWindow:
     """A window whose map is all of one color, unless a dialog covers it."""
 
     replacement = None
+    controls = None
     status_text = ""
 
     def __init__(self):
@@ -677,6 +678,9 @@ class FakeWindow:
 
     def set_appearance(self, scale, theme, *, panel):
         pass
+
+    def set_compact(self, *, is_compact):
+        self.is_compact = is_compact
 
     def reduce_motion(self, *, is_reduced):
         self.is_motion_reduced = is_reduced

@@ -44,6 +44,11 @@ def get_canvas_size(browser):
     return browser.run_script("const it = document.querySelector('canvas'); return [it.width, it.height]")
 
 
+def get_classes(browser):
+    """Return the classes that describe the role of the page."""
+    return set(browser.run_script("return document.body.className").split())
+
+
 def read_picture(browser):
     return browser.run_script("return document.querySelector('canvas').toDataURL()")
 
@@ -127,21 +132,25 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))
         teacher = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
+        set_size(browser, 1024, 900)
         browser.driver.get(link)
+        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
+        browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900])
+        set_size(browser, 1280, 720)
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
-        assert browser.run_script("return document.body.className") == "watching"
+        browser.wait_until(lambda: get_classes(browser) == {"watching"})
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         browser.find("summary").click()
         browser.run_script("prompt = () => 'Ada'")
         browser.find_all("#here button")[1].click()
         browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
         browser.find("#here button").click()  # a second window of the teacher's takes control
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
+        browser.wait_until(lambda: get_classes(browser) == set())
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "")
+        browser.wait_until(lambda: get_classes(browser) == set())
         assert not browser.read_console()
 
 
@@ -168,7 +177,7 @@ def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_p
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "watching map")
+        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
         assert browser.find("#line").text.startswith("You watch Teacher 1")
         assert not any(button.is_displayed() for button in browser.find_all("#touch button"))
         browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
@@ -181,12 +190,12 @@ def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_p
         hand_over = browser.find_all("#toast button")[0]
         assert (hand_over.text, later.text) == ("Hand over", "Later")
         hand_over.click()
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "watching")
+        browser.wait_until(lambda: get_classes(browser) == {"watching"})
         assert not browser.find("#toast").is_displayed()
         browser.driver.switch_to.window(phone)
-        browser.wait_until(lambda: browser.run_script("return document.body.className") == "map")
+        browser.wait_until(lambda: get_classes(browser) == {"map", "phone"})
         assert browser.run_script("return canvas.getBoundingClientRect().width") <= 390
-        browser.run_script("document.getElementById('choose').click()")
+        browser.find("#to-tools").click()
         wall = next(button for button in browser.find_all("#tools button") if button.text == "Wall")
         wall.click()
         browser.wait_until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
@@ -298,21 +307,22 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
         set_size(browser, 390, 844, 3.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
-            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2388])
+            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2376])
             narrow = wait_for_rest(browser)
             box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
             assert browser.run_script(f"{box} return [box.left, box.top, box.width, box.height]") == [
                 0,
                 0,
                 390,
-                796,
+                792,
             ]
             assert (
                 browser.run_script("return document.getElementById('touch').getBoundingClientRect().top")
-                == 796
+                == 792
             )
-            browser.find("[data-key=h]").click()
+            browser.find("#panel").click()
             browser.wait_until(lambda: read_picture(browser) != narrow)
+            browser.wait_until(lambda: browser.run_script("return scrollBox"))
             told = record_messages(browser)
 
             def touch(*moments):
@@ -335,6 +345,45 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
             pinch = touch(*([(50 - 4 * k, 300), (70 + 4 * k, 300)] for k in range(8)))
             assert pinch[0] == pinch[-1] == ("button", 3, 60)
             assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
+            scrolled = touch(*([(60, 700 - 20 * k)] for k in range(6)))
+            assert {kind for kind, *_ in scrolled} == {"wheel"}, "up and down, a finger scrolls the panel"
+            slid = touch(*([(60 + 10 * k, 700)] for k in range(6)))
+            assert {kind for kind, *_ in slid} == {"button"}, "to the side, it moves a slider"
+            assert browser.read_console() == []
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
+    touch = {"enabled": True, "maxTouchPoints": 2}
+    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    try:
+        set_size(browser, 390, 844, 2.0)
+        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+            browser.driver.get(link)
+            browser.wait_until(lambda: get_classes(browser) == {"phone"})
+            wait_for_rest(browser)
+            shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
+            assert [button.text for button in shown] == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
+            assert all(min(button.size.values()) >= 48 for button in shown)
+            assert not browser.find("#undo").is_enabled()
+            browser.find("#play").click()
+            browser.wait_until(lambda: browser.find("#play").text == "Pause")
+            browser.find("#play").click()
+            browser.wait_until(lambda: browser.find("#play").text == "Play")
+            browser.find("#to-tools").click()
+            browser.find("[data-command='tool:failure']").click()
+            browser.wait_until(lambda: browser.find("#to-tools").text == "Fail")
+            browser.find("#to-more").click()
+            targets = [button for button in browser.find_all("#more button") if button.is_displayed()]
+            assert all(min(button.size.values()) >= 48 for button in targets)
+            browser.find("[data-command='pane:add']").click()
+            browser.wait_until(lambda: browser.find("#undo").is_enabled())
+            browser.find("#undo").click()
+            browser.wait_until(lambda: not browser.find("#undo").is_enabled())
+            browser.find("#lesson").click()
+            browser.wait_until(lambda: browser.find("#lesson").get_attribute("aria-pressed") == "true")
+            assert not browser.find("#panel").is_enabled()
             assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})

@@ -244,6 +244,11 @@ class EditorWindow(CommandWindow):
         if self.play_mode.window is not None:
             self.play_mode.window.set_appearance(scale, theme, panel=panel)
 
+    def set_compact(self, *, is_compact: bool) -> None:
+        """Leave the buttons of play mode to the page of a phone, or show them again."""
+        if self.play_mode.window is not None:
+            self.play_mode.window.set_compact(is_compact=is_compact)
+
     def reduce_motion(self, *, is_reduced: bool) -> None:
         """Adopt the setting of the user's system for reduced motion, which matters in play mode."""
         self.play_mode.reduce_motion(is_reduced=is_reduced)
@@ -321,6 +326,7 @@ class EditorWindow(CommandWindow):
         draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
         if layout.has_panel:
             self.panel.draw(self.screen)
+        self.sheet_handle.draw(self.screen, layout, theme)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
         self.tool_rail.draw(self.screen)

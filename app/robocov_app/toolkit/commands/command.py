@@ -188,6 +188,9 @@ class CommandTable:
     def __getitem__(self, name: str) -> Command:
         return self._by_name[name]
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._by_name
+
     def run(self, name: str) -> None:
         """Run a command, and show its message or error."""
         self.attempt(self._by_name[name])

@@ -22,6 +22,8 @@ from robocov_app.toolkit.widgets.tool_tip import TipSketch, ToolTip, draw_tool_t
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 
+_OUTSIDE = (-1, -1)
+"""Position of a pointer that is not in the window."""
 _MAX_RUNS = 3
 """Maximum number of runs for one drawing. The height of the content is known only after a run."""
 
@@ -113,7 +115,7 @@ class Page(RowLayout):
         self.background: Color | None = theme.panel
         self.needs_redraw = True
         self.surface: Surface | None = None
-        self.pointer = (-1, -1)
+        self.pointer = _OUTSIDE
         self.focus: str | None = None
         self.focused_rect: Rect | None = None
         self.reveals_focus = False
@@ -173,6 +175,12 @@ class Page(RowLayout):
     def is_busy(self) -> bool:
         """Whether text is being edited, a list is open or a mouse button is held down."""
         return self.active is not None or self.edit is not None or self.open_list is not None
+
+    def leave(self) -> None:
+        """Record that the pointer has left the window, so that it is over no widget."""
+        self.pointer = _OUTSIDE
+        self.tool_tip.note_hovered("")
+        self.needs_redraw = True
 
     def stop_typing(self) -> None:
         """Take the focus away from all widgets, and close the open list."""

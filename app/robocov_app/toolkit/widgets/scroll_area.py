@@ -9,14 +9,12 @@ from pygame import Rect
 
 from robocov_app.toolkit.widgets.appearance import draw_box, shade
 from robocov_app.toolkit.widgets.page import Page, Widget
-from robocov_app.toolkit.window.input import get_wheel_notches
+from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, get_wheel_notches
 
 # Lengths in pixels at scale 1.
 BAR_WIDTH_PX = 10.0
 PANEL_MARGIN_PX = 12.0
 """Margin at the side of a panel, which contains the scroll bar."""
-_NOTCH_PX = 40.0
-"""Distance scrolled by one notch of the wheel."""
 _MIN_KNOB_PX = 20
 _BAR_GAP_PX = 4
 """Distance between the content and the scroll bar."""
@@ -181,7 +179,7 @@ def _read_input(page: Page, bar: _Bar, area: Rect, offset: float) -> float:
     is_pressed = page.is_pressed(bar.track)
     is_dragged = page.active == bar.key and page.is_event(pygame.MOUSEMOTION)
     if event is not None and event.type == pygame.MOUSEWHEEL and area.collidepoint(page.pointer):
-        offset -= get_wheel_notches(event) * _NOTCH_PX
+        offset -= get_wheel_notches(event) * SCROLL_PX_PER_NOTCH
         page.consume_event()
     elif is_pressed or is_dragged:
         is_knob_press = is_pressed and bool(bar.knob.collidepoint(page.pointer))

@@ -36,12 +36,13 @@ FINE_FRACTION = 0.1
 
 @dataclass(frozen=True)
 class _Range:
-    """Range of values of a slider, and its track in the window."""
+    """Range of values of a slider, and its areas in the window."""
 
     low: float
     high: float
     step: float  # spacing of the values; 0 if any value is possible
     track: Rect
+    target: Rect  # area in which a press moves the knob
     knob_width: int
 
     @property
@@ -101,7 +102,7 @@ def show_slider(
     rect = page.cell()
     track = Rect(rect.left, 0, rect.width, page.px(_TRACK_HEIGHT_PX))
     track.centery = rect.centery
-    values = _Range(low, high, step, track, page.px(_KNOB_WIDTH_PX))
+    values = _Range(low, high, step, track, rect, page.px(_KNOB_WIDTH_PX))
     new_value = value
     if not disabled_reason:
         new_value = _read_input(page, key, value, values)
@@ -119,7 +120,7 @@ def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
     """Return the value after the current mouse or key event; it may lie beyond the ends."""
     track = values.track
     knob_left = track.left + values.free_width * values.compute_fraction(value)
-    is_pressed = page.is_pressed(track)
+    is_pressed = page.is_pressed(values.target)
     is_knob_press = is_pressed and knob_left <= page.pointer[0] <= knob_left + values.knob_width
     if is_pressed:
         page.active = key
@@ -171,7 +172,7 @@ def _draw_slider(page: Page, key: str, values: _Range, fraction: float, *, enabl
     strength = 0.0
     if page.active == key:
         strength = _HELD_STRENGTH
-    elif enabled and page.is_hovered(track):
+    elif enabled and page.is_hovered(values.target):
         strength = _HOVERED_STRENGTH
     knob = Rect(track.left + knob_offset, track.top, values.knob_width, page.px(_TRACK_HEIGHT_PX))
     draw_box(page, knob, mix(accent, theme.ink, strength), radius=_KNOB_RADIUS_PX)

@@ -14,8 +14,9 @@ from robocov_app.toolkit.commands.help_page import draw_help_page
 from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.panel import CommandPanel
+from robocov_app.toolkit.sheet_handle import SheetHandle
 from robocov_app.toolkit.tools.pointer import Pointer
-from robocov_app.toolkit.window.input import MOUSE_EVENTS
+from robocov_app.toolkit.window.input import COMMAND_EVENT, MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.toolkit.window.window_model import WindowModel
@@ -84,6 +85,8 @@ class CommandWindow(BaseWindow):
         The panel.
     pointer : Pointer
         The mouse over the map.
+    sheet_handle : SheetHandle
+        Closes the panel of a narrow window.
     layout : Layout
         Boxes of the window.
     theme : Theme
@@ -114,6 +117,7 @@ class CommandWindow(BaseWindow):
         self.dialogs = dialogs
         self.scale = scale
         self.is_help_open = False
+        self.sheet_handle = SheetHandle(self.close_sheet)
 
     @property
     def status_text(self) -> str:
@@ -132,6 +136,22 @@ class CommandWindow(BaseWindow):
             self.is_help_open = False
         else:
             self.commands.run(name)
+
+    def close_sheet(self) -> None:
+        """Close the panel of a narrow window."""
+        self.do("panel")
+
+    def _do_from_page(self, name: str) -> None:
+        """Run a command that was chosen in a browser page, after closing what covers the window."""
+        if name not in self.commands:
+            return
+        if self.dialogs.is_open:
+            self.dialogs.close()
+            if name == "cancel":
+                return
+        if name not in ("help", "cancel"):
+            self.is_help_open = False
+        self.do(name)
 
     def toggle_help(self) -> None:
         """Show or hide the help page."""
@@ -160,6 +180,8 @@ class CommandWindow(BaseWindow):
             self.commands.reset_keys()
         if event.type == pygame.QUIT:
             self.handle_quit()
+        elif event.type == COMMAND_EVENT:
+            self._do_from_page(event.name)
         elif not self.dialogs.handle_event(event):
             self._handle_below_dialogs(event)
 
@@ -176,7 +198,8 @@ class CommandWindow(BaseWindow):
 
     def handle_mouse(self, event: pygame.event.Event) -> None:
         """Handle a mouse event that no dialog has used."""
-        self.pointer.handle_event(event, self.model.now)
+        if not self.sheet_handle.handle_event(event, self.layout):
+            self.pointer.handle_event(event, self.model.now)
 
     def _handle_below_dialogs(self, event: pygame.event.Event) -> None:
         """Handle an event that no dialog has used."""
@@ -190,6 +213,8 @@ class CommandWindow(BaseWindow):
             self.handle_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
             self.pointer.leave()
+            for part in self.parts:
+                part.ui.leave()
         else:
             offer_event(self.parts, event)
 

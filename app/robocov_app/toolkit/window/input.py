@@ -15,7 +15,11 @@ MAX_CLICK_MOVE_PX = 5.0
 """Distance at scale 1 that the mouse may move during a click."""
 ZOOM_PER_NOTCH = 1.15
 """Magnification of one notch of the wheel."""
+SCROLL_PX_PER_NOTCH = 40.0
+"""Distance at scale 1 scrolled by one notch of the wheel."""
 MOUSE_EVENTS = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
+COMMAND_EVENT = pygame.event.custom_type()
+"""Event with the name of a command that the user has chosen outside the window, in a browser page."""
 ENTER_KEYS = ("return", "enter")
 
 _MAX_NOTCHES = 5.0

@@ -19,8 +19,21 @@ _PANE_MARGINS_PX = (31, 68)
 """Width and height of a pane in addition to those of its map."""
 MIN_SIZE_PX = (900, 600)
 """Minimum width and height of a window in which everything fits at scale 1."""
-MIN_PORTRAIT_SIZE_PX = (460, 600)
-"""The same for a phone in portrait orientation, where the panel takes most of the width."""
+MIN_PORTRAIT_SIZE_PX = (360, 600)
+"""The same in portrait orientation, where the panel is a sheet over the lower part of the window."""
+MIN_COMPACT_SIDE_PX = 300
+"""The same for the shorter side of a compact window."""
+COMPACT_PANEL_WIDTH_PX = 384
+"""Width of the panel at the side of a compact window, whose widgets are larger."""
+MAX_SHEET_WIDTH_PX = 700
+"""Width at scale 1 below which the panel of a window in portrait orientation is a sheet."""
+SHEET_HEIGHT_FRACTION = 0.6
+"""Height of the sheet, including its handle, in heights of the window."""
+HANDLE_HEIGHT_PX = 28
+_COMPACT_SLIDER_HEIGHT_PX = 36
+"""Height of the time slider for a finger."""
+_MIN_CHART_WINDOW_PX = 480
+"""Height at scale 1 from which on a compact window has a chart."""
 
 _MIN_SCALE = 0.25
 _SCALE_STEPS = 8
@@ -66,6 +79,10 @@ class Layout(NamedTuple):
         Part of the arena for each pane.
     legend : Box
         The legend that several panes share, above them; its height is 0 for a single pane.
+    handle : Box
+        The strip above the panel by which it is closed, if the panel is a sheet; otherwise of height 0.
+    is_compact : bool
+        Whether the window is on a phone, whose page has the buttons of the bar and of the rail.
     """
 
     size: tuple[int, int]
@@ -79,11 +96,18 @@ class Layout(NamedTuple):
     status: Box
     panes: tuple[Box, ...]
     legend: Box
+    handle: Box = Box(0, 0, 0, 0)
+    is_compact: bool = False
 
     @property
     def has_panel(self) -> bool:
         """Whether the panel is shown."""
         return self.panel.width > 0
+
+    @property
+    def has_sheet(self) -> bool:
+        """Whether the panel is shown for fingers: as a sheet, or at the side of a compact window."""
+        return self.has_panel and (self.is_compact or self.handle.height > 0)
 
 
 def build_layout(
@@ -94,6 +118,7 @@ def build_layout(
     *,
     panel: bool = True,
     plot: bool = True,
+    is_compact: bool = False,
 ) -> Layout:
     """Lay out a window.
 
@@ -110,22 +135,26 @@ def build_layout(
         Whether the panel is shown.
     plot : bool
         Whether chart and time slider are shown.
+    is_compact : bool
+        Whether the window is on a phone, whose page has the buttons of the bar and of the rail.
 
     Returns
     -------
     Layout
     """
     width, height = size
-    scale = min(scale, find_max_scale(size))
-    panel_width = 0
-    if panel:
-        panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
+    scale = min(scale, find_max_scale(size, is_compact=is_compact))
+    handle, panel_box = _place_panel(size, scale, is_shown=panel, is_compact=is_compact)
     legend_height = 0
     if panes > 1:
         legend_height = round(LEGEND_HEIGHT_PX * scale)
-    left_width = width - panel_width
-    rail_width = round(RAIL_WIDTH_PX * scale)
-    rows = _choose_row_heights(height, scale, plot=plot)
+    rail_width = 0 if is_compact else round(RAIL_WIDTH_PX * scale)
+    if handle.height:
+        left_width = width
+        rows = _choose_rows_above_sheet(handle.top, scale, is_compact=is_compact)
+    else:
+        left_width = width - panel_box.width
+        rows = _choose_row_heights(height, scale, plot=plot, is_compact=is_compact)
     arena = Box(rail_width, rows.bar, max(left_width - rail_width, 1), rows.arena)
     chart_top = rows.bar + rows.arena
     slider_top = chart_top + rows.chart
@@ -135,13 +164,39 @@ def build_layout(
         bar=Box(0, 0, width, rows.bar),
         rail=Box(0, rows.bar, rail_width, rows.arena),
         arena=arena,
-        panel=Box(left_width, rows.bar, panel_width, height - rows.bar),
+        panel=panel_box,
         chart=Box(0, chart_top, left_width, rows.chart),
         time_slider=Box(0, slider_top, left_width, rows.time_slider),
         status=Box(0, slider_top + rows.time_slider, left_width, rows.status),
         panes=_arrange_panes(panes, aspect, scale, arena, legend_height),
         legend=Box(rail_width, rows.bar, arena.width, legend_height),
+        handle=handle,
+        is_compact=is_compact,
     )
+
+
+def uses_sheet(size: tuple[int, int], scale: float, *, is_compact: bool = False) -> bool:
+    """Return whether the panel of a window is a sheet over its lower part; see `build_layout`."""
+    width, height = size
+    scale = min(scale, find_max_scale(size, is_compact=is_compact))
+    return width < height and width < MAX_SHEET_WIDTH_PX * scale
+
+
+def _place_panel(size: tuple[int, int], scale: float, *, is_shown: bool, is_compact: bool) -> tuple[Box, Box]:
+    """Return the boxes of the handle and of the panel: a sheet at the bottom, or a column at the right."""
+    width, height = size
+    bar_height = 0 if is_compact else round(BAR_HEIGHT_PX * scale)
+    if not is_shown:
+        return Box(0, height, 0, 0), Box(width, bar_height, 0, height - bar_height)
+    if not uses_sheet(size, scale, is_compact=is_compact):
+        panel_width = min(round(PANEL_WIDTH_PX * scale), width - 1)
+        if is_compact:
+            panel_width = min(round(COMPACT_PANEL_WIDTH_PX * scale), width // 2)
+        return Box(0, height, 0, 0), Box(width - panel_width, bar_height, panel_width, height - bar_height)
+    sheet_height = round(SHEET_HEIGHT_FRACTION * height)
+    handle = Box(0, height - sheet_height, width, min(round(HANDLE_HEIGHT_PX * scale), sheet_height))
+    panel_top = handle.top + handle.height
+    return handle, Box(0, panel_top, width, height - panel_top)
 
 
 class _RowHeights(NamedTuple):
@@ -154,48 +209,32 @@ class _RowHeights(NamedTuple):
     status: int
 
 
-def _choose_row_heights(height: int, scale: float, *, plot: bool) -> _RowHeights:
+def _choose_row_heights(height: int, scale: float, *, plot: bool, is_compact: bool) -> _RowHeights:
     """Choose the heights of the rows; the arena gets the space that the others leave."""
     bar = round(BAR_HEIGHT_PX * scale)
     status = round(STATUS_HEIGHT_PX * scale)
+    slider_px = TIME_SLIDER_HEIGHT_PX
+    has_chart = plot
+    if is_compact:
+        bar = 0
+        status = 0
+        slider_px = _COMPACT_SLIDER_HEIGHT_PX
+        has_chart = plot and height >= _MIN_CHART_WINDOW_PX * scale
     chart = 0
-    time_slider = 0
-    if plot:
+    if has_chart:
         # In small windows, the chart takes at most a third of the height.
         chart = min(round(CHART_HEIGHT_PX * scale), height // 3)
-        time_slider = round(TIME_SLIDER_HEIGHT_PX * scale)
+    time_slider = 0
+    if plot:
+        time_slider = round(slider_px * scale)
     arena = max(height - bar - status - time_slider - chart, 1)
     return _RowHeights(bar=bar, arena=arena, chart=chart, time_slider=time_slider, status=status)
 
 
-def build_map_layout(size: tuple[int, int], scale: float, panes: int, aspect: float) -> Layout:
-    """Lay out a picture that consists of the panes alone.
-
-    Parameters
-    ----------
-    size, scale, panes, aspect
-        See `build_layout`; the scale is not reduced.
-
-    Returns
-    -------
-    Layout
-        All boxes other than those of the panes are empty.
-    """
-    arena = Box(0, 0, *size)
-    empty = Box(0, 0, 0, 0)
-    return Layout(
-        size=size,
-        scale=scale,
-        bar=empty,
-        rail=empty,
-        arena=arena,
-        panel=empty,
-        chart=empty,
-        time_slider=empty,
-        status=empty,
-        panes=_arrange_panes(panes, aspect, scale, arena, 0),
-        legend=empty,
-    )
+def _choose_rows_above_sheet(sheet_top: int, scale: float, *, is_compact: bool) -> _RowHeights:
+    """Choose the heights of the rows above a sheet, which covers the chart and all below it."""
+    bar = 0 if is_compact else round(BAR_HEIGHT_PX * scale)
+    return _RowHeights(bar=bar, arena=max(sheet_top - bar, 1), chart=0, time_slider=0, status=0)
 
 
 def _arrange_panes(
@@ -220,9 +259,11 @@ def _arrange_panes(
     return tuple(boxes)
 
 
-def find_max_scale(size: tuple[int, int]) -> float:
+def find_max_scale(size: tuple[int, int], *, is_compact: bool = False) -> float:
     """Return the largest scale at which everything fits into a window."""
     width, height = size
+    if is_compact:
+        return max(floor(_SCALE_STEPS * min(size) / MIN_COMPACT_SIDE_PX) / _SCALE_STEPS, _MIN_SCALE)
     min_width, min_height = MIN_SIZE_PX
     if width < height:
         min_width, min_height = MIN_PORTRAIT_SIZE_PX

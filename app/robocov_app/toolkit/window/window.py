@@ -1,6 +1,7 @@
 """A window and its main loop, which handles events and draws a frame if something has changed."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from time import perf_counter
@@ -66,6 +67,41 @@ class Remote(Protocol):
 
     def send(self, surface: Surface, cursor: int) -> None:
         """Show the current frame and the shape of the cursor (a pygame constant)."""
+
+
+@dataclass(frozen=True)
+class WindowControls:
+    """State of a window that the buttons of a phone's page show.
+
+    Attributes
+    ----------
+    theme : str
+        ``light`` or ``dark``.
+    is_compact : bool
+        Whether the window leaves its buttons to the page.
+    is_playing : bool
+    can_undo : bool
+    tool : str
+        Name of the tool in use.
+    lesson : str
+        ``shown`` while a lesson is shown, ``left`` while the user has taken over from it, or else empty.
+    has_panel : bool
+        Whether the panel is open.
+    is_typing : bool
+        Whether typed text goes to a text field.
+    scroll_box : Box or None
+        Part of the window that a vertical drag of a finger scrolls.
+    """
+
+    theme: str
+    is_compact: bool
+    is_playing: bool
+    can_undo: bool
+    tool: str
+    lesson: str
+    has_panel: bool
+    is_typing: bool
+    scroll_box: Box | None
 
 
 class MapDrawing(Protocol):
@@ -176,6 +212,11 @@ class BaseWindow:
         """Text that a screen reader announces when it changes."""
         return ""
 
+    @property
+    def controls(self) -> WindowControls | None:
+        """State that the buttons of a phone's page show; None if the page has no buttons for this window."""
+        return None
+
     def close(self) -> None:
         """Stop threads and processes that the window has started."""
 
@@ -190,6 +231,9 @@ class BaseWindow:
         panel : bool or None
             Whether the panel is shown; None to leave it as it is.
         """
+
+    def set_compact(self, *, is_compact: bool) -> None:
+        """Leave the buttons of the bar and of the rail to the page of a phone, or show them again."""
 
     def reduce_motion(self, *, is_reduced: bool) -> None:
         """Adopt the setting of the user's system for reduced motion."""

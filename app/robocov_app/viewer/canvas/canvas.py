@@ -32,6 +32,7 @@ from robocov_app.viewer.session.document import Node
 
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
+_FINGER_MARGIN_PX = 12.0  # the same on a phone
 _ACTIVE_BAR_PX = 3  # height of the bar at the top of the active pane
 _FRAME_STRENGTH = 0.18  # fraction of the color of text in the frames of the panes
 _BAR_GAP_PX = 6.0  # between the layer bar and the map
@@ -156,12 +157,14 @@ class ViewerCanvas:
         # Nothing is drawn: this canvas only provides the radii at which robots are drawn.
         canvas = self._build_canvas(pygame.Surface((1, 1)), pane, scene)
         distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
-        radii = np.array(compute_drawn_radii(canvas, scene)) + _HIT_MARGIN_PX * self.layout.scale
+        margin_px = _FINGER_MARGIN_PX if self.layout.is_compact else _HIT_MARGIN_PX
+        radii = np.array(compute_drawn_radii(canvas, scene)) + margin_px * self.layout.scale
         rows = np.flatnonzero(distances <= radii).tolist()
         hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
         for number, position in scene.failed.items():
             distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
-            if distance <= FAILED_RADIUS_PX * self.layout.scale:
+            failed_radius_px = FAILED_RADIUS_PX + margin_px - _HIT_MARGIN_PX
+            if distance <= failed_radius_px * self.layout.scale:
                 hits.append((distance, number))
         if hits:
             return min(hits, key=lambda hit: hit[0])[1]

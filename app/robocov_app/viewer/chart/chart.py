@@ -4,6 +4,7 @@ import numpy as np
 import pygame
 
 from robocov_app.look.theme import Theme
+from robocov_app.render.canvas import Canvas
 from robocov_app.toolkit.overlay import create_flat_canvas
 from robocov_app.toolkit.window.layout import Box, Layout, is_inside
 from robocov_app.viewer.chart.axes import draw_axes, draw_computation_state, draw_switch, draw_title
@@ -114,6 +115,11 @@ class Chart:
         return any(len(pane.curves["time"]) for pane in self.viewer.session.timeline.panes)
 
     @property
+    def _has_curves(self) -> bool:
+        """Whether there are curves above the time slider."""
+        return self.layout.chart.height > 0
+
+    @property
     def _frame(self) -> ChartFrame:
         return ChartFrame(self.layout, self.theme, self.viewer.session, self.quantity)
 
@@ -156,14 +162,17 @@ class Chart:
         return self.times.to_column(time)
 
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw the chart and the time slider onto the window."""
+        """Draw the chart and the time slider onto the window, as far as the layout has them."""
+        if not self.layout.time_slider.height:
+            return
         frame = self._frame
         page = self._page
         if self._update_page_key(frame) or page is None:
             page = self._draw_page(frame)
         screen.blit(page, self.layout.chart.position)
-        cut_off = {pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes}
-        draw_captions(screen, frame, self._scale, cut_off)
+        if self._has_curves:
+            cut_off = {pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes}
+            draw_captions(screen, frame, self._scale, cut_off)
         hovered = None if self.hover is None else self.find_branch(self.hover)
         draw_branch_tree(screen, frame, self._branch_lines, hovered)
         draw_slider_state(screen, frame)
@@ -207,12 +216,23 @@ class Chart:
         self._page_time = self.viewer.now
         curves = [curve.values for curve in frame.list_curves()]
         ghosts = [ghost.values for ghost in frame.list_ghosts()]
-        self._branch_lines = list_branch_lines(frame.timeline)
+        self._branch_lines = list_branch_lines(frame.timeline) if self._has_curves else []
         tree_height = measure_tree(len(self._branch_lines))
         scale = build_chart_scale(frame.times, layout, curves + ghosts, tree_height)
         self._scale = scale
         canvas = create_flat_canvas(page, frame.theme, frame.scale)
         page.fill(frame.theme.panel)
+        if self._has_curves:
+            self._draw_curves(canvas, frame)
+        else:
+            self.ghosts = []
+            self.switch_box = None
+        draw_empty_slider(canvas, frame, scale.times)
+        return page
+
+    def _draw_curves(self, canvas: Canvas, frame: ChartFrame) -> None:
+        """Draw title, axes, events and curves on the page."""
+        scale = self._scale
         title_end = draw_title(canvas, frame)
         self.switch_box = draw_switch(canvas, frame, title_end) if self._has_times else None
         draw_computation_state(
@@ -222,5 +242,3 @@ class Chart:
         draw_events(canvas, frame, scale)
         self.ghosts = draw_ghosts(canvas, frame, scale)
         draw_curves(canvas, frame, scale)
-        draw_empty_slider(canvas, frame, scale.times)
-        return page

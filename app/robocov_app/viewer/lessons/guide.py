@@ -9,6 +9,7 @@ from robocov_app.look.theme import Theme
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.viewer.lessons.page import ClickArea, draw_caption, draw_lesson_page
 from robocov_app.viewer.lessons.player import FIRST_LESSON, LessonPlayer, LessonState, load_lesson
+from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
 from robocov_app.viewer.presenter import Presenter
 
 COMMANDS_WITHIN_LESSON = frozenset(
@@ -64,6 +65,10 @@ class LessonGuide:
         self.is_unattended = is_unattended
         self._viewer = viewer
         self._fit_view = fit_view
+        self._scroll_key: object = None  # the text that is scrolled
+        self._scroll_offset: float | None = None  # px; None until the user scrolls it
+        self._shown_offset = 0.0
+        self._max_offset = 0.0
 
     @property
     def shown(self) -> LessonPlayer | None:
@@ -83,7 +88,7 @@ class LessonGuide:
         player = self.player
         if player is None:
             return None
-        return player.state, player.number, player.progress, player.answer
+        return player.state, player.number, player.progress, player.answer, self._scroll_offset
 
     def start(self, path: Path = FIRST_LESSON) -> None:
         """Start a lesson.
@@ -164,13 +169,32 @@ class LessonGuide:
                 return True
         return False
 
+    def scroll(self, distance: float) -> bool:
+        """Scroll the text in the sheet down by a distance, px; return whether there is more than fits."""
+        if self.shown is None or not self._max_offset:
+            return False
+        self._scroll_offset = min(max(self._shown_offset + distance, 0.0), self._max_offset)
+        return True
+
     def draw(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> bool:
         """Draw the lesson in place of the panel, or as a caption; return whether there is one to draw."""
         self.click_areas = []
+        self._max_offset = 0.0
         if self.shown is None:
             return False
-        if layout.has_panel:
+        if layout.has_sheet:
+            self._draw_sheet(screen, layout, theme, self.shown)
+        elif layout.has_panel:
             self.click_areas = draw_lesson_page(screen, layout, theme, self.shown)
         else:
             draw_caption(screen, layout, theme, self.shown)
         return True
+
+    def _draw_sheet(self, screen: pygame.Surface, layout: Layout, theme: Theme, player: LessonPlayer) -> None:
+        key = (player.number, player.state)
+        if key != self._scroll_key:
+            self._scroll_key = key
+            self._scroll_offset = None
+        self.click_areas, self._shown_offset, self._max_offset = draw_lesson_sheet(
+            screen, layout, theme, player, self._scroll_offset
+        )

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import pygame
 
@@ -32,10 +32,13 @@ class ClickArea(NamedTuple):
         Position and size, px.
     action : callable
         Called when the area is clicked.
+    name : str
+        ``answer:1``, ``chapter:0``, ``back``, ``next`` or ``end``.
     """
 
     box: pygame.Rect
     action: Callable[[], object]
+    name: str
 
 
 # Lengths in pixels at scale 1.
@@ -96,15 +99,11 @@ _DOTS_ROW_PX = 24
 _DOT_RADIUS_PX = 3.0
 _CURRENT_DOT_RADIUS_PX = 4.5
 _BAR_HEIGHT_PX = 3
-_END_BUTTON_PX = 28
-_END_BUTTON_TOP_PX = 7
-"""Distance of the button that ends the lesson above the text of the heading."""
+_END_BUTTON_CENTER_PX = 7
+"""Distance of the center of the button that ends the lesson below the top of the heading."""
 _BUTTON_RADIUS_PX = 6
-_BUTTON_HEIGHT_PX = 34
 _BUTTON_GAP_PX = 10
 _BUTTON_TEXT_PX = 14
-_BUTTONS_ABOVE_BOTTOM_PX = 74
-_PROGRESS_ABOVE_BOTTOM_PX = 88
 _HINT_ABOVE_BOTTOM_PX = 26
 _TEXT_SIZES_PX = (14.0, 13.0, 12.0)
 """Sizes of the text; the first one at which the page fits is used."""
@@ -173,7 +172,7 @@ def draw_lesson_page(
     top = layout.panel.top + _PAGE_TOP_PX * layout.scale
     for text_px in _TEXT_SIZES_PX:
         screen.fill(theme.panel, layout.panel)
-        page = _LessonPage(screen, layout, theme, lesson, text_px, top)
+        page = LessonPage(screen, layout, theme, lesson, text_px, top)
         page.draw()
         areas = page.areas
         if page.fits:
@@ -182,8 +181,35 @@ def draw_lesson_page(
 
 
 @dataclass
-class _LessonPage:
-    """The page of a lesson, which is drawn from top to bottom; `y` is the top of the next item, px."""
+class LessonPage:
+    """The page of a lesson in place of the panel, which is drawn from top to bottom.
+
+    Attributes
+    ----------
+    screen : pygame.Surface
+    layout : Layout
+    theme : Theme
+    lesson : LessonPlayer
+    text_px : float
+        Size of the text at scale 1, px.
+    y : float
+        Top of the next item, px.
+    areas : list of ClickArea
+        Areas that can be clicked, drawn so far.
+    fits : bool
+        Whether everything fits into the panel.
+    """
+
+    min_answer_height: ClassVar[float] = 0.0
+    """Minimum height of the frame of an open answer at scale 1, px."""
+    button_height: ClassVar[float] = 34.0
+    """Height of the buttons at the bottom at scale 1, px."""
+    buttons_above_bottom: ClassVar[float] = 74.0
+    """Distance of their top from the bottom of the page at scale 1, px."""
+    progress_above_bottom: ClassVar[float] = 88.0
+    """Distance of the top of the progress bar from the bottom of the page at scale 1, px."""
+    end_button_size: ClassVar[float] = 28.0
+    """Width and height of the button that ends the lesson at scale 1, px."""
 
     screen: pygame.Surface
     layout: Layout
@@ -216,17 +242,9 @@ class _LessonPage:
 
     def draw(self) -> None:
         """Draw the chapter or the closing page, the list of chapters, the buttons and the progress bar."""
-        lesson = self.lesson
-        is_closing = lesson.state is LessonState.CLOSING
-        count = len(lesson.lesson.chapters)
-        heading = "LESSON" if is_closing else f"LESSON · {lesson.number + 1} OF {count}"
-        self._write(heading, _SMALL_TEXT_PX, self.theme.faint, bold=True)
         heading_y = self.y
-        self.y += _HEADING_LINE_PX * self.scale
-        if is_closing:
-            self._draw_closing()
-        else:
-            self._draw_chapter_text()
+        self._draw_heading()
+        self._draw_text()
         self._draw_chapters()
         self._draw_progress()
         self._draw_buttons()
@@ -235,14 +253,31 @@ class _LessonPage:
         self._write(hint, _SMALL_TEXT_PX, self.theme.faint)
         self._draw_end_button(heading_y)
 
+    def _draw_heading(self) -> None:
+        """Write the number of the chapter."""
+        lesson = self.lesson
+        heading = f"LESSON · {lesson.number + 1} OF {len(lesson.lesson.chapters)}"
+        if lesson.state is LessonState.CLOSING:
+            heading = "LESSON"
+        self._write(heading, _SMALL_TEXT_PX, self.theme.faint, bold=True)
+        self.y += _HEADING_LINE_PX * self.scale
+
+    def _draw_text(self) -> None:
+        """Draw the text of the chapter, or the closing page."""
+        if self.lesson.state is LessonState.CLOSING:
+            self._draw_closing()
+        else:
+            self._draw_chapter_text()
+
     def _draw_end_button(self, top: float) -> None:
         """Draw a cross in the upper right corner, which ends the lesson."""
-        size = round(_END_BUTTON_PX * self.scale)
-        left = round(self.x + self.width) - size
-        box = pygame.Rect(left, round(top - _END_BUTTON_TOP_PX * self.scale), size, size)
+        size = round(self.end_button_size * self.scale)
+        box = pygame.Rect(0, 0, size, size)
+        box.right = round(self.x + self.width)
+        box.centery = round(top + _END_BUTTON_CENTER_PX * self.scale)
         image = render_text("×", round(_PAGE_TITLE_PX * self.scale), self.theme.faint)
         self.screen.blit(image, image.get_rect(center=box.center))
-        self.areas.append(ClickArea(box, self.lesson.end))
+        self.areas.append(ClickArea(box, self.lesson.end, "end"))
 
     def _draw_chapter_text(self) -> None:
         """Draw the title and text of the chapter, its question with the answers, and comments."""
@@ -317,8 +352,11 @@ class _LessonPage:
             ink = self.theme.faint
         text_width = self.width - (_ANSWER_INDENT_PX + _ANSWER_RIGHT_INDENT_PX) * scale
         lines = wrap_text(answer.text, round(self.text_px * scale), text_width)
-        height = round((_LINE_HEIGHT * self.text_px * len(lines) + _ANSWER_HEIGHT_PX) * scale)
+        height_px = _LINE_HEIGHT * self.text_px * len(lines) + _ANSWER_HEIGHT_PX
+        extra_px = max(self.min_answer_height - height_px, 0.0) if is_open else 0.0
+        height = round((height_px + extra_px) * scale)
         box = pygame.Rect(round(self.x), round(top - _ANSWER_TOP_PX * scale), round(self.width), height)
+        self.y += extra_px / 2 * scale
         edge_px = _MARKED_ANSWER_EDGE_PX
         if answer.mark is AnswerMark.NONE:
             edge_px = _ANSWER_EDGE_PX
@@ -337,7 +375,7 @@ class _LessonPage:
         )
         self.y = box.bottom + _ANSWER_GAP_PX * scale
         if is_open:
-            self.areas.append(ClickArea(box, partial(self.lesson.reply, number)))
+            self.areas.append(ClickArea(box, partial(self.lesson.reply, number), f"answer:{number}"))
 
     def _choose_answer_edge(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
         """Return the color of an answer's frame; it depends on the mark, if the answer has one."""
@@ -358,7 +396,7 @@ class _LessonPage:
         scale = self.scale
         count = len(self.lesson.lesson.chapters)
         self.y += _CHAPTERS_TOP_PX * scale
-        bottom = self.bottom - (_PROGRESS_ABOVE_BOTTOM_PX + _CHAPTERS_BOTTOM_PX) * scale
+        bottom = self.bottom - (self.progress_above_bottom + _CHAPTERS_BOTTOM_PX) * scale
         free_height = bottom - self.y
         self.fits = free_height >= _DOTS_ROW_PX * scale
         if free_height < _MIN_CHAPTER_ROW_PX * scale * count:
@@ -381,7 +419,7 @@ class _LessonPage:
             if number == self.lesson.number:
                 radius = _CURRENT_DOT_RADIUS_PX
             self._draw_dot(number, box.center, radius)
-            self.areas.append(ClickArea(box, partial(self.lesson.go_to, number)))
+            self.areas.append(ClickArea(box, partial(self.lesson.go_to, number), f"chapter:{number}"))
 
     def _draw_dot(self, number: int, center: tuple[float, float], radius: float) -> None:
         """Draw the dot of a chapter, filled if it was reached."""
@@ -407,13 +445,13 @@ class _LessonPage:
         self._write(title, _CHAPTER_TEXT_PX, color, indent=_CHAPTER_INDENT_PX, bold=is_current)
         top = round(self.y - _CHAPTER_TOP_PX * scale)
         box = pygame.Rect(round(self.x), top, round(self.width), round(row))
-        self.areas.append(ClickArea(box, partial(lesson.go_to, number)))
+        self.areas.append(ClickArea(box, partial(lesson.go_to, number), f"chapter:{number}"))
 
     def _draw_progress(self) -> None:
         """Draw the progress bar above the buttons."""
         theme = self.theme
         scale = self.scale
-        bar_top = round(self.bottom - _PROGRESS_ABOVE_BOTTOM_PX * scale)
+        bar_top = round(self.bottom - self.progress_above_bottom * scale)
         bar_height = max(_BAR_HEIGHT_PX, round(_BAR_HEIGHT_PX * scale))
         bar = pygame.Rect(round(self.x), bar_top, round(self.width), bar_height)
         empty_color = mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH)
@@ -432,17 +470,17 @@ class _LessonPage:
             next_label = "Close lesson"
         elif is_last:
             next_label = "Finish"
-        top = round(self.bottom - _BUTTONS_ABOVE_BOTTOM_PX * scale)
+        top = round(self.bottom - self.buttons_above_bottom * scale)
         width = round((self.width - _BUTTON_GAP_PX * scale) / 2)
-        height = round(_BUTTON_HEIGHT_PX * scale)
+        height = round(self.button_height * scale)
         back = pygame.Rect(round(self.x), top, width, height)
         forward = pygame.Rect(round(self.x + self.width) - width, top, width, height)
         if lesson.number > 0 or is_closing:
             self._draw_button("← Back", back, is_primary=False)
-            self.areas.append(ClickArea(back, partial(lesson.skip, -1)))
+            self.areas.append(ClickArea(back, partial(lesson.skip, -1), "back"))
         has_ended = lesson.state in (LessonState.ENDED, LessonState.CLOSING)
         self._draw_button(next_label, forward, is_primary=has_ended)
-        self.areas.append(ClickArea(forward, partial(lesson.skip, 1)))
+        self.areas.append(ClickArea(forward, partial(lesson.skip, 1), "next"))
 
     def _draw_button(self, label: str, box: pygame.Rect, *, is_primary: bool) -> None:
         """Draw a button; a primary one is filled with the accent color."""

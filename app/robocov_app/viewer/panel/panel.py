@@ -12,6 +12,7 @@ from pygame import Rect
 from robocov.controllers import get_controller_label, load_controller_class
 from robocov.errors import ParameterError
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
+from robocov_app.look.theme import Theme
 from robocov_app.render.dashes import cut_into_dashes
 from robocov_app.render.fonts import shorten_to_width
 from robocov_app.toolkit.commands.command import CommandTable
@@ -20,6 +21,7 @@ from robocov_app.toolkit.panel import CommandPanel, PanelButton, PanelPage
 from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box
 from robocov_app.toolkit.widgets.ui import Ui
+from robocov_app.toolkit.window.layout import PANEL_WIDTH_PX, Layout
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
 from robocov_app.viewer.explanation.sentences import ReportLine
@@ -69,6 +71,9 @@ _MAP_PX = (172, 0)  # menus of the map and of its starts
 # Label and number of robots, minus, plus, a gap, label and value of the seed, next seed.
 _ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
 _SLIDER_ROW_PX = 20
+_FINGER_SLIDER_ROW_PX = 30
+_FINGER_SCALE = 1.2
+"""Size of widgets on a phone, in sizes elsewhere."""
 _MARK_PX = 4  # bar next to the controller of the active pane
 _SAMPLE_PX = 24
 _SAMPLE_LINE_PX = 3.0
@@ -96,6 +101,8 @@ class ViewerPanel(CommandPanel):
         The window's commands.
     report : RobotReport or None
         Explanation of the selected robot.
+    is_in_sheet : bool
+        Whether the panel is below the handle of a sheet.
     """
 
     tabs = ("parameters", "show", "robot", "file")
@@ -113,7 +120,16 @@ class ViewerPanel(CommandPanel):
         self.viewer = viewer
         self.titles = layer_titles
         self.report: RobotReport | None = None
+        self.is_in_sheet = False
         self._age_s = 0.0  # time since the panel was drawn
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Adopt a layout and a theme; on a phone, widgets are larger, as far as the width allows."""
+        scale = layout.scale
+        if layout.is_compact and layout.has_panel:
+            scale = min(_FINGER_SCALE * scale, max(layout.panel.width / PANEL_WIDTH_PX, scale))
+        self.is_in_sheet = layout.handle.height > 0
+        super().arrange(layout._replace(scale=scale), theme)
 
     def list_pages(self) -> dict[str, PanelPage]:
         """Return the pages by the names of their tabs."""
@@ -151,7 +167,7 @@ class ViewerPanel(CommandPanel):
 
     def show_content(self, ui: Ui) -> None:
         """Show the settings that are always visible, and the page of the open tab."""
-        ui.inset(12, 8, 12)
+        ui.inset(12, 0 if self.is_in_sheet else 8, 12)
         self._show_environment(ui)
         self._show_controllers(ui)
         self.show_pages(ui, _TAB_TITLES)
@@ -285,7 +301,8 @@ class ViewerPanel(CommandPanel):
             self.viewer.attempt(lambda: self.viewer.comparison.set_parameter(name, parameter.parse(text)))
         if not parameter.is_unlimited:
             ui.label(unit, key=f"unit:{name}", style="unit")
-        ui.row(0, _RESET_PX, height=_SLIDER_ROW_PX, gap=_PARAMETER_GAP_PX, below=5)
+        slider_row = _FINGER_SLIDER_ROW_PX if self.viewer.view.is_compact else _SLIDER_ROW_PX
+        ui.row(0, _RESET_PX, height=slider_row, gap=_PARAMETER_GAP_PX, below=5)
         position = ui.slider(name, parameter.compute_position(), 0.0, 1.0, tip=_SLIDER_TIP)
         if position is not None:
             self._set(name, parameter.compute_value(position))

@@ -16,13 +16,12 @@ from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
-from robocov_app.toolkit.window.input import get_key_name
-from robocov_app.toolkit.window.layout import build_layout
-from robocov_app.toolkit.window.window import FPS
+from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, get_key_name, get_wheel_notches
+from robocov_app.toolkit.window.layout import Box, build_layout, is_inside, uses_sheet
+from robocov_app.toolkit.window.window import FPS, WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
-from robocov_app.viewer.canvas.map_picture import MapPictures
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.chart.chart_focus import ChartFocus
 from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_commands, list_viewer_commands
@@ -39,6 +38,7 @@ from robocov_app.viewer.window.dialogs import (
     build_file_dialog,
     build_recovery_offer,
 )
+from robocov_app.viewer.window.map_picture import MapPictures, PictureSources
 from robocov_app.viewer.window.menus import WindowMenus
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
@@ -59,6 +59,7 @@ class _FrameSettings(NamedTuple):
     size: tuple[int, int]
     scale: float
     has_panel: bool
+    is_compact: bool
     theme: str
 
 
@@ -174,10 +175,11 @@ class ViewerWindow(CommandWindow):
             show_robot_page=lambda: self.panel.show_tab("robot"),
         )
         self.pointer = ViewerPointer(viewer, targets, actions)
-        self.map_pictures = MapPictures(viewer, self.canvas, lambda: self._is_map_covered)
         self._cost_curves = CostCurves(viewer)
         self._runner = SessionRunner(viewer)
         self._status = StatusDisplay(viewer, self.lesson, self.hint, can_suggest=not is_unattended)
+        sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
+        self.map_pictures = MapPictures(viewer, sources, lambda: self._is_map_covered)
         self._inspector = RobotInspector(viewer, self.panel)
         self._layout_key: _LayoutKey | None = None  # of the current layout
         self._arrange()
@@ -219,7 +221,9 @@ class ViewerWindow(CommandWindow):
 
     def _list_focus_groups(self) -> list[FocusGroup]:
         """Return what Tab visits: top bar, tool rail, chips, panel and chart, as far as they are visible."""
-        groups: list[FocusGroup] = [self.top_bar.ui]
+        groups: list[FocusGroup] = []
+        if not self.top_bar.hidden:
+            groups.append(self.top_bar.ui)
         if not self.tool_rail.hidden:
             groups.append(self.tool_rail.ui)
         groups.append(self.layer_bar)
@@ -278,8 +282,49 @@ class ViewerWindow(CommandWindow):
 
     @property
     def _is_map_covered(self) -> bool:
-        """Whether a lesson, the help page or a dialog is shown."""
-        return self.lesson.shown is not None or self.is_help_open or self.dialogs.current is not None
+        """Whether the help page or a dialog is shown."""
+        return self.is_help_open or self.dialogs.current is not None
+
+    def set_compact(self, *, is_compact: bool) -> None:
+        """Leave the buttons of the bar and of the rail to the page of a phone, or show them again."""
+        self.viewer.view.is_compact = is_compact
+        self.viewer.revision += 1
+
+    @property
+    def controls(self) -> WindowControls:
+        """State that the buttons of a phone's page show."""
+        viewer = self.viewer
+        lesson = ""
+        if self.lesson.shown is not None:
+            lesson = "shown"
+        elif self.lesson.is_waiting:
+            lesson = "left"
+        pages = [part.ui for part in self.parts]
+        if self.dialogs.ui is not None and self.dialogs.is_open:
+            pages.append(self.dialogs.ui)
+        return WindowControls(
+            theme=viewer.view.theme,
+            is_compact=viewer.view.is_compact,
+            is_playing=viewer.session.playback.is_playing,
+            can_undo=self.top_bar.get_file().can_undo,
+            tool=viewer.tool.name,
+            lesson=lesson,
+            has_panel=viewer.view.has_panel,
+            is_typing=any(page.edit is not None for page in pages),
+            scroll_box=self._find_scroll_box(),
+        )
+
+    def _find_scroll_box(self) -> Box | None:
+        """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""
+        if self.dialogs.is_open or self.layer_bar.is_open:
+            return Box(0, 0, *self.screen.get_size())
+        if self.layout.has_panel:
+            return self.layout.panel
+        return None
+
+    def close_sheet(self) -> None:
+        """Close the panel of a narrow window, or leave the lesson in its place."""
+        self.do("panel" if self.lesson.shown is None else "tour")
 
     def reduce_motion(self, *, is_reduced: bool) -> None:
         """Adopt the setting of the user's system for reduced motion."""
@@ -355,19 +400,30 @@ class ViewerWindow(CommandWindow):
         before = self._layout_key
         low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
-        frame = _FrameSettings(size, self.scale, view.has_panel, view.theme)
+        has_panel = view.has_panel or self._has_lesson_sheet
+        frame = _FrameSettings(size, self.scale, has_panel, view.is_compact, view.theme)
         key = _LayoutKey(frame, panes, round(aspect, _ASPECT_DECIMALS))
         if key == before:
             return
         self._layout_key = key
         self.theme = get_theme(view.theme)
-        self.layout = build_layout(size, self.scale, panes, aspect, panel=view.has_panel)
+        self.layout = build_layout(
+            size, self.scale, panes, aspect, panel=has_panel, is_compact=view.is_compact
+        )
         self.canvas.arrange(self.layout, self.theme)
         self.chart.arrange(self.layout, self.theme)
         # The parts do not depend on the panes.
         if before is None or frame != before.frame:
             for part in self.parts:
                 part.arrange(self.layout, self.theme)
+
+    @property
+    def _has_lesson_sheet(self) -> bool:
+        """Whether a lesson is shown in a sheet, because the window is too small for a card over the map."""
+        if self.lesson.shown is None:
+            return False
+        is_compact = self.viewer.view.is_compact
+        return is_compact or uses_sheet(self.screen.get_size(), self.scale)
 
     def draw(self) -> None:
         """Draw all parts of the window, show the frame, and add it to the video."""
@@ -378,14 +434,17 @@ class ViewerWindow(CommandWindow):
         self.chart.draw(self.screen)
         self.chart_focus.draw(self.screen)
         facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, self.video_recorder.duration)
-        self._status.draw_status_line(self.screen, layout, self.theme, facts)
+        if layout.status.height:
+            self._status.draw_status_line(self.screen, layout, self.theme, facts)
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
+        self.sheet_handle.draw(self.screen, layout, self.theme)
         self._status.draw_message(self.screen, layout, self.theme)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
-        self.tool_rail.draw(self.screen)
-        self.top_bar.draw(self.screen)
+        if not layout.is_compact:
+            self.tool_rail.draw(self.screen)
+            self.top_bar.draw(self.screen)
         self.draw_above_map()
         self.video_recorder.add_frame(self.screen)
 
@@ -439,6 +498,10 @@ class ViewerWindow(CommandWindow):
         if event.type == pygame.MOUSEBUTTONDOWN:
             self.layer_bar.stop_typing()
             self.chart_focus.stop_typing()
+        if event.type == pygame.MOUSEWHEEL and is_inside(self.layout.panel, self.pointer.pixel):
+            distance = -SCROLL_PX_PER_NOTCH * self.layout.scale * get_wheel_notches(event)
+            if self.lesson.scroll(distance):
+                return
         is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
         if not (is_left_press and self.lesson.click(event.pos)):
             super().handle_mouse(event)

@@ -1,0 +1,191 @@
+"""The window without its buttons, drawn in the size of the screen of somebody who watches."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import pygame
+
+from robocov_app.look.theme import get_theme
+from robocov_app.toolkit.window.layout import build_layout, is_inside
+from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.chart.chart import Chart
+from robocov_app.viewer.lessons.guide import LessonGuide
+from robocov_app.viewer.lessons.page import ClickArea
+from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.window.status_display import StatusDisplay
+
+MAX_MAP_PICTURES = 8  # of different sizes that are kept
+_UNUSED_PIXEL = (1.0, 1.0)  # of the window, in the margin of its bar
+
+
+class _LayoutKey(NamedTuple):
+    """Everything on which the layout of the picture depends, to detect changes."""
+
+    size: tuple[int, int]
+    scale: float
+    theme: str
+    pane_count: int
+    bounds: tuple[float, float, float, float]
+    has_lesson: bool
+
+
+@dataclass(frozen=True)
+class PictureSources:
+    """Parts of the window that its pictures show.
+
+    Attributes
+    ----------
+    canvas : ViewerCanvas
+        The panes, whose section of the map the pictures show.
+    chart : Chart
+        The chart and the time slider.
+    lesson : LessonGuide
+        The lesson, if there is one.
+    status : StatusDisplay
+        The message above the map.
+    """
+
+    canvas: ViewerCanvas
+    chart: Chart
+    lesson: LessonGuide
+    status: StatusDisplay
+
+
+class MapPicture:
+    """Draws panes, chart, message and lesson of a window in another size, for somebody who watches.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    sources : PictureSources
+        Parts of the window that the picture shows.
+    """
+
+    def __init__(self, viewer: Presenter, sources: PictureSources) -> None:
+        self._viewer = viewer
+        self._sources = sources
+        self._canvas = ViewerCanvas(viewer, sources.canvas.theme, has_controls=False)
+        self._chart = Chart(viewer)
+        self._lesson_areas: list[ClickArea] = []
+        self._layout_key: _LayoutKey | None = None
+
+    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface:
+        """Draw the panes, the chart, the message and the lesson.
+
+        Parameters
+        ----------
+        size : (width, height), px
+        scale : float
+            Size of texts and symbols.
+
+        Returns
+        -------
+        pygame.Surface
+        """
+        self._arrange(size, scale)
+        theme = self._canvas.theme
+        layout = self._canvas.layout
+        surface = pygame.Surface(size, 0, 32)
+        surface.fill(theme.background)
+        window_canvas = self._sources.canvas
+        self._canvas.camera.follow(window_canvas.camera)
+        self._canvas.hovered = window_canvas.hovered
+        self._canvas.draw(surface)
+        self._chart.draw(surface)
+        self._lesson_areas = []
+        lesson = self._sources.lesson.shown
+        if lesson is not None:
+            self._lesson_areas, _, _ = draw_lesson_sheet(surface, layout, theme, lesson, None)
+        self._sources.status.draw_message(surface, layout, theme)
+        return surface
+
+    def find_window_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same as a pixel of the picture.
+
+        A point of the map that the window does not show becomes a pixel at the edge of its pane. A button of
+        the lesson becomes the same button of the window.
+        """
+        layout = self._canvas.layout
+        if is_inside(layout.panel, pixel) or is_inside(layout.handle, pixel):
+            return self._find_lesson_pixel(pixel)
+        if is_inside(layout.chart, pixel) or is_inside(layout.time_slider, pixel):
+            return self._find_time_pixel(pixel)
+        panes = self._sources.canvas.layout.panes
+        pane = min(self._canvas.find_pane(pixel) or 0, len(panes) - 1)
+        x, y = self._sources.canvas.to_pixel(self._canvas.to_world(pixel, pane), pane)
+        left, top, width, height = panes[pane]
+        return min(max(x, left), left + width - 1.0), min(max(y, top), top + height - 1.0)
+
+    def _find_lesson_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the center of the window's button that a button of the lesson in the picture stands for."""
+        pressed = [area.name for area in self._lesson_areas if area.box.collidepoint(pixel)]
+        for area in self._sources.lesson.click_areas:
+            if area.name in pressed:
+                x, y = area.box.center
+                return float(x), float(y)
+        return _UNUSED_PIXEL
+
+    def _find_time_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel on the time slider of the window with the time of a pixel of the picture."""
+        left, top, width, height = self._sources.chart.layout.time_slider
+        x = self._sources.chart.to_column(self._chart.to_time(pixel[0]))
+        return min(max(x, left), left + width - 1.0), top + 0.5 * height
+
+    def _arrange(self, size: tuple[int, int], scale: float) -> None:
+        """Lay out the picture if something has changed on which its layout depends."""
+        session = self._viewer.session
+        theme = self._viewer.view.theme
+        bounds = session.displayed.environment.region.bounds
+        has_lesson = self._sources.lesson.shown is not None
+        panes = len(session.timeline.panes)
+        key = _LayoutKey(size, scale, theme, panes, bounds, has_lesson)
+        if key == self._layout_key:
+            return
+        self._layout_key = key
+        low_x, low_y, high_x, high_y = bounds
+        aspect = (high_x - low_x) / (high_y - low_y)
+        layout = build_layout(size, scale, panes, aspect, panel=has_lesson, is_compact=True)
+        self._canvas.arrange(layout, get_theme(theme))
+        self._chart.arrange(layout, get_theme(theme))
+
+
+class MapPictures:
+    """Pictures of a window without its buttons in several sizes, for those who watch.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    sources : PictureSources
+        Parts of the window that the pictures show.
+    is_covered : callable
+        Returns whether something else is shown in front of the map.
+    """
+
+    def __init__(self, viewer: Presenter, sources: PictureSources, is_covered: Callable[[], bool]) -> None:
+        self._viewer = viewer
+        self._sources = sources
+        self._is_covered = is_covered
+        self._pictures: dict[tuple[int, int], MapPicture] = {}
+
+    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface | None:
+        """Draw the panes without the buttons; None while a page or a dialog is open. See `MapDrawing`."""
+        if self._is_covered():
+            return None
+        picture = self._pictures.get(size)
+        if picture is None:
+            if len(self._pictures) >= MAX_MAP_PICTURES:
+                self._pictures.clear()
+            picture = MapPicture(self._viewer, self._sources)
+            self._pictures[size] = picture
+        return picture.draw(size, scale)
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same as a pixel of the picture. See `MapDrawing`."""
+        picture = self._pictures.get(size)
+        if picture is None or self._is_covered():
+            return pixel
+        return picture.find_window_pixel(pixel)
