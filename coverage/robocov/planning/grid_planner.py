@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import count, pairwise
+from typing import NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -32,13 +33,24 @@ from robocov.planning.window import Window
 _MAX_ROUTE_ENDS = 12
 """Maximum number of nodes that are tried as the first node of a route, and as the last."""
 _MAX_CANDIDATES = 180
-"""Maximum number of nodes that may become goals of a team, in a small window."""
+"""Maximum number of nodes that may become goals of a team, in a small window, apart from narrow passages."""
 _NODES_PER_CANDIDATE = 9
 """Minimum number of nodes for each node that may become a goal, in a large window."""
+_MAX_CANDIDATE_DISTANCE_STEPS = 1.5
+"""Maximum distance of a node from the nearest node that may become a goal, in steps between these nodes."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose visible nodes are cached."""
 NO_NODE = -1
 """Index that stands for no node."""
+
+
+class TeamCandidates(NamedTuple):
+    """Nodes that may become goals of a team."""
+
+    nodes: IntArray
+    """(c,) Indices of the nodes."""
+    distances: Array
+    """(c, m) m, distances from these nodes to all nodes."""
 
 
 @dataclass(eq=False)
@@ -59,6 +71,7 @@ class GridPlanner(MapWindow):
 
     _distances_of_node: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
     _visible_nodes: dict[bytes, IntArray] = field(default_factory=dict, init=False, repr=False)
+    _team_candidates: dict[int, TeamCandidates] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def get_shared(cls, known_map: DiscoveredMap, window: Window, clearance: float) -> GridPlanner:
@@ -153,26 +166,58 @@ class GridPlanner(MapWindow):
             last_column=min(self.window.first_column + width, columns) - 1,
         )
 
-    @cached_property
-    def candidate_nodes(self) -> IntArray:
-        """Nodes that may become goals of a team, (c,): those with clearance in every k-th row and column.
+    def choose_candidates(self, is_usable: BoolArray) -> IntArray:
+        """Choose the nodes that may become goals of a team, spread over the usable nodes.
 
-        The step k is the smallest one for which there are not too many; see `_MAX_CANDIDATES`.
+        Parameters
+        ----------
+        is_usable : (m,) bool array
+            Whether each node may become a goal. All of these nodes have clearance.
+
+        Returns
+        -------
+        (c,) int array
+            The usable nodes in every k-th row and column, where k is the smallest step for which there are
+            not more than the limit; see `_MAX_CANDIDATES`. In narrow passages, which these rows and columns
+            may miss, there are further ones, so that no usable node is far from all candidates.
         """
         max_candidates = max(_MAX_CANDIDATES, len(self.nodes) // _NODES_PER_CANDIDATE)
         rows, columns = np.divmod(np.arange(len(self.nodes)), self.window.columns)
         for k in count(1):
             # One node in the middle of each block of k rows and k columns.
             is_middle = (rows % k == k // 2) & (columns % k == k // 2)
-            candidates = np.flatnonzero(self.has_clearance & is_middle)
+            candidates = np.flatnonzero(is_usable & is_middle)
             if len(candidates) <= max_candidates:
                 break
-        return candidates
+        max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * k * self.spacing
+        distances = self._search(candidates, np.zeros(len(candidates)))
+        while True:
+            farthest = int(np.where(is_usable, distances, 0.0).argmax())
+            if not (is_usable[farthest] and distances[farthest] > max_distance):
+                return candidates
+            candidates = np.append(candidates, farthest)
+            distances = np.minimum(distances, self.get_distances(farthest))
 
-    @cached_property
-    def candidate_distances(self) -> Array:
-        """Distances from the candidate nodes to all nodes, (c, m) m."""
-        return self.compute_distance_table(self.candidate_nodes)
+    def get_team_candidates(self, node: int) -> TeamCandidates:
+        """Return the nodes that may become goals of a team whose robots can reach a node.
+
+        Parameters
+        ----------
+        node : int
+            A node with clearance.
+
+        Returns
+        -------
+        TeamCandidates
+        """
+        is_usable = np.isfinite(self.get_distances(node)) & self.has_clearance
+        # Nodes with clearance that are connected have the same usable nodes, and no two connected components
+        # have the same first one.
+        first_node = int(is_usable.argmax())
+        if first_node not in self._team_candidates:
+            nodes = self.choose_candidates(is_usable)
+            self._team_candidates[first_node] = TeamCandidates(nodes, self.compute_distance_table(nodes))
+        return self._team_candidates[first_node]
 
     def get_distances(self, node: int) -> Array:
         """Return the distances from a node to all nodes.
@@ -243,6 +288,26 @@ class GridPlanner(MapWindow):
             first_nodes.append(visible)
             lengths.append(compute_point_distances(self.nodes[visible], position))
         return self._search(np.concatenate(first_nodes), np.concatenate(lengths))
+
+    def look_up_distances(self, position: Array, table: Array) -> Array:
+        """Return the distances from a position to some nodes, whose distances to all nodes are known.
+
+        This takes less time than a search from the position.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+        table : (k, m) array, m
+            Distances from each of k nodes with clearance to all nodes; see `compute_distance_table`.
+
+        Returns
+        -------
+        (k,) array, m
+            Infinite for nodes that cannot be reached.
+        """
+        visible = self._find_visible_nodes(position)
+        offsets = compute_point_distances(self.nodes[visible], position)
+        return np.asarray((table[:, visible] + offsets).min(axis=1, initial=np.inf))
 
     def _search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
         """Compute the distance from each node to the nearest of `nodes`, at which paths have offsets, m."""

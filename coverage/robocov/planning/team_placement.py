@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.density import Density
 from robocov.k_median import improve_sources, move_first_source
 from robocov.planning.grid_planner import NO_NODE, GridPlanner
@@ -109,39 +109,58 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     if own_node == NO_NODE:
         return team.previous_goals
     # Candidates are the nodes that may become goals, and targets the nodes that count in the cost.
-    is_reachable = np.isfinite(planner.get_distances(own_node))
-    is_usable = is_reachable[planner.candidate_nodes]
-    candidates = planner.candidate_nodes[is_usable]
-    is_target = is_reachable & (weights > 0.0)
+    candidates, distances = planner.get_team_candidates(own_node)
+    is_target = np.isfinite(planner.get_distances(own_node)) & (weights > 0.0)
     if len(candidates) < len(team.positions) or not is_target.any():
         return team.previous_goals
-    distances = planner.candidate_distances[is_usable]
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
     # Entry (q, c) of the table is the weighted distance from target q to candidate c. The last column stands
     # for all robots outside the plan: it contains the weighted distance to the nearest of them.
     target_distances = np.vstack([distances[:, is_target], other_distances[is_target]])
     table = np.ascontiguousarray((target_distances * weights[is_target]).T)
 
-    chosen = _choose_previous_candidates(planner.nodes[candidates], team)
+    chosen = _choose_previous_candidates(planner, candidates, distances, team)
     chosen = _improve_goals(table, chosen, team, min_savings.relocation)
     if team.is_fixed[1:].all():
         # Distances from each candidate to the goal of each robot, and to the nearest robot outside the plan.
         goal_distances = np.column_stack([distances[:, candidates[chosen]], other_distances[candidates]])
         is_in_own_cell = goal_distances.argmin(axis=1) == 0
         chosen = _move_first_goal(table, chosen, is_in_own_cell, min_savings.own_cell)
-    return _assign_goals(
-        planner.nodes[candidates], distances[:, candidates[chosen]], chosen, team, min_savings.swap
+    mobile = np.flatnonzero(~team.is_fixed)
+    path_lengths = np.array(
+        [planner.look_up_distances(team.positions[robot], distances[chosen[mobile]]) for robot in mobile]
     )
+    assignment = _assign_goals(path_lengths, min_savings.swap)
+    goals = team.previous_goals.copy()
+    goals[mobile] = planner.nodes[candidates[chosen[mobile[assignment]]]]
+    return goals
 
 
-def _choose_previous_candidates(candidate_positions: Array, team: TeamSituation) -> IntArray:
-    """Return the candidate nearest to each previous goal, (k,), all different; fixed robots choose first."""
+def _choose_previous_candidates(
+    planner: GridPlanner, candidates: IntArray, distances: Array, team: TeamSituation
+) -> IntArray:
+    """Return the candidate closest to each previous goal, (k,), all different; fixed robots choose first.
+
+    Parameters
+    ----------
+    planner : GridPlanner
+    candidates : (c,) int array
+        Nodes of the candidates.
+    distances : (c, m) array, m
+        Distances from the candidates to all nodes.
+    team : TeamSituation
+    """
     chosen = np.empty(len(team.positions), dtype=np.intp)
-    is_taken = np.zeros(len(candidate_positions), dtype=bool)
+    is_taken = np.zeros(len(candidates), dtype=bool)
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
-        squared_distances = ((candidate_positions - team.previous_goals[robot]) ** 2).sum(axis=1)
-        squared_distances[is_taken] = np.inf
-        chosen[robot] = squared_distances.argmin()
+        goal = team.previous_goals[robot]
+        goal_distances = planner.look_up_distances(goal, distances)
+        # Straight distances decide between candidates to which there is no path.
+        straight_distances = compute_point_distances(planner.nodes[candidates], goal)
+        is_reachable = np.isfinite(goal_distances)
+        goal_distances = np.where(is_reachable, goal_distances, UNREACHABLE_M + straight_distances)
+        goal_distances[is_taken] = np.inf
+        chosen[robot] = goal_distances.argmin()
         is_taken[chosen[robot]] = True
     return chosen
 
@@ -204,45 +223,27 @@ def _move_first_goal(
     return moved_columns[:-1]
 
 
-def _assign_goals(
-    candidate_positions: Array, distances: Array, chosen: IntArray, team: TeamSituation, min_saving: float
-) -> Array:
-    """Assign the chosen candidates to robots as goals, so that the sum of squared path lengths is minimal.
+def _assign_goals(path_lengths: Array, min_saving: float) -> IntArray:
+    """Assign goals to robots so that the sum of squared path lengths is minimal.
 
     Parameters
     ----------
-    candidate_positions : (c, 2) array, m
-    distances : (c, k) array, m
-        Distances from all candidates to the chosen ones.
-    chosen : (k,) int array
-        The candidate chosen for each robot. Fixed robots keep their previous goals; the other robots may
-        exchange theirs.
-    team : TeamSituation
+    path_lengths : (k, k) array, m
+        Entry (i, j) is the length of the path from robot i to the goal that was chosen for robot j.
     min_saving : float
         Fraction of the sum that an exchange of goals must save; otherwise, no goals are exchanged.
 
     Returns
     -------
-    (k, 2) array, m
-        The goal of each robot.
+    (k,) int array
+        For each robot, the index of its goal.
     """
-    # Row i of `squared_lengths` belongs to mobile robot i, and column j to the goal now chosen for mobile
-    # robot j.
-    mobile = np.flatnonzero(~team.is_fixed)
-    starts = [_find_nearest(candidate_positions, team.positions[robot]) for robot in mobile]
-    squared_lengths = np.minimum(distances[starts][:, mobile] ** 2, _MAX_SQUARED_LENGTH_M2)
+    unchanged = np.arange(len(path_lengths))
+    squared_lengths = np.minimum(path_lengths**2, _MAX_SQUARED_LENGTH_M2)
     _, assignment = scipy.optimize.linear_sum_assignment(squared_lengths)
-    unchanged = np.arange(len(mobile))
     if min_saving:
         assigned_sum = squared_lengths[unchanged, assignment].sum()
         unchanged_sum = squared_lengths[unchanged, unchanged].sum()
         if assigned_sum > (1.0 - min_saving) * unchanged_sum:
-            assignment = unchanged
-    goals = team.previous_goals.copy()
-    goals[mobile] = candidate_positions[chosen[mobile[assignment]]]
-    return goals
-
-
-def _find_nearest(points: Array, position: Array) -> int:
-    """Return the index of the point nearest to a position."""
-    return int(((points - position) ** 2).sum(axis=1).argmin())
+            return unchanged
+    return np.asarray(assignment, dtype=np.intp)

@@ -184,3 +184,39 @@ def test_routes_through_unknown_cells_count_as_longer() -> None:
     ratio = after[is_across] / before[is_across]
     assert (ratio > 1.0 + 0.3 * unknown_fraction).all()
     assert (ratio < 1.0 + 0.5 * unknown_fraction).all()
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 1000), max_nodes=st.sampled_from([150, 600, 2400]))
+def test_no_usable_node_is_far_from_all_candidates(seed: int, max_nodes: int) -> None:
+    planner = build_planner(build_random_blocks(seed), max_nodes=max_nodes)
+    is_usable = planner.has_clearance & (planner.nodes[:, 0] < 5.0)
+    candidates = planner.choose_candidates(is_usable)
+    assert is_usable[candidates].all()
+    assert len(set(candidates.tolist())) == len(candidates)
+    step = 1
+    while len(planner.nodes) / step**2 > max(180, len(planner.nodes) // 9):
+        step += 1
+    distances = planner.compute_distance_table(candidates).min(axis=0)
+    assert distances[is_usable].max() <= 1.5 * step * planner.spacing
+
+
+def test_candidates_are_in_every_second_row_and_column_of_open_space() -> None:
+    planner = build_planner(np.zeros(RASTER.shape, dtype=bool), clearance=0.0, max_nodes=600)
+    candidates = planner.choose_candidates(planner.has_clearance)
+    rows, columns = np.divmod(candidates, planner.window.columns)
+    assert set((rows % 2).tolist()) == set((columns % 2).tolist()) == {1}
+    assert len(candidates) == (planner.window.rows // 2) * (planner.window.columns // 2)
+
+
+def test_team_candidates_are_those_of_the_robots_own_component() -> None:
+    is_blocked = build_wall_with_door(slice(0, 0))
+    planner = build_planner(is_blocked)
+    left = planner.find_nearest_node(np.array([1.0, 2.0]))
+    right = planner.find_nearest_node(np.array([5.0, 2.0]))
+    for node, is_left in ((left, True), (right, False), (left, True)):
+        candidates = planner.get_team_candidates(node)
+        assert ((planner.nodes[candidates.nodes, 0] < 3.0) == is_left).all()
+        np.testing.assert_array_equal(
+            candidates.distances[:, node], planner.get_distances(node)[candidates.nodes]
+        )

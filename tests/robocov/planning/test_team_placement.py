@@ -6,11 +6,15 @@ import numpy as np
 from planning_cases import HALVES, RASTER, WINDOW, build_map, build_planner
 
 from robocov.density import Gaussian, Gaussians
+from robocov.observation.region import Region
+from robocov.planning import team_placement
 from robocov.planning.discovered_map import FREE, WALL, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.own_goal import find_own_goal
+from robocov.planning.raster import Raster
 from robocov.planning.team_placement import MinSavings, TeamSituation, compute_node_weights, place_team
 from robocov.planning.viewpoint import find_viewpoint
+from robocov.planning.window import Window
 
 NO_POSITIONS = np.empty((0, 2))
 
@@ -102,7 +106,7 @@ def test_goals_are_exchanged_only_if_that_saves_enough() -> None:
     assert left < right
     # Each robot is past the middle: 2.4 m from its own goal, 1.6 m from the other one.
     middle = 0.5 * (left + right)
-    positions = np.array([[middle + 0.3, 2.0], [middle - 0.3, 2.0]])
+    positions = np.array([[middle + 0.4, 2.25], [middle - 0.4, 2.25]])
     team = TeamSituation(positions, goals, nobody, NO_POSITIONS)
     for min_saving, is_exchanged in ((0.0, True), (0.5, True), (0.6, False)):
         new_goals = place_team(planner, weights, team, MinSavings(1.0, 1.0, swap=min_saving))
@@ -173,3 +177,53 @@ def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
         assert find_own_goal(planner, weights, others, own.node, far, 1.0).goal.tolist() == own.goal.tolist()
         close = node + 0.9 * np.array(shift)
         assert find_own_goal(planner, weights, others, own.node, close, 1.0).goal.tolist() == close.tolist()
+
+
+def test_a_team_spreads_over_narrow_tunnels() -> None:
+    """The tunnels are so narrow that few of them lead through the middle of a block of candidates."""
+    region = Region(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 24.0], [0.0, 24.0]]))
+    raster = Raster(region, 0.1)
+    state = np.full(raster.shape, FREE, dtype=np.uint8)
+    for row in (12, 120):
+        for column in (12, 140, 270):
+            state[row : row + 108 - 12 * (row == 12), column : column + 118] = WALL
+    window = Window.build_around(raster, np.array([20.0, 12.0]), math.inf, 1000)
+    planner = GridPlanner(DiscoveredMap(raster, state), window, 0.13)
+    crowd = np.column_stack([np.linspace(2.0, 8.0, 6), np.full(6, 0.5)])
+    by_hand = np.array([[1.5, 11.5], [13.5, 1.5], [13.5, 22.5], [26.5, 10.5], [27.5, 23.5], [39.5, 10.5]])
+    goals = place_at_rest(planner, crowd)
+    assert compute_cost(planner, goals) < 1.03 * compute_cost(planner, by_hand)
+
+
+WALL_BESIDE_CANDIDATES = (slice(0, 28), slice(44, 45))
+"""A wall like `HALVES`, but just to the left of a column of candidates for goals."""
+
+
+def test_goals_are_assigned_by_the_lengths_of_paths() -> None:
+    planner = build_planner(WALL_BESIDE_CANDIDATES)
+    left, right = np.array([[2.0, 2.0], [6.0, 2.0]])
+    # The candidate nearest to the first robot is behind the wall. The second robot is close to the passage.
+    positions = np.array([[4.35, 0.5], [3.6, 2.6]])
+    for goals in (np.array([left, right]), np.array([right, left])):
+        team = TeamSituation(positions, goals, np.zeros(2, dtype=bool), NO_POSITIONS)
+        new_goals = place_team(planner, compute_node_weights(planner), team, MinSavings(1.0, 1.0))
+        assert new_goals[0, 0] < 4.4 < new_goals[1, 0]
+
+
+def test_the_candidate_closest_to_a_previous_goal_is_on_the_same_side_of_a_wall() -> None:
+    planner = build_planner(WALL_BESIDE_CANDIDATES)
+    goals = np.array([[4.35, 0.7], [4.8, 0.7]])
+    team = TeamSituation(goals, goals, np.zeros(2, dtype=bool), NO_POSITIONS)
+    candidates, distances = planner.get_team_candidates(planner.find_own_node(goals[0]))
+    chosen = team_placement._choose_previous_candidates(planner, candidates, distances, team)
+    left, right = planner.nodes[candidates[chosen]]
+    assert left[0] < 4.4 < right[0]
+
+
+def test_distances_that_are_looked_up_are_those_of_a_search() -> None:
+    planner = build_planner(HALVES)
+    nodes = planner.choose_candidates(planner.has_clearance)
+    table = planner.compute_distance_table(nodes)
+    for position in np.random.default_rng(0).uniform([0.2, 0.2], [3.8, 3.8], (20, 2)):
+        searched = planner.compute_distances_from(position[None])[nodes]
+        np.testing.assert_allclose(planner.look_up_distances(position, table), searched, atol=1e-12)

@@ -164,7 +164,7 @@ class FrontierMedian(SharedMapController):
     def _compute_median(self, situation: Situation) -> Array:
         """Return the final goals of all robots, (k, 2) m."""
         weights = situation.compute_weights(situation.known_map.state == FREE)
-        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.candidate_nodes)
+        candidates = Candidates.build_for_team(situation, weights)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return situation.positions

@@ -56,7 +56,7 @@ class GreedySubmodular(SharedMapController):
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute the greedy placement, or the previous one if that is about as good, after descent."""
         weights = situation.compute_weights(~situation.known_map.is_blocked)
-        candidates = Candidates.build_at_nodes(situation, weights, situation.planner.candidate_nodes)
+        candidates = Candidates.build_for_team(situation, weights)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)

@@ -143,6 +143,24 @@ class Candidates(NamedTuple):
         table = (np.minimum(distances, UNREACHABLE_M) * weights[targets]).T
         return cls(positions=situation.planner.nodes[nodes], table=np.ascontiguousarray(table))
 
+    @classmethod
+    def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
+        """Build candidates that are spread evenly over the nodes that robots can reach.
+
+        Parameters
+        ----------
+        situation : Situation
+        weights : (m,) array
+            Weights of all nodes, from `Situation.compute_weights`.
+
+        Returns
+        -------
+        Candidates
+        """
+        planner = situation.planner
+        nodes = planner.choose_candidates(planner.has_clearance & (weights > 0.0))
+        return cls.build_at_nodes(situation, weights, nodes)
+
     def compute_cost(self, chosen: IntArray) -> float:
         """Compute the coverage cost with a robot at each of the chosen candidates, (k,)."""
         return float(self.table[:, chosen].min(axis=1).sum())
