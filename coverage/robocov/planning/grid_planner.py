@@ -336,8 +336,8 @@ class GridPlanner(MapWindow):
         squared_distances = ((self.nodes - position) ** 2).sum(axis=1)
         return int(np.where(self.has_clearance, squared_distances, np.inf).argmin())
 
-    def find_own_node(self, position: Array) -> int:
-        """Find the node that represents the position of a robot: the nearest one with clearance in its sight.
+    def find_visible_node(self, position: Array) -> int:
+        """Find the nearest node with clearance that is in sight of a position.
 
         Parameters
         ----------

@@ -128,7 +128,7 @@ def test_a_route_leads_through_the_door() -> None:
 def test_a_crack_is_no_passage(door: slice, is_passage: bool) -> None:
     """No robot fits through some holes, for example in a wall that has not been seen completely."""
     planner = build_planner(build_wall_with_door(door), max_nodes=600)
-    node = planner.find_own_node(np.array([1.0, 1.0]))
+    node = planner.find_visible_node(np.array([1.0, 1.0]))
     is_beyond = planner.nodes[:, 0] > 3.5
     assert np.isfinite(planner.get_distances(node)[is_beyond & planner.has_clearance]).any() == is_passage
     last = planner.find_route(np.array([1.0, 1.0]), np.array([5.0, 1.0]))[-1]
@@ -220,3 +220,11 @@ def test_team_candidates_are_those_of_the_robots_own_component() -> None:
         np.testing.assert_array_equal(
             candidates.distances[:, node], planner.get_distances(node)[candidates.nodes]
         )
+
+
+def test_a_visible_node_is_not_behind_a_wall() -> None:
+    planner = build_planner(build_wall_with_door(), max_nodes=40)
+    position = np.array([2.88, 1.0])
+    nearest = planner.nodes[planner.find_nearest_node(position)]
+    visible = planner.nodes[planner.find_visible_node(position)]
+    assert visible[0] < 2.9 < 3.1 < nearest[0]

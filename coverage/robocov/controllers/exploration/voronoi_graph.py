@@ -139,7 +139,7 @@ def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
     is_near_wall = window.crop(planner.is_near_wall[:row_count, :column_count], fill=True)
     has_clearance = ~is_near_wall.reshape(window.block_shape).any(axis=(1, 3))
     labels, _ = ndimage.label(has_clearance, np.ones((3, 3)))
-    own_nodes = [planner.find_own_node(position) for position in situation.positions]
+    own_nodes = [planner.find_visible_node(position) for position in situation.positions]
     rows, columns = raster.find_cells(planner.nodes[own_nodes])
     own_labels = labels[rows // window.stride, columns // window.stride]
     return np.asarray(has_clearance & np.isin(labels, own_labels) & (labels > 0))
