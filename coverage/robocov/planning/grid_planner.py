@@ -166,6 +166,30 @@ class GridPlanner(MapWindow):
             last_column=min(self.window.first_column + width, columns) - 1,
         )
 
+    def choose_regular_nodes(self, is_usable: BoolArray) -> tuple[IntArray, int]:
+        """Choose the usable nodes in every k-th row and column of the lattice.
+
+        Parameters
+        ----------
+        is_usable : (m,) bool array
+            Whether each node may be chosen.
+
+        Returns
+        -------
+        nodes : (c,) int array
+        k : int
+            The smallest step for which there are not too many nodes; see `_MAX_CANDIDATES`.
+        """
+        max_candidates = max(_MAX_CANDIDATES, len(self.nodes) // _NODES_PER_CANDIDATE)
+        rows, columns = np.divmod(np.arange(len(self.nodes)), self.window.columns)
+        for k in count(1):
+            # One node in the middle of each block of k rows and k columns.
+            is_middle = (rows % k == k // 2) & (columns % k == k // 2)
+            nodes = np.flatnonzero(is_usable & is_middle)
+            if len(nodes) <= max_candidates:
+                break
+        return nodes, k
+
     def choose_candidates(self, is_usable: BoolArray) -> IntArray:
         """Choose the nodes that may become goals of a team, spread over the usable nodes.
 
@@ -177,19 +201,11 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (c,) int array
-            The usable nodes in every k-th row and column, where k is the smallest step for which there are
-            not more than the limit; see `_MAX_CANDIDATES`. In narrow passages, which these rows and columns
-            may miss, there are further ones, so that no usable node is far from all candidates.
+            The nodes from `choose_regular_nodes` and, in narrow passages, which the rows and columns of these
+            nodes may miss, further ones, so that no usable node is far from all candidates.
         """
-        max_candidates = max(_MAX_CANDIDATES, len(self.nodes) // _NODES_PER_CANDIDATE)
-        rows, columns = np.divmod(np.arange(len(self.nodes)), self.window.columns)
-        for k in count(1):
-            # One node in the middle of each block of k rows and k columns.
-            is_middle = (rows % k == k // 2) & (columns % k == k // 2)
-            candidates = np.flatnonzero(is_usable & is_middle)
-            if len(candidates) <= max_candidates:
-                break
-        max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * k * self.spacing
+        candidates, step = self.choose_regular_nodes(is_usable)
+        max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * step * self.spacing
         distances = self._search(candidates, np.zeros(len(candidates)))
         while True:
             farthest = int(np.where(is_usable, distances, 0.0).argmax())

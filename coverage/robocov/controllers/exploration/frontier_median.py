@@ -128,9 +128,11 @@ class FrontierMedian(SharedMapController):
     def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
         """Return the path length from each robot to each target, (k, t) m; infinite without a path."""
         planner = situation.planner
-        if not len(targets) or not planner.has_clearance.any():
+        clear_nodes = np.flatnonzero(planner.has_clearance)
+        if not len(targets) or not len(clear_nodes):
             return np.full((len(situation.positions), len(targets)), np.inf)
-        target_nodes = [planner.find_visible_node(target) for target in targets]
+        squared_distances = ((targets[:, None] - planner.nodes[clear_nodes]) ** 2).sum(axis=2)
+        target_nodes = clear_nodes[squared_distances.argmin(axis=1)]
         return np.array(
             [planner.compute_distances_from(position[None])[target_nodes] for position in situation.positions]
         )

@@ -145,7 +145,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
-        """Build candidates that are spread evenly over the nodes that robots can reach.
+        """Build candidates on a regular lattice, at the nodes that robots can reach.
 
         Parameters
         ----------
@@ -157,8 +157,7 @@ class Candidates(NamedTuple):
         -------
         Candidates
         """
-        planner = situation.planner
-        nodes = planner.choose_candidates(planner.has_clearance & (weights > 0.0))
+        nodes, _ = situation.planner.choose_regular_nodes(situation.planner.has_clearance)
         return cls.build_at_nodes(situation, weights, nodes)
 
     def compute_cost(self, chosen: IntArray) -> float:
