@@ -278,6 +278,28 @@ def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, th
     return np.concatenate([[best], sources[1:]])
 
 
+@kernel
+def compute_costs_with_column(table: Array, distances: Array) -> Array:
+    """Compute, for each column, the cost of given sources and the column together.
+
+    Parameters
+    ----------
+    table : (m, c) array
+        Distances from targets to possible sources.
+    distances : (m,) array
+        Distance from each target to the nearest of the given sources; inf if there are none.
+
+    Returns
+    -------
+    (c,) array
+    """
+    costs = np.zeros(table.shape[1])
+    for t in range(len(table)):
+        for column in range(table.shape[1]):
+            costs[column] += min(table[t, column], distances[t])
+    return costs
+
+
 def rebuild_sources(table: Array, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
     """Replace two or three sources at the same time.
 

@@ -1,0 +1,92 @@
+"""Exemplar-based clustering of the known map: robots are placed greedily, and sent to their goals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from robocov.arrays import IntArray
+from robocov.controllers.known_placement import KnownTeam, PlacementController, PlacementMap
+from robocov.k_median import compute_costs_with_column
+
+
+@dataclass(frozen=True)
+class Exemplar(PlacementController):
+    """Greedy choice of exemplars on the known map (after NavEX: Ghimire, Nieto-Granda and Kia 2025).
+
+    Goals are chosen one after another among the points of a square lattice, each so that the mean geodesic
+    distance from all points to the nearest goal becomes as low as possible. Points are weighted by the
+    density of the map. There is no descent afterwards. The robots are then sent to the goals along shortest
+    paths.
+
+    Notes
+    -----
+    D. Ghimire, C. Nieto-Granda and S. S. Kia, "NavEX: A Multi-Agent Coverage in Non-Convex and Uneven
+    Environments via Exemplar-Clustering" (arXiv 2504.21113). With L(S) the mean distance from all points to
+    the nearest element of S, the utility of a set of exemplars S is
+
+        f(S) = L({s0}) - L(S ∪ {s0}),
+
+    where s0 is a phantom exemplar, farther from every point than any real one. The utility is monotone and
+    submodular for any measure of distance. The greedy choice therefore gains at least 1 - 1/e of the maximum
+    (Nemhauser, Wolsey and Fisher 1978); or 1/2 if the free space has several components, each of which gets
+    as many exemplars as it has robots. The bound is one of f, not of the coverage cost L(S).
+
+    Each robot computes the exemplars for the robots that it knows of; see `PlacementController`.
+
+    The implementation is based on the abstract of the paper, a summary of its method and general knowledge of
+    exemplar-based clustering, not on the full text. The paper's distances are those of a visibility graph,
+    which are the geodesic distances that are used here. It also covers uneven terrain, which robocov lacks.
+    """
+
+    name = "exemplar"
+    label = "Exemplar clustering"
+    summary = "greedy exemplars of the known map, without descent (after Ghimire et al. 2025, NavEX)"
+
+    def choose_candidates(self, placement_map: PlacementMap, known_team: KnownTeam) -> IntArray:
+        """Choose as many exemplars in each component of the configuration space as robots are there."""
+        robot_counts = np.bincount(known_team.components)
+        return _choose_cached_exemplars(placement_map, tuple(robot_counts.tolist()))
+
+
+def choose_exemplars(placement_map: PlacementMap, robot_counts: IntArray) -> IntArray:
+    """Choose candidates one after another, each so that the cost becomes as low as possible.
+
+    Parameters
+    ----------
+    placement_map : PlacementMap
+    robot_counts : (p,) int array
+        Number of robots in each component of the configuration space, up to the last one with a robot.
+
+    Returns
+    -------
+    (q,) int array
+        The chosen candidates in the order of their choice. There are fewer than robots if a component has
+        too few.
+    """
+    components = placement_map.components
+    remaining_counts = np.zeros(max(len(robot_counts), components.max(initial=-1) + 1), dtype=np.intp)
+    remaining_counts[: len(robot_counts)] = robot_counts
+    is_taken = np.zeros(len(components), dtype=bool)
+    distances = np.full(len(placement_map.table), np.inf)
+    chosen: list[int] = []
+    while True:
+        is_usable = ~is_taken & (remaining_counts[components] > 0)
+        if not is_usable.any():
+            return np.array(chosen, dtype=np.intp)
+        costs = compute_costs_with_column(placement_map.table, distances)
+        best = int(np.where(is_usable, costs, np.inf).argmin())
+        chosen.append(best)
+        is_taken[best] = True
+        remaining_counts[components[best]] -= 1
+        distances = np.minimum(distances, placement_map.table[:, best])
+
+
+@lru_cache(maxsize=256)
+def _choose_cached_exemplars(placement_map: PlacementMap, robot_counts: tuple[int, ...]) -> IntArray:
+    """Return the result of `choose_exemplars`. Several robots and plans need the same exemplars."""
+    chosen = choose_exemplars(placement_map, np.array(robot_counts, dtype=np.intp))
+    chosen.setflags(write=False)
+    return chosen
