@@ -23,7 +23,7 @@ def test_each_controller_states_its_information() -> None:
     information = {name: get_information(kind) for name, kind in CONTROLLERS.items()}
     whole_map = {name for name, stated in information.items() if stated == "whole map"}
     shared_map = {name for name, stated in information.items() if stated == "shared map"}
-    assert whole_map == {"geodesic-lloyd", "diffeomorphism"}
+    assert whole_map == {"geodesic-lloyd", "diffeomorphism", "local-search", "exemplar"}
     assert shared_map == {
         "adaptive",
         "atlas-shared",

@@ -52,6 +52,8 @@ SHARING = ("frontier-median", "greedy-submodular", "voronoi-graph")
 COARSE = {
     "geodesic-lloyd": {"lattice": 8.0},
     "diffeomorphism": {"lattice": 8.0},
+    "local-search": {"nodes": 100.0},
+    "exemplar": {"nodes": 100.0},
     "adaptive": {"basis": 3.0},
     **{name: {"nodes": 100.0, "period": 0.4} for name in SHARING},
 }
