@@ -5,8 +5,6 @@ Lengths are in meters. Coordinates are rounded to centimeters, so that they are 
 
 import itertools
 from collections.abc import Callable
-from contextlib import suppress
-from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -14,36 +12,30 @@ import shapely
 from robocov.arrays import Array
 from robocov.environment import (
     CircleObstacle,
-    DiscStart,
     Environment,
     Obstacle,
     ObstaclePath,
     PolygonObstacle,
-    Ring,
     WallObstacle,
 )
-from robocov.errors import MapError, ParameterError
-from robocov.mapfile import from_json, to_json
+from robocov_app.benchmark.plan_search import search_map
+from robocov_app.benchmark.plan_shapes import (
+    INNER_WALL_M,
+    FloorPlan,
+    build_block,
+    build_box,
+    build_rotated_block,
+    build_wall_with_door,
+    round_points,
+)
 
-FloorPlan: TypeAlias = tuple[Ring, list[Obstacle]]
-"""Boundary and obstacles of a map."""
 _SEED_ORDER = ("homes", "offices", "plants", "traffic", "yards")
 """Kinds in the order that determines their seeds; append new kinds, so that other seeds do not change."""
-_MAX_ATTEMPTS = 400
-"""Maximum number of plans that are drawn for a map."""
-_MIN_PASSAGE_M = 0.6
-"""Minimum width of the passages that connect the free space."""
-_INNER_WALL_M = 0.12
-"""Thickness of inner walls."""
-_HALF_WALL_M = _INNER_WALL_M / 2.0
+_HALF_WALL_M = INNER_WALL_M / 2.0
 _START_RADIUS_M = 0.6
 """Radius of the start disc."""
-_START_MARGIN_M = 0.01
-"""Distance of the start disc from walls, so that the disc is still free when its center has been rounded."""
 _MIN_BLOCKED_FRACTION = 0.04
 """Minimum area of the obstacles divided by the area of the map."""
-_MIN_WALL_PIECE_M = 0.15
-"""Minimum length of a wall next to a door; shorter walls are left out."""
 
 # Floor plans are frozen: a different number gives different maps. Sizes that vary are in the functions.
 _HOME_DOOR_MARGIN_M = 0.8
@@ -88,7 +80,7 @@ _AISLES_Y_M = (5.7, 9.6, 1.5)
 def build_floor_plan(kind: str, seed: int) -> Environment:
     """Build a random map of a kind.
 
-    Plans are drawn until one has enough obstacles, and a free space that is connected by wide passages.
+    Plans are drawn until one is suitable, as in `search_map`.
 
     Parameters
     ----------
@@ -107,96 +99,18 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
     ParameterError
         If no plan with this seed is suitable.
     """
-    for attempt in range(_MAX_ATTEMPTS):
-        rng = np.random.default_rng([_SEED_ORDER.index(kind), seed, attempt])
-        boundary, obstacles = FLOOR_PLANS[kind](rng)
-        plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
-        if not _is_connected(plan) or not _has_enough_obstacles(plan):
-            continue
-        start = _find_entry(plan)
-        if start is None:
-            continue
-        document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": start}))
-        # Reading the plan as a map file checks it. If it is not a valid map, another plan is drawn.
-        with suppress(MapError):
-            return from_json(document, plan.name)
-    raise ParameterError(
-        f"map {kind}-{seed}: no plan of {_MAX_ATTEMPTS} is in one piece; expected another seed"
+    return search_map(
+        kind,
+        seed,
+        kind_number=_SEED_ORDER.index(kind),
+        draw=FLOOR_PLANS[kind],
+        start_radius=_START_RADIUS_M,
+        min_blocked_fraction=_MIN_BLOCKED_FRACTION,
     )
 
 
-def _is_connected(plan: Environment) -> bool:
-    """Return whether the free space is connected, even without its narrow passages."""
-    wide_space = plan.free.buffer(-_MIN_PASSAGE_M / 2.0, quad_segs=16)
-    return len(plan.free.geoms) == 1 and isinstance(wide_space, shapely.Polygon)
-
-
-def _has_enough_obstacles(plan: Environment) -> bool:
-    """Return whether the obstacles block at least the minimum fraction of the map."""
-    blocked_area = sum(obstacle.polygon.area for obstacle in plan.obstacles)
-    return bool(blocked_area >= _MIN_BLOCKED_FRACTION * plan.area)
-
-
-def _find_entry(plan: Environment) -> DiscStart | None:
-    """Return the free start disc nearest to the lower left corner; None if there is no space for it."""
-    centers = plan.static.free.buffer(-_START_RADIUS_M - _START_MARGIN_M)
-    if centers.is_empty:
-        return None
-    lower_left = shapely.Point(plan.region.bounds[:2])
-    x, y = shapely.shortest_line(centers, lower_left).coords[0]
-    return DiscStart((round(x, 2), round(y, 2)), _START_RADIUS_M)
-
-
-def _round_points(points: Array | list[tuple[float, float]]) -> Ring:
-    return tuple((round(float(x), 2), round(float(y), 2)) for x, y in points)
-
-
-def _build_box(left: float, bottom: float, right: float, top: float) -> Ring:
-    return _round_points([(left, bottom), (right, bottom), (right, top), (left, top)])
-
-
-def _build_block(x: float, y: float, width: float, height: float) -> Obstacle:
-    """Build a rectangle whose lower left corner is at (x, y)."""
-    return PolygonObstacle(_build_box(x, y, x + width, y + height))
-
-
-def _build_rotated_block(center: Array, width: float, height: float, angle: float) -> Obstacle:
-    """Build a rectangle around a center, rotated counterclockwise by an angle, rad."""
-    corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
-    along = np.array([np.cos(angle), np.sin(angle)])
-    across = [-along[1], along[0]]
-    return PolygonObstacle(_round_points(center + corners @ np.array([along, across])))
-
-
 def _build_circle(center: Array, radius: float) -> Obstacle:
-    return CircleObstacle(_round_points(center[None])[0], round(radius, 2))
-
-
-def _build_wall_with_door(
-    offset: float, start: float, end: float, *, door: float, width: float, is_vertical: bool
-) -> list[Obstacle]:
-    """Return the two pieces of a wall on either side of its door; very short pieces are left out.
-
-    Parameters
-    ----------
-    offset : float, m
-        x of a vertical wall, or y of a horizontal wall.
-    start, end : float, m
-        Ends of the wall along its direction.
-    door, width : float, m
-        Middle and width of the door, along the wall.
-    is_vertical : bool
-        Whether the wall is parallel to the y axis, instead of the x axis.
-    """
-    walls: list[Obstacle] = []
-    for low, high in ((start, door - width / 2.0), (door + width / 2.0, end)):
-        if high - low <= _MIN_WALL_PIECE_M:
-            continue
-        ends = [(low, offset), (high, offset)]
-        if is_vertical:
-            ends = [(offset, low), (offset, high)]
-        walls.append(WallObstacle(_round_points(ends), _INNER_WALL_M))
-    return walls
+    return CircleObstacle(round_points(center[None])[0], round(radius, 2))
 
 
 def _build_home(rng: np.random.Generator) -> FloorPlan:
@@ -205,7 +119,7 @@ def _build_home(rng: np.random.Generator) -> FloorPlan:
     height = rng.uniform(8.0, 11.0)
     flat = _Flat(rng)
     flat.divide(0.0, 0.0, width, height)
-    return _build_box(0.0, 0.0, width, height), [*flat.walls, *flat.furniture]
+    return FloorPlan(build_box(0.0, 0.0, width, height), [*flat.walls, *flat.furniture])
 
 
 class _Flat:
@@ -259,7 +173,7 @@ class _Flat:
         split = low + (high - low) * rng.uniform(0.38, 0.62)
         door = rng.uniform(start + _HOME_DOOR_MARGIN_M, end - _HOME_DOOR_MARGIN_M)
         door_width = rng.uniform(0.8, 1.1)
-        self.walls += _build_wall_with_door(
+        self.walls += build_wall_with_door(
             split, start, end, door=door, width=door_width, is_vertical=is_vertical
         )
         return split
@@ -273,7 +187,7 @@ class _Flat:
         if right - left > width + free_width and top - bottom > depth + free_width:
             x = left + _HALF_WALL_M if rng.random() < 0.5 else right - _HALF_WALL_M - width
             y = bottom + _HALF_WALL_M if rng.random() < 0.5 else top - _HALF_WALL_M - depth
-            self.furniture.append(_build_block(x, y, width, depth))
+            self.furniture.append(build_block(x, y, width, depth))
 
 
 def _build_office(rng: np.random.Generator) -> FloorPlan:
@@ -288,7 +202,7 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
         *_build_open_space_wall(rng, width, corridor_low),
         *_build_desks(rng, width, corridor_low),
     ]
-    return _build_box(0.0, 0.0, width, height), obstacles
+    return FloorPlan(build_box(0.0, 0.0, width, height), obstacles)
 
 
 def _build_offices(rng: np.random.Generator, width: float, low: float, high: float) -> list[Obstacle]:
@@ -298,13 +212,13 @@ def _build_offices(rng: np.random.Generator, width: float, low: float, high: flo
     partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
     for left, right in itertools.pairwise(partitions.tolist()):
         door = rng.uniform(left + _OFFICE_DOOR_MARGIN_M, right - _OFFICE_DOOR_MARGIN_M)
-        obstacles += _build_wall_with_door(
+        obstacles += build_wall_with_door(
             low, left, right, door=door, width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
         )
         if right < width:
-            obstacles.append(WallObstacle(_round_points([(right, low), (right, high)]), _INNER_WALL_M))
+            obstacles.append(WallObstacle(round_points([(right, low), (right, high)]), INNER_WALL_M))
         if rng.random() < _SHELF_PROBABILITY:
-            shelf = _build_box(left + _HALF_WALL_M, high - _SHELF_DEPTH_M, left + _SHELF_END_M, high)
+            shelf = build_box(left + _HALF_WALL_M, high - _SHELF_DEPTH_M, left + _SHELF_END_M, high)
             obstacles.append(PolygonObstacle(shelf))
     return obstacles
 
@@ -316,7 +230,7 @@ def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> 
     middle = width / 2.0
     walls: list[Obstacle] = []
     for start, end, door in ((0.0, middle, left_door), (middle, width, right_door)):
-        walls += _build_wall_with_door(
+        walls += build_wall_with_door(
             y, start, end, door=door, width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
         )
     return walls
@@ -327,7 +241,7 @@ def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[O
     columns_x = np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6))
     rows_y = (_LOWER_DESKS_Y_M, depth - _UPPER_DESKS_MARGIN_M)
     corners = itertools.product(columns_x, rows_y)
-    return [_build_block(x, y, *_DESK_SIZE_M) for x, y in corners if rng.random() < _DESK_PROBABILITY]
+    return [build_block(x, y, *_DESK_SIZE_M) for x, y in corners if rng.random() < _DESK_PROBABILITY]
 
 
 def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
@@ -349,7 +263,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     corners_y = center_y + radius_y * np.sin(angles)
     corners = np.column_stack([corners_x, corners_y])
     hull = shapely.orient_polygons(shapely.convex_hull(shapely.MultiPoint(corners)))
-    boundary = _round_points(np.asarray(hull.exterior.coords)[:-1])
+    boundary = round_points(np.asarray(hull.exterior.coords)[:-1])
 
     # Large shapes come first, because of two shapes that are too close, the later one is removed.
     builders = [_build_house] * 5 + [_build_pond] + [_build_hedge] * 6 + [_build_tree] * 14
@@ -357,7 +271,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     land = shapely.Polygon(boundary)
     inside = [shape for shape in shapes if land.contains(shape.polygon)]
     clear = [shape for shape in inside if land.exterior.distance(shape.polygon) > _YARD_GAP_M]
-    return boundary, _remove_near_shapes(clear, _YARD_GAP_M)
+    return FloorPlan(boundary, _remove_near_shapes(clear, _YARD_GAP_M))
 
 
 def _draw_yard_point(rng: np.random.Generator) -> Array:
@@ -369,7 +283,7 @@ def _build_house(rng: np.random.Generator) -> Obstacle:
     center = _draw_yard_point(rng)
     width = rng.uniform(2.0, 3.6)
     depth = rng.uniform(1.6, 2.6)
-    return _build_rotated_block(center, width, depth, rng.uniform(0.0, np.pi))
+    return build_rotated_block(center, width, depth, rng.uniform(0.0, np.pi))
 
 
 def _build_pond(rng: np.random.Generator) -> Obstacle:
@@ -377,7 +291,7 @@ def _build_pond(rng: np.random.Generator) -> Obstacle:
     angles = np.linspace(0.0, 2.0 * np.pi, _POND_CORNERS, endpoint=False)
     radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
     shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
-    return PolygonObstacle(_round_points(_draw_yard_point(rng) + shore))
+    return PolygonObstacle(round_points(_draw_yard_point(rng) + shore))
 
 
 def _build_hedge(rng: np.random.Generator) -> Obstacle:
@@ -388,7 +302,7 @@ def _build_hedge(rng: np.random.Generator) -> Obstacle:
     across = np.array((-np.sin(angle), np.cos(angle)))
     leg_length = rng.uniform(1.4, 2.4)
     corners = leg_length * np.array([np.zeros(2), along, along + across])
-    return WallObstacle(_round_points(start + corners), _HEDGE_WIDTH_M)
+    return WallObstacle(round_points(start + corners), _HEDGE_WIDTH_M)
 
 
 def _build_tree(rng: np.random.Generator) -> Obstacle:
@@ -403,11 +317,11 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
     split = width * rng.uniform(0.48, 0.58)
     gate = rng.uniform(_GATE_MARGIN_M, height - _GATE_MARGIN_M)
     gate_width = rng.uniform(1.4, 2.2)
-    obstacles = _build_wall_with_door(split, 0.0, height, door=gate, width=gate_width, is_vertical=True)
+    obstacles = build_wall_with_door(split, 0.0, height, door=gate, width=gate_width, is_vertical=True)
     for y in np.arange(_FIRST_RACK_Y_M, height - _MACHINE_MARGIN_M, rng.uniform(1.9, 2.4)):
         left = rng.uniform(1.2, 2.2)
         right = split - rng.uniform(1.2, 1.8)
-        obstacles.append(PolygonObstacle(_build_box(left, y, right, y + _RACK_DEPTH_M)))
+        obstacles.append(PolygonObstacle(build_box(left, y, right, y + _RACK_DEPTH_M)))
     shapes: list[Obstacle] = []
     margin = _MACHINE_MARGIN_M
     for number in range(_MACHINE_ATTEMPTS):
@@ -420,9 +334,9 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
             continue
         block_width = rng.uniform(0.8, 2.0)
         block_depth = rng.uniform(0.6, 1.2)
-        shapes.append(_build_rotated_block(center, block_width, block_depth, rng.choice([0.0, 0.6, 1.2])))
+        shapes.append(build_rotated_block(center, block_width, block_depth, rng.choice([0.0, 0.6, 1.2])))
     machines = _remove_near_shapes(shapes, _MACHINE_GAP_M)[:_MAX_MACHINES]
-    return _build_box(0.0, 0.0, width, height), [*obstacles, *machines]
+    return FloorPlan(build_box(0.0, 0.0, width, height), [*obstacles, *machines])
 
 
 def _build_traffic(rng: np.random.Generator) -> FloorPlan:
@@ -435,13 +349,13 @@ def _build_traffic(rng: np.random.Generator) -> FloorPlan:
     for y in _SHELF_ROWS_Y_M:
         middle = rng.uniform(8.2, 9.8)
         for start, end in ((left, middle - _HALF_CROSS_AISLE_M), (middle + _HALF_CROSS_AISLE_M, right)):
-            obstacles.append(PolygonObstacle(_build_box(start, y, end, y + rng.uniform(0.8, 1.3))))
+            obstacles.append(PolygonObstacle(build_box(start, y, end, y + rng.uniform(0.8, 1.3))))
     vehicles = int(rng.integers(2, 4))
     for y in _AISLES_Y_M[:vehicles]:
-        ends = _round_points([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
+        ends = round_points([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
         path = ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
         obstacles.append(CircleObstacle(ends[0], round(rng.uniform(0.3, 0.45), 2), path=path))
-    return _build_box(0.0, 0.0, width, height), obstacles
+    return FloorPlan(build_box(0.0, 0.0, width, height), obstacles)
 
 
 FLOOR_PLANS: dict[str, Callable[[np.random.Generator], FloorPlan]] = {

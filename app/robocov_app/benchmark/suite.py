@@ -17,6 +17,7 @@ from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name, quote
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
+from robocov_app.benchmark.large_plans import LARGE_PLANS, build_large_plan
 from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study.study import Study, StudyMap
@@ -75,11 +76,14 @@ OTHER_FAMILIES: Mapping[str, tuple[str, ...]] = {
     "density": tuple(f"dense-{name}" for kind in _GENERATED_FAMILIES for name in _list_names(kind, 1)),
     "moving": ("forklifts", *_list_names("traffic", 5)),
     "large": tuple(f"large-{name}" for kind in _LARGE_KINDS for name in _list_names(kind, 2)),
+    **{kind: _list_names(kind, 4) for kind in LARGE_PLANS},
     "tuning": tuple(name for kind in _GENERATED_FAMILIES for name in _list_names(kind, 2, first_seed=1)),
 }
 """Maps of the other tracks by family; the tuning maps are for choosing gains and do not count."""
 FAMILY_OF = {name: family for family, names in {**FAMILIES, **OTHER_FAMILIES}.items() for name in names}
 """The family of each map of the suite."""
+_PLANS = tuple(tuple(f"{kind}-{_FIRST_SEED + k}" for kind in LARGE_PLANS) for k in range(4))
+"""Maps of the tracks on large plans: on each track one of every kind."""
 _CORE_MAPS = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
@@ -138,6 +142,28 @@ TRACKS: Mapping[str, Track] = {
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
+    "plans-small": Track("3 robots in large buildings and tunnels", _PLANS[0], robots=3, duration=240.0),
+    "plans-medium": Track(
+        "12 robots in large buildings and tunnels, range of 12 m",
+        _PLANS[1],
+        robots=12,
+        duration=180.0,
+        changes={"communication_range": 12.0},
+    ),
+    "plans-large": Track(
+        "24 robots in large buildings and tunnels, range of 6 m",
+        _PLANS[2],
+        robots=24,
+        duration=150.0,
+        changes={"communication_range": 6.0},
+    ),
+    "plans-crowd": Track(
+        "50 robots in large buildings and tunnels, range of 3 m",
+        _PLANS[3],
+        robots=50,
+        duration=120.0,
+        changes={"communication_range": 3.0},
+    ),
     "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"]),
 }
 """All tracks by name; only `RATED_TRACKS` count."""
@@ -184,6 +210,8 @@ def build_map(name: str) -> Environment:
         return generate_map(int(seed), kind=kind)
     if kind in FLOOR_PLANS:
         return build_floor_plan(kind, int(seed))
+    if kind in LARGE_PLANS:
+        return build_large_plan(kind, int(seed))
     return load_map(name)
 
 

@@ -1,0 +1,68 @@
+"""Plans of large buildings and tunnels, 30 to 60 m long, drawn after real kinds of places.
+
+Each module draws one kind. Its plans have four layouts; consecutive seeds take turns.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from robocov.environment import Environment
+from robocov_app.benchmark.large_plans.depots import draw_depot
+from robocov_app.benchmark.large_plans.museums import draw_museum
+from robocov_app.benchmark.large_plans.office_floors import draw_office_floor
+from robocov_app.benchmark.large_plans.schools import draw_school
+from robocov_app.benchmark.large_plans.tunnels import draw_tunnels
+from robocov_app.benchmark.large_plans.wards import draw_ward
+from robocov_app.benchmark.plan_search import search_map
+from robocov_app.benchmark.plan_shapes import FloorPlan
+
+_FIRST_KIND_NUMBER = 100
+"""Number of the first kind, which makes its random numbers different from those of the smaller maps."""
+_LAYOUTS = 4
+"""Number of layouts of each kind."""
+_START_RADIUS_M = 1.2
+"""Radius of the start disc, in which 50 robots fit."""
+
+LARGE_PLANS: dict[str, Callable[[np.random.Generator, int], FloorPlan]] = {
+    "office-floors": draw_office_floor,
+    "wards": draw_ward,
+    "depots": draw_depot,
+    "museums": draw_museum,
+    "schools": draw_school,
+    "tunnels": draw_tunnels,
+}
+"""Functions that draw a plan with a given layout, by the name of its kind.
+
+The order determines the random numbers; append new kinds, so that other maps do not change.
+"""
+
+
+def build_large_plan(kind: str, seed: int) -> Environment:
+    """Build a random plan of a large building or of tunnels.
+
+    Parameters
+    ----------
+    kind : str
+        Name of a kind in `LARGE_PLANS`.
+    seed : int
+        Seed of the random numbers, which also selects the layout.
+
+    Returns
+    -------
+    Environment
+        The map, with a start named "entry" near its entrance.
+
+    Raises
+    ------
+    ParameterError
+        If no plan with this seed is suitable.
+    """
+    layout = seed % _LAYOUTS
+    return search_map(
+        kind,
+        seed,
+        kind_number=_FIRST_KIND_NUMBER + list(LARGE_PLANS).index(kind),
+        draw=lambda rng: LARGE_PLANS[kind](rng, layout),
+        start_radius=_START_RADIUS_M,
+    )
