@@ -98,6 +98,13 @@ class Drawing:
                 self.add_wall(tuple(low), tuple(high), thickness=thickness)
             piece_start = door + width / 2.0
 
+    def add_partitions(
+        self, positions: Iterable[float], depth: float, *, thickness: float = INNER_WALL_M
+    ) -> None:
+        """Add walls between the rooms of a row, from y = 0 to y = `depth`, at given x."""
+        for x in positions:
+            self.add_wall((x, 0.0), (x, depth), thickness=thickness)
+
     def add_block(self, left: float, bottom: float, right: float, top: float) -> None:
         """Add a solid rectangle."""
         self.add_polygon(build_box(left, bottom, right, top))

@@ -1,100 +1,141 @@
-"""Museums: galleries in a row with aligned doors around an atrium, with cabinets, partitions and plinths."""
+"""Museums: galleries with aligned doors around an atrium, with cabinets, partitions and plinths."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import shapely
 
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_octagon, build_outline, divide_evenly
+from robocov.arrays import Array
+from robocov_app.benchmark.large_plans.drawing import (
+    Drawing,
+    build_octagon,
+    build_outline,
+    divide_evenly,
+)
 from robocov_app.benchmark.plan_shapes import FloorPlan
 
 _WALL_M = 0.4
 _DOOR_WIDTH_M = 1.2
 _COLUMN_M = 0.6
-_ENFILADE = 0.36
-"""Position of the aligned doors of a row of galleries, as a fraction of their depth from the outside."""
+_COLUMN_DISTANCE_M = 3.4
+_COLUMN_INSET_M = 2.4
+"""Distance of the columns of an atrium from its walls."""
+_ENFILADE = 0.64
+"""Position of the aligned doors of galleries, as a fraction of their depth from the inner wall."""
+_PORTICO_M = 2.4
+"""Depth of the portico in front of the entrance hall."""
+_PROJECTION_M = 1.4
+"""Depth by which the corner pavilions project from the facades."""
+_APSE_RADIUS_M = 4.6
+_MIDDLE_GALLERY_M = 3.6
+"""Half the width of the gallery between two atriums."""
+_MAX_ROTUNDA_RADIUS_M = 6.4
+
+
+@dataclass(frozen=True)
+class _Building:
+    """Sizes of a museum, m."""
+
+    width: float
+    height: float
+    depth: float
+    """Depth of the galleries."""
+    half_hall: float
+    """Half the width of the entrance hall."""
+
+    @property
+    def middle(self) -> float:
+        """Position x of the axis of the building."""
+        return self.width / 2.0
+
+    @property
+    def inner_right(self) -> float:
+        """Position x of the right inner wall; that of the left one is the depth."""
+        return self.width - self.depth
+
+    @property
+    def inner_top(self) -> float:
+        """Position y of the upper inner wall; that of the lower one is the depth."""
+        return self.height - self.depth
 
 
 def draw_museum(rng: np.random.Generator, layout: int) -> FloorPlan:
-    """Draw a museum: around one or two atriums, with corner pavilions, a portico, and sometimes an apse."""
+    """Draw a museum; its layout selects what the galleries surround, and the shape of the building."""
     depth = rng.uniform(7.0, 8.2)
-    width = rng.uniform(44.0, 54.0)
-    height = rng.uniform(31.0, 36.0)
+    building = _Building(
+        width=rng.uniform(44.0, 54.0),
+        height=rng.uniform(31.0, 36.0),
+        depth=depth,
+        half_hall=rng.uniform(5.0, 6.0),
+    )
     drawing = Drawing()
-    hall_half = rng.uniform(5.0, 6.0)
-    middle = width / 2.0
-    shapes = [
-        shapely.box(0.0, 0.0, width, height),
-        shapely.box(middle - hall_half, -2.4, middle + hall_half, 1.0),
-    ]
-    if layout != 2:
-        projection = 1.4
-        for left, bottom in itertools.product((0.0, width - depth), (0.0, height - depth)):
-            shapes.append(
-                shapely.box(left, bottom, left + depth, bottom + depth).buffer(projection, join_style="mitre")
-            )
-    if layout in (1, 2):
-        shapes.append(shapely.Polygon(build_octagon(middle, height, 4.6)))
-        drawing.add_octagon(middle, height + 1.6, 0.8)
-    _draw_ring(rng, drawing, width, height, depth, hall_half)
-    _draw_entrance(drawing, middle, hall_half, depth)
-    left, right = depth, width - depth
-    if layout in (1, 3):
-        # A gallery between two atriums.
-        for x in (middle - 3.6, middle + 3.6):
-            drawing.add_wall_with_doors(
-                (x, depth),
-                (x, height - depth),
-                [(height - 2.0 * depth) / 2.0],
-                width=_DOOR_WIDTH_M,
-                thickness=_WALL_M,
-            )
-        _draw_exhibits(rng, drawing.open_part(middle, height / 2.0 + 3.4), 4.0, 4.0)
-        _draw_exhibits(rng, drawing.open_part(middle, height / 2.0 - 3.4), 4.0, 4.0)
-        _draw_atrium(drawing, left, depth, middle - 3.6, height - depth)
-        _draw_atrium(drawing, middle + 3.6, depth, right, height - depth)
+    has_apse = layout in (1, 2)
+    if has_apse:
+        drawing.add_octagon(building.middle, building.height + 1.6, 0.8)
+    _draw_galleries(rng, drawing, building)
+    _draw_entrance(drawing, building)
+    if layout == 0:
+        _draw_rotunda_court(drawing, building)
     elif layout == 2:
-        # A light well on either side of the atrium.
-        well = rng.uniform(5.0, 6.0)
-        for x in (left + 1.8, right - 1.8 - well):
-            drawing.add_block(x, depth + 2.2, x + well, height - depth - 2.2)
-        _draw_atrium(drawing, left + well + 2.2, depth, right - well - 2.2, height - depth)
+        _draw_light_wells(rng, drawing, building)
     else:
-        _draw_rotunda(drawing, middle, height / 2.0, min(6.4, (height - 2.0 * depth) / 2.0 - 1.6))
-        for x in (left + (middle - 6.4 - left) / 2.0, right - (middle - 6.4 - left) / 2.0):
-            for y in divide_evenly(depth, height - depth, 4.4)[1:-1].tolist():
-                drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
-    return FloorPlan(build_outline(shapes), drawing.obstacles, (middle, 0.4))
+        _draw_two_atriums(rng, drawing, building)
+    outline = _build_outline(building, has_apse=has_apse, has_pavilions=layout != 2)
+    return FloorPlan(build_outline(outline), drawing.obstacles, (building.middle, 0.4))
 
 
-def _draw_ring(
-    rng: np.random.Generator, drawing: Drawing, width: float, height: float, depth: float, hall_half: float
-) -> None:
-    """Draw the four rows of galleries around the middle, whose aligned doors make enfilades."""
-    middle = width / 2.0
+def _build_outline(building: _Building, *, has_apse: bool, has_pavilions: bool) -> list[shapely.Geometry]:
+    """Return the parts of the floor: the main part, the portico, and the corner pavilions and the apse."""
+    width = building.width
+    height = building.height
+    depth = building.depth
+    left = building.middle - building.half_hall
+    right = building.middle + building.half_hall
+    parts = [shapely.box(0.0, 0.0, width, height), shapely.box(left, -_PORTICO_M, right, 1.0)]
+    if has_pavilions:
+        for x, y in itertools.product((0.0, building.inner_right), (0.0, building.inner_top)):
+            parts.append(shapely.box(x, y, x + depth, y + depth).buffer(_PROJECTION_M, join_style="mitre"))
+    if has_apse:
+        parts.append(shapely.Polygon(build_octagon(building.middle, height, _APSE_RADIUS_M)))
+    return parts
+
+
+def _draw_galleries(rng: np.random.Generator, drawing: Drawing, building: _Building) -> None:
+    """Draw the four rows of galleries, and a plinth in each corner pavilion."""
+    depth = building.depth
     # In each part, x runs along the inner wall, and y from the inner wall to the facade.
     south = drawing.open_part(0.0, depth, mirrored=True)
-    north = drawing.open_part(0.0, height - depth)
+    north = drawing.open_part(0.0, building.inner_top)
     west = drawing.open_part(depth, 0.0, 1)
-    east = drawing.open_part(width - depth, 0.0, 1, mirrored=True)
-    gallery = rng.uniform(6.5, 8.5)
-    left_row = divide_evenly(depth, middle - hall_half, gallery).tolist()
-    right_row = divide_evenly(middle + hall_half, width - depth, gallery).tolist()
-    _draw_row(rng, south, [*left_row, *right_row], depth, [middle - 2.6, middle + 2.6], hall=middle)
-    upper = rng.uniform(7.0, 9.5)
-    # An odd number of galleries, so that the door from the atrium leads to the middle one.
-    galleries = 2 * round((width - 2.0 * depth) / upper / 2.0 - 0.5) + 1
-    north_row = np.linspace(depth, width - depth, galleries + 1).tolist()
-    _draw_row(rng, north, north_row, depth, [middle])
-    side_row = divide_evenly(depth, height - depth, rng.uniform(8.0, 10.0)).tolist()
+    east = drawing.open_part(building.inner_right, 0.0, 1, mirrored=True)
+    _draw_entrance_row(rng, south, building)
+    galleries = 2 * round((building.inner_right - depth) / rng.uniform(7.0, 9.5) / 2.0 - 0.5) + 1
+    # The number of galleries is odd, so that the door from the atrium leads to the middle one.
+    partitions = np.linspace(depth, building.inner_right, galleries + 1).tolist()
+    _draw_row(rng, north, partitions, depth, [building.middle])
+    partitions = divide_evenly(depth, building.inner_top, rng.uniform(8.0, 10.0)).tolist()
+    gallery = (len(partitions) - 1) // 2
+    door = (partitions[gallery] + partitions[gallery + 1]) / 2.0
     for part in (west, east):
-        door_room = (len(side_row) - 1) // 2
-        door = (side_row[door_room] + side_row[door_room + 1]) / 2.0
-        _draw_row(rng, part, side_row, depth, [door])
-    for x, y in itertools.product((depth / 2.0, width - depth / 2.0), (depth / 2.0, height - depth / 2.0)):
+        _draw_row(rng, part, partitions, depth, [door])
+    columns = (depth / 2.0, building.width - depth / 2.0)
+    rows = (depth / 2.0, building.height - depth / 2.0)
+    for x, y in itertools.product(columns, rows):
         drawing.add_octagon(x, y, 0.9)
+
+
+def _draw_entrance_row(rng: np.random.Generator, part: Drawing, building: _Building) -> None:
+    """Draw the galleries on both sides of the entrance hall, which has two doors to the middle."""
+    width = rng.uniform(6.5, 8.5)
+    middle = building.middle
+    left = divide_evenly(building.depth, middle - building.half_hall, width).tolist()
+    right = divide_evenly(middle + building.half_hall, building.inner_right, width).tolist()
+    doors = [middle - 2.6, middle + 2.6]
+    _draw_row(rng, part, [*left, *right], building.depth, doors, hall=middle)
 
 
 def _draw_row(
@@ -103,94 +144,141 @@ def _draw_row(
     partitions: list[float],
     depth: float,
     inner_doors: list[float],
+    *,
     hall: float | None = None,
 ) -> None:
-    """Draw a row of galleries between the corner pavilions, with doors through all its partitions."""
-    start = partitions[0]
-    doors = [door - start for door in inner_doors]
-    part.add_wall_with_doors(
-        (start - _WALL_M / 2.0, 0.0),
-        (partitions[-1] + _WALL_M / 2.0, 0.0),
-        [door + _WALL_M / 2.0 for door in doors],
-        width=_DOOR_WIDTH_M,
-        thickness=_WALL_M,
-    )
-    enfilade = depth * (1.0 - _ENFILADE)
+    """Draw a row of galleries between the corner pavilions, with doors through all its partitions.
+
+    Parameters
+    ----------
+    partitions : list of float, m
+        x of the partitions.
+    depth : float, m
+        Depth of the galleries.
+    inner_doors : list of float, m
+        x of the doors in the inner wall.
+    hall : float, m, or None
+        x of a point in the entrance hall, which has no exhibits.
+    """
+    add_wall = partial(part.add_wall_with_doors, width=_DOOR_WIDTH_M, thickness=_WALL_M)
+    # The inner wall extends to the outer corners of the partitions.
+    start = partitions[0] - _WALL_M / 2.0
+    end = partitions[-1] + _WALL_M / 2.0
+    add_wall((start, 0.0), (end, 0.0), [door - start for door in inner_doors])
+    enfilade = depth * _ENFILADE
     for x in partitions:
-        part.add_wall_with_doors((x, 0.0), (x, depth), [enfilade], width=_DOOR_WIDTH_M, thickness=_WALL_M)
+        add_wall((x, 0.0), (x, depth), [enfilade])
     for low, high in itertools.pairwise(partitions):
         if hall is not None and low < hall < high:
             continue
-        # The exhibits leave the line of the enfilade free.
-        _draw_exhibits(
-            rng, part.open_part((low + high) / 2.0, (enfilade - 1.0) / 2.0), high - low - 2.4, enfilade - 2.6
-        )
+        # The exhibits leave the line of the doors free.
+        gallery = part.open_part((low + high) / 2.0, (enfilade - 1.0) / 2.0)
+        _draw_exhibits(rng, gallery, high - low - 2.4, enfilade - 2.6)
 
 
 def _draw_exhibits(rng: np.random.Generator, part: Drawing, width: float, depth: float) -> None:
-    """Draw exhibits around the origin: cabinets, partitions, or a plinth with benches."""
+    """Draw exhibits in a rectangle around the origin: cabinets, partitions, or a plinth with benches."""
+    right = width / 2.0
+    top = depth / 2.0
     choice = int(rng.integers(0, 4))
     if choice == 0:
-        for x, y in itertools.product(
-            (-width / 2.0 + 0.6, width / 2.0 - 0.6), (-depth / 2.0 + 0.3, depth / 2.0)
-        ):
+        for x, y in itertools.product((0.6 - right, right - 0.6), (0.3 - top, top)):
             part.add_centered_block(x, y, 1.2, 0.6)
     elif choice == 1:
-        # Two partitions that overlap in the middle, for paintings.
-        part.add_wall((-width / 2.0, -depth / 4.0), (width * 0.1, -depth / 4.0), thickness=0.3)
-        part.add_wall((width * 0.1, depth / 2.0 - 0.1), (width / 2.0, depth / 2.0 - 0.1), thickness=0.3)
+        # Two partitions for paintings.
+        part.add_wall((-right, -top / 2.0), (width * 0.1, -top / 2.0), thickness=0.3)
+        part.add_wall((width * 0.1, top - 0.1), (right, top - 0.1), thickness=0.3)
     elif choice == 2:
         part.add_octagon(0.0, 0.0, 0.8)
-        part.add_centered_block(-width / 2.0 + 0.2, 0.0, 0.5, 1.8)
-        part.add_centered_block(width / 2.0 - 0.2, 0.0, 0.5, 1.8)
+        part.add_centered_block(0.2 - right, 0.0, 0.5, 1.8)
+        part.add_centered_block(right - 0.2, 0.0, 0.5, 1.8)
     else:
-        part.add_wall(
-            (-width / 4.0, -depth / 2.0),
-            (-width / 4.0, depth / 2.0),
-            (width / 4.0, depth / 2.0),
-            thickness=0.3,
-        )
-        part.add_octagon(width / 4.0, -depth / 4.0, 0.5)
+        # Partitions at a right angle, and a plinth.
+        part.add_wall((-right / 2.0, -top), (-right / 2.0, top), (right / 2.0, top), thickness=0.3)
+        part.add_octagon(right / 2.0, -top / 2.0, 0.5)
 
 
-def _draw_entrance(drawing: Drawing, middle: float, hall_half: float, depth: float) -> None:
-    """Draw the entrance hall behind the portico: columns, a ticket desk, and a cloakroom counter."""
-    for x in np.linspace(middle - hall_half + 1.0, middle + hall_half - 1.0, 4).tolist():
+def _draw_entrance(drawing: Drawing, building: _Building) -> None:
+    """Draw the columns of the portico, and in the entrance hall a ticket desk and a cloakroom."""
+    left = building.middle - building.half_hall
+    right = building.middle + building.half_hall
+    for x in np.linspace(left + 1.0, right - 1.0, 4).tolist():
         drawing.add_centered_block(x, -1.4, _COLUMN_M, _COLUMN_M)
-    drawing.add_centered_block(middle, depth - 2.6, 3.0, 0.8)
-    drawing.add_block(middle - hall_half, depth - 1.6, middle - hall_half + 0.8, depth)
+    drawing.add_centered_block(building.middle, building.depth - 2.6, 3.0, 0.8)
+    drawing.add_block(left, building.depth - 1.6, left + 0.8, building.depth)
 
 
-def _draw_atrium(drawing: Drawing, left: float, bottom: float, right: float, top: float) -> None:
+def _draw_two_atriums(rng: np.random.Generator, drawing: Drawing, building: _Building) -> None:
+    """Draw an atrium on either side of a gallery in the middle."""
+    bottom = building.depth
+    top = building.inner_top
+    left = building.middle - _MIDDLE_GALLERY_M
+    right = building.middle + _MIDDLE_GALLERY_M
+    for x in (left, right):
+        drawing.add_wall_with_doors(
+            (x, bottom), (x, top), [(top - bottom) / 2.0], width=_DOOR_WIDTH_M, thickness=_WALL_M
+        )
+    for shift in (3.4, -3.4):
+        _draw_exhibits(rng, drawing.open_part(building.middle, building.height / 2.0 + shift), 4.0, 4.0)
+    _draw_atrium(drawing, building, building.depth, left)
+    _draw_atrium(drawing, building, right, building.inner_right)
+
+
+def _draw_light_wells(rng: np.random.Generator, drawing: Drawing, building: _Building) -> None:
+    """Draw an atrium between two light wells, which are closed."""
+    width = rng.uniform(5.0, 6.0)
+    left = building.depth + 1.8
+    right = building.inner_right - 1.8
+    for x in (left, right - width):
+        drawing.add_block(x, building.depth + 2.2, x + width, building.inner_top - 2.2)
+    _draw_atrium(drawing, building, left + width + 0.4, right - width - 0.4)
+
+
+def _draw_atrium(drawing: Drawing, building: _Building, left: float, right: float) -> None:
     """Draw an atrium: columns along its sides, and a sculpture in its middle."""
-    inset = 2.4
-    columns_x = divide_evenly(left + inset, right - inset, 3.4).tolist()
-    columns_y = divide_evenly(bottom + inset, top - inset, 3.4).tolist()
-    for x in columns_x:
-        for y in (columns_y[0], columns_y[-1]):
-            drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
-    for y in columns_y[1:-1]:
-        for x in (columns_x[0], columns_x[-1]):
-            drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
-    drawing.add_octagon((left + right) / 2.0, (bottom + top) / 2.0, 1.3)
+    inset = _COLUMN_INSET_M
+    columns_x = divide_evenly(left + inset, right - inset, _COLUMN_DISTANCE_M).tolist()
+    lowest = building.depth + inset
+    highest = building.inner_top - inset
+    columns_y = divide_evenly(lowest, highest, _COLUMN_DISTANCE_M).tolist()
+    positions = [
+        *itertools.product(columns_x, (columns_y[0], columns_y[-1])),
+        *((x, y) for y in columns_y[1:-1] for x in (columns_x[0], columns_x[-1])),
+    ]
+    for x, y in positions:
+        drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+    drawing.add_octagon((left + right) / 2.0, building.height / 2.0, 1.3)
 
 
-def _draw_rotunda(drawing: Drawing, x: float, y: float, radius: float) -> None:
-    """Draw a rotunda: an octagonal wall with four doors, and a sculpture in its middle."""
-    ring = build_octagon(0.0, 0.0, radius)
-    # Doors are in the middle of the sides that face the four galleries; the wall pieces are the corners.
-    sides = [ring[number] for number in range(8)]
+def _draw_rotunda_court(drawing: Drawing, building: _Building) -> None:
+    """Draw a rotunda around a sculpture in the middle of a court, and a row of columns on either side."""
+    middle = building.middle
+    half_height = (building.inner_top - building.depth) / 2.0
+    _draw_rotunda(
+        drawing.open_part(middle, building.height / 2.0), min(_MAX_ROTUNDA_RADIUS_M, half_height - 1.6)
+    )
+    drawing.add_octagon(middle, building.height / 2.0, 1.2)
+    distance = (middle - _MAX_ROTUNDA_RADIUS_M - building.depth) / 2.0
+    for x in (building.depth + distance, building.inner_right - distance):
+        for y in divide_evenly(building.depth, building.inner_top, 4.4)[1:-1].tolist():
+            drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+
+
+def _draw_rotunda(part: Drawing, radius: float) -> None:
+    """Draw an octagonal wall with doors on four sides around the origin."""
+    corners = np.array(build_octagon(0.0, 0.0, radius))
     for number in range(0, 8, 2):
-        first, second = np.array(sides[number]), np.array(sides[(number + 1) % 8])
-        before, after = np.array(sides[number - 1]), np.array(sides[(number + 2) % 8])
-        start = _stop_before_door(first, before)
-        end = _stop_before_door(second, after)
-        points = [tuple(point + (x, y)) for point in (start, first, second, end)]
-        drawing.add_wall(*points, thickness=_WALL_M)
-    drawing.add_octagon(x, y, 1.2)
+        # Each piece of the wall is a whole side, with parts of both sides next to it.
+        first = corners[number]
+        second = corners[number + 1]
+        start = _stop_at_door(first, corners[number - 1])
+        end = _stop_at_door(second, corners[(number + 2) % 8])
+        points = [(float(x), float(y)) for x, y in (start, first, second, end)]
+        part.add_wall(*points, thickness=_WALL_M)
 
 
-def _stop_before_door(corner: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
-    """Return the end of the wall from a corner towards the door in the middle of a side."""
-    length = float(np.hypot(*(next_corner - corner)))
-    return corner + (next_corner - corner) * ((length - _DOOR_WIDTH_M) / 2.0 / length)
+def _stop_at_door(corner: Array, next_corner: Array) -> Array:
+    """Return the end of the wall that goes from a corner to a door in the middle of a side."""
+    side = next_corner - corner
+    length = float(np.hypot(*side))
+    return corner + side * ((length - _DOOR_WIDTH_M) / 2.0 / length)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
+from robocov.environment import Point
 from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline, divide_evenly
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
 
 _CORE_WALL_M = 0.25
 """Thickness of the walls around the core."""
@@ -19,9 +19,24 @@ _COLUMN_M = 0.5
 _LOBBY_WIDTH_M = 3.2
 _LIFT_WIDTH_M = 2.2
 _LIFT_DEPTH_M = 2.4
+_LIFT_DOOR_M = 1.2
+_LIFT_NICHE_M = 0.35
+"""Depth of the niche in front of the door of a lift."""
 _DESK_DEPTH_M = 1.6
 """Depth of two desks that face each other."""
 _DESK_WIDTH_M = 1.6
+_DESK_PROBABILITY = 0.75
+"""Probability of a desk in a cell; the others have a cupboard."""
+_CELL_WIDTH_M = 3.6
+_LARGE_CELL_M = 5.0
+"""Width of a cell above which it has two desks."""
+_MEETING_ROOM_WIDTH_M = 5.8
+_COLUMN_DISTANCE_M = 7.2
+_SHORT_BENCH_PROBABILITY = 0.25
+_RECESS_MARGIN_M = 0.7
+"""Minimum distance of furniture from a recess in the facade."""
+_LONG_SPACE_M = 30.0
+"""Length above which an open space has telephone boxes."""
 _USES = (
     {"south": "open", "north": "cells", "west": "cells", "east": "meeting"},
     {"south": "open", "north": "cells", "west": "open", "east": "meeting"},
@@ -88,42 +103,46 @@ def _draw_core(rng: np.random.Generator, drawing: Drawing, floor: _Floor) -> Non
     """Draw the core: a lift lobby between two banks of lifts, and rooms on both sides in two rows."""
     left, bottom, right, top = floor.core
     middle_x = (left + right) / 2.0
-    middle_y = (bottom + top) / 2.0
-    bank_left = middle_x - _LOBBY_WIDTH_M / 2.0 - _LIFT_DEPTH_M
-    bank_right = middle_x + _LOBBY_WIDTH_M / 2.0 + _LIFT_DEPTH_M
-    lifts = int((top - bottom - 1.0) / _LIFT_WIDTH_M)
     for side in (-1, 1):
         lobby_x = middle_x + side * _LOBBY_WIDTH_M / 2.0
-        drawing.add_polygon(_outline_lifts(lobby_x, side, bottom, top, lifts))
-    for end, inner, direction in ((left, bank_left, 1.0), (right, bank_right, -1.0)):
-        length = abs(inner - end)
-        drawing.add_wall((end, bottom), (end, top), thickness=_CORE_WALL_M)
-        drawing.add_wall((end, middle_y), (inner, middle_y), thickness=_CORE_WALL_M)
-        for edge, is_upper in ((bottom, False), (top, True)):
-            # The origin is at the outer end of the row, on the corridor; y goes towards the middle.
-            turned = direction < 0.0
-            mirrored = is_upper != turned
-            part = drawing.open_part(end, edge, 2 if turned else 0, mirrored=mirrored)
-            has_stairs = is_upper == turned
-            _draw_core_row(rng, part, length, abs(middle_y - edge), has_stairs=has_stairs)
+        drawing.add_polygon(_outline_lifts(lobby_x, side, bottom, top))
+    for is_right, end in ((False, left), (True, right)):
+        _draw_core_end(rng, drawing, floor, end, is_right=is_right)
 
 
-def _outline_lifts(
-    lobby_x: float, side: int, bottom: float, top: float, lifts: int
-) -> list[tuple[float, float]]:
-    """Return the outline of a solid bank of lifts, with a niche in front of the door of each lift."""
+def _draw_core_end(
+    rng: np.random.Generator, drawing: Drawing, floor: _Floor, end: float, *, is_right: bool
+) -> None:
+    """Draw the rooms between the lifts and one end of the core, whose x is `end`."""
+    left, bottom, right, top = floor.core
+    middle_y = (bottom + top) / 2.0
+    side = 1 if is_right else -1
+    inner = (left + right) / 2.0 + side * (_LOBBY_WIDTH_M / 2.0 + _LIFT_DEPTH_M)
+    drawing.add_wall((end, bottom), (end, top), thickness=_CORE_WALL_M)
+    drawing.add_wall((end, middle_y), (inner, middle_y), thickness=_CORE_WALL_M)
+    for edge, is_upper in ((bottom, False), (top, True)):
+        # The origin is at the end of the core, on the corridor; y is the distance from the corridor.
+        quarter_turns = 2 if is_right else 0
+        part = drawing.open_part(end, edge, quarter_turns, mirrored=is_upper != is_right)
+        has_stairs = is_upper == is_right
+        _draw_core_row(rng, part, abs(inner - end), abs(middle_y - edge), has_stairs=has_stairs)
+
+
+def _outline_lifts(lobby_x: float, side: int, bottom: float, top: float) -> list[Point]:
+    """Return the outline of a solid bank of lifts, with a niche in front of the door of each lift.
+
+    The bank is on the left of the lobby if `side` is -1, and on its right if `side` is 1.
+    """
+    lifts = int((top - bottom - 1.0) / _LIFT_WIDTH_M)
     back_x = lobby_x + side * _LIFT_DEPTH_M
     points = [(back_x, bottom), (lobby_x, bottom)]
     pitch = (top - bottom) / lifts
     for number in range(lifts):
         middle = bottom + (number + 0.5) * pitch
-        niche_x = lobby_x + side * 0.35
-        points += [
-            (lobby_x, middle - 0.6),
-            (niche_x, middle - 0.6),
-            (niche_x, middle + 0.6),
-            (lobby_x, middle + 0.6),
-        ]
+        low = middle - _LIFT_DOOR_M / 2.0
+        high = middle + _LIFT_DOOR_M / 2.0
+        niche_x = lobby_x + side * _LIFT_NICHE_M
+        points += [(lobby_x, low), (niche_x, low), (niche_x, high), (lobby_x, high)]
     return [*points, (lobby_x, top), (back_x, top)]
 
 
@@ -136,15 +155,14 @@ def _draw_core_row(
     doors = [(low + high) / 2.0 for low, high in itertools.pairwise(partitions)]
     doors[0] = 0.9
     part.add_wall_with_doors((0.0, 0.0), (length, 0.0), doors, thickness=_CORE_WALL_M)
-    for x in partitions[1:-1]:
-        part.add_wall((x, 0.0), (x, depth))
+    part.add_partitions(partitions[1:-1], depth)
     if has_stairs:
-        # Two flights around an eye, and a landing in front of them.
+        # Two flights of stairs, a passage between them, and the landing behind.
         part.add_block(0.0, 1.6, 1.35, depth)
-        part.add_block(1.85 + 0.3, 1.6, first, depth)
+        part.add_block(2.15, 1.6, first, depth)
         part.add_block(1.3, depth - 1.3, 2.2, depth)
     else:
-        # Two rows of cubicles, with washbasins in between.
+        # A row of cubicles and a row of washbasins.
         part.add_block(0.0, depth - 1.5, first, depth)
         part.add_block(first - 0.6, 0.0, first, depth - 2.4)
     for low, high in itertools.pairwise(partitions[1:]):
@@ -159,94 +177,101 @@ def _draw_sides(
     rng: np.random.Generator, drawing: Drawing, floor: _Floor, uses: dict[str, str], recess: shapely.Geometry
 ) -> None:
     """Draw the four sides; those in the south and north include the corners of the floor."""
-    width = floor.width
-    height = floor.height
     depth = floor.depth
+    far_x = floor.width - depth
+    far_y = floor.height - depth
     # In each part, x runs along the corridor, and y from the corridor to the facade.
     south = drawing.open_part(0.0, depth, mirrored=True)
-    north = drawing.open_part(0.0, height - depth)
+    north = drawing.open_part(0.0, far_y)
     west = drawing.open_part(depth, depth, 1)
-    east = drawing.open_part(width - depth, depth, 1, mirrored=True)
-    side_length = height - 2.0 * depth
-    corner = depth + floor.corridor
+    east = drawing.open_part(far_x, depth, 1, mirrored=True)
     for name, part in (("south", south), ("north", north)):
         if uses[name] == "open":
-            _draw_open_space(rng, part, width, depth, recess, has_ends=True)
-            continue
-        inner = divide_evenly(corner, width - corner, rng.uniform(3.4, 4.2))
-        doors = [(low + high) / 2.0 for low, high in itertools.pairwise(inner)]
-        doors = [corner - floor.corridor / 2.0, *doors, width - corner + floor.corridor / 2.0]
-        _draw_cells(rng, part, np.array([0.0, *inner, width]), depth, doors)
-    for name, part in (("west", west), ("east", east)):
-        if uses[name] == "open":
-            _draw_open_space(rng, part, side_length, depth, recess, has_ends=False)
-            continue
-        room_width = 3.6 if uses[name] == "cells" else 5.8
-        partitions = divide_evenly(0.0, side_length, room_width)
-        doors = [(low + high) / 2.0 for low, high in itertools.pairwise(partitions)]
-        if uses[name] == "cells":
-            _draw_cells(rng, part, partitions, depth, doors)
+            _draw_open_space(rng, part, floor.width, depth, recess)
         else:
-            _draw_meeting_rooms(part, partitions, depth, doors)
-        # Walls towards the rooms in the corners, unless they belong to closed rooms.
-        for x, neighbor in ((0.0, "south"), (side_length, "north")):
+            _draw_cells_with_corners(rng, part, floor)
+    for name, part in (("west", west), ("east", east)):
+        length = far_y - depth
+        if uses[name] == "open":
+            _draw_open_space(rng, part, length, depth, recess)
+            continue
+        if uses[name] == "cells":
+            partitions = divide_evenly(0.0, length, _CELL_WIDTH_M).tolist()
+            _draw_cells(rng, part, partitions, _find_middles(partitions), depth)
+        else:
+            partitions = divide_evenly(0.0, length, _MEETING_ROOM_WIDTH_M).tolist()
+            _draw_meeting_rooms(part, partitions, depth)
+        # Towards an open space in the corner, these rooms need a wall.
+        for x, neighbor in ((0.0, "south"), (length, "north")):
             if uses[neighbor] == "open":
                 part.add_wall((x, 0.0), (x, depth))
 
 
+def _find_middles(partitions: Sequence[float]) -> list[float]:
+    """Return the middle of each room between partitions."""
+    return [(low + high) / 2.0 for low, high in itertools.pairwise(partitions)]
+
+
+def _draw_cells_with_corners(rng: np.random.Generator, part: Drawing, floor: _Floor) -> None:
+    """Draw a row of cells with a room in each corner, whose door is at the end of a corridor."""
+    corner = floor.depth + floor.corridor
+    inner = divide_evenly(corner, floor.width - corner, rng.uniform(3.4, 4.2)).tolist()
+    corner_door = corner - floor.corridor / 2.0
+    doors = [corner_door, *_find_middles(inner), floor.width - corner_door]
+    _draw_cells(rng, part, [0.0, *inner, floor.width], doors, floor.depth)
+
+
 def _draw_cells(
-    rng: np.random.Generator, part: Drawing, partitions: Array, depth: float, doors: Sequence[float]
+    rng: np.random.Generator, part: Drawing, partitions: Sequence[float], doors: Sequence[float], depth: float
 ) -> None:
-    """Draw a row of cells, with a desk near the facade and sometimes a cupboard."""
-    part.add_wall_with_doors((partitions[0], 0.0), (partitions[-1], 0.0), doors)
-    for x in partitions[1:-1]:
-        part.add_wall((x, 0.0), (x, depth))
+    """Draw a row of cells, with a desk near the facade, or a cupboard."""
+    part.add_wall_with_doors((0.0, 0.0), (partitions[-1], 0.0), doors)
+    part.add_partitions(partitions[1:-1], depth)
     for low, high in itertools.pairwise(partitions):
         middle = (low + high) / 2.0
-        if rng.random() < 0.75:
-            part.add_centered_block(middle, depth - 2.2, 1.6, 1.6 if high - low > 5.0 else 0.8)
+        if rng.random() < _DESK_PROBABILITY:
+            desk_depth = 1.6 if high - low > _LARGE_CELL_M else 0.8
+            part.add_centered_block(middle, depth - 2.2, _DESK_WIDTH_M, desk_depth)
         else:
             part.add_block(low, 2.0, low + 0.6, depth - 1.6)
 
 
-def _draw_meeting_rooms(part: Drawing, partitions: Array, depth: float, doors: Sequence[float]) -> None:
+def _draw_meeting_rooms(part: Drawing, partitions: Sequence[float], depth: float) -> None:
     """Draw a row of meeting rooms, with a table in the middle."""
-    part.add_wall_with_doors((partitions[0], 0.0), (partitions[-1], 0.0), doors)
-    for x in partitions[1:-1]:
-        part.add_wall((x, 0.0), (x, depth))
-    for low, high in itertools.pairwise(partitions):
-        part.add_centered_block((low + high) / 2.0, depth / 2.0, 1.4, depth - 3.4)
+    middles = _find_middles(partitions)
+    part.add_wall_with_doors((0.0, 0.0), (partitions[-1], 0.0), middles)
+    part.add_partitions(partitions[1:-1], depth)
+    for middle in middles:
+        part.add_centered_block(middle, depth / 2.0, 1.4, depth - 3.4)
 
 
 def _draw_open_space(
-    rng: np.random.Generator,
-    part: Drawing,
-    length: float,
-    depth: float,
-    recess: shapely.Geometry,
-    *,
-    has_ends: bool,
+    rng: np.random.Generator, part: Drawing, length: float, depth: float, recess: shapely.Geometry
 ) -> None:
-    """Draw an open space: columns along the corridor, benches of desks across, and low shelves between."""
-    for x in divide_evenly(0.0, length, 7.2)[1:-1]:
+    """Draw an open space: columns along the corridor, and benches of desks across.
+
+    In a long open space, some benches are replaced by a telephone box and a round table. Nothing is near the
+    recess in the facade.
+    """
+    for x in divide_evenly(0.0, length, _COLUMN_DISTANCE_M)[1:-1].tolist():
         part.add_centered_block(x, 0.3, _COLUMN_M, _COLUMN_M)
     pitch = rng.uniform(3.4, 3.9)
     benches = int((length - 2.0) / pitch)
-    first = (length - (benches - 1) * pitch) / 2.0
+    first_x = (length - (benches - 1) * pitch) / 2.0
+    end = depth - 0.9
     for number in range(benches):
-        x = first + number * pitch
-        draw = rng.random()
-        bench_end = depth - 0.9
-        bench_start = bench_end - _DESK_WIDTH_M * (3 if depth > 6.9 else 2.5)
-        place = shapely.box(x - 1.1, 0.0, x + 1.1, depth)
-        plan_place = shapely.Polygon(part.to_plan(place.exterior.coords[:-1]))
-        if not recess.is_empty and plan_place.distance(recess) < 0.7:
+        x = first_x + number * pitch
+        # The number is drawn even if it is not used, because the other numbers depend on it.
+        is_short = rng.random() < _SHORT_BENCH_PROBABILITY
+        space = part.to_plan(build_box(x - 1.1, 0.0, x + 1.1, depth))
+        if not recess.is_empty and shapely.Polygon(space).distance(recess) < _RECESS_MARGIN_M:
             continue
-        if has_ends and 0 < number < benches - 1 and number % 5 == 2:
-            # A bench is replaced by a telephone box and a round table.
+        if length > _LONG_SPACE_M and 0 < number < benches - 1 and number % 5 == 2:
             part.add_block(x - 1.1, depth - 1.2, x + 1.1, depth)
             part.add_octagon(x, depth - 3.6, 0.7)
             continue
-        if draw < 0.25:
-            bench_start += _DESK_WIDTH_M
-        part.add_block(x - _DESK_DEPTH_M / 2.0, bench_start, x + _DESK_DEPTH_M / 2.0, bench_end)
+        desks = 3.0 if depth > 6.9 else 2.5
+        if is_short:
+            desks -= 1.0
+        start = end - _DESK_WIDTH_M * desks
+        part.add_block(x - _DESK_DEPTH_M / 2.0, start, x + _DESK_DEPTH_M / 2.0, end)

@@ -1,141 +1,187 @@
-"""Hospital wards: wings with rooms on both sides of a corridor, and nurse stations where wings meet."""
+"""Hospital wards: wings with rooms on both sides of a corridor, which meet at a nurse station."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline, divide_evenly
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
+from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
 
 _DOOR_WIDTH_M = 1.2
+"""Width of the doors of rooms, through which beds fit."""
+_DOOR_MARGIN_M = 0.95
+"""Distance of the middle of a door from the next wall."""
 _BATH_WIDTH_M = 1.8
 _BATH_DEPTH_M = 2.2
-_BATH_DOOR_M = 0.85
+_BATH_DOOR_M = 0.91
+"""Distance of the wall of a bath from the middle of the wall along the corridor."""
 _BED_WIDTH_M = 1.0
 _BED_LENGTH_M = 2.1
-_OUTER_WALL_M = 0.3
-_WINGS: tuple[tuple[int, ...], ...] = ((0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 2, 3))
-"""Directions of the wings, in quarter turns from the x axis, by layout: an L, a T, a cross, and a T again."""
+_BED_PITCH_M = 1.6
+_BED_MARGIN_M = 0.7
+"""Distance of the first bed from the facade."""
+_TWO_BEDS_PROBABILITY = 0.6
+_STORE_WALL_M = 0.2
+_HUB_CORNER_M = 4.0
+"""Width of the lifts, the stairs and the store in the corners of the hub."""
+_LIFT_WIDTH_M = 2.2
+_LIFT_DOOR_M = 1.2
+_LIFT_NICHE_M = 0.4
+_STAIRS_WIDTH_M = 1.5
+_COUNTER_M = 2.0
+"""Distance of the counter of the nurse station from its middle."""
+_COUNTER_DEPTH_M = 0.5
+_DIRECTIONS = ((0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 2, 3))
+"""Directions of the wings in quarter turns, by layout: an L, a T, a cross, and a T upside down."""
+_ROOMS = (6, 4, 3, 4)
+"""Number of rooms on each side of a wing, by layout."""
+
+
+@dataclass(frozen=True)
+class _Wing:
+    """Sizes of a wing along the x axis, m."""
+
+    start: float
+    """x of the first room."""
+    rooms: int
+    """Number of rooms on each side."""
+    room_width: float
+    day_room: float
+    """Length of the day room at the end."""
+    depth: float
+    """Depth of the rooms."""
+    corridor: float
+    """Width of the corridor."""
+
+    @property
+    def rooms_end(self) -> float:
+        """Position x of the end of the last room."""
+        return self.start + self.rooms * self.room_width
+
+    @property
+    def end(self) -> float:
+        """Position x of the end of the wing."""
+        return self.rooms_end + self.day_room
 
 
 def draw_ward(rng: np.random.Generator, layout: int) -> FloorPlan:
     """Draw a ward: two to four wings around a hub with a nurse station, lifts and stairs."""
-    directions = _WINGS[layout]
     depth = rng.uniform(6.0, 6.5)
     corridor = rng.uniform(2.3, 2.6)
-    hub = 2.0 * depth + corridor
-    half_hub = hub / 2.0
+    half_hub = depth + corridor / 2.0
     drawing = Drawing()
     shapes = [shapely.box(-half_hub, -half_hub, half_hub, half_hub)]
-    # With many wings, each is shorter.
-    rooms = {2: 6, 3: 4, 4: 3}[len(directions)]
-    for direction in directions:
-        room_width = rng.uniform(3.9, 4.3)
-        day_room = rng.uniform(4.6, 5.4)
-        length = rooms * room_width + day_room
-        part = drawing.open_part(0.0, 0.0, direction)
-        _draw_wing(rng, part, half_hub, rooms, room_width, day_room, depth, corridor)
-        outline = part.to_plan(
-            [(0.0, -half_hub), (half_hub + length, -half_hub), (half_hub + length, half_hub), (0.0, half_hub)]
+    for direction in _DIRECTIONS[layout]:
+        wing = _Wing(
+            start=half_hub,
+            rooms=_ROOMS[layout],
+            room_width=rng.uniform(3.9, 4.3),
+            day_room=rng.uniform(4.6, 5.4),
+            depth=depth,
+            corridor=corridor,
         )
+        part = drawing.open_part(0.0, 0.0, direction)
+        _draw_wing(rng, part, wing)
+        outline = part.to_plan(build_box(0.0, -half_hub, wing.end, half_hub))
         shapes.append(shapely.Polygon(outline))
-    _draw_hub(drawing, half_hub, corridor, directions)
+    _draw_hub(drawing, half_hub)
     return FloorPlan(build_outline(shapes), drawing.obstacles, (half_hub * 0.45, -half_hub * 0.45))
 
 
-def _draw_hub(drawing: Drawing, half_hub: float, corridor: float, directions: tuple[int, ...]) -> None:
+def _draw_hub(drawing: Drawing, half_hub: float) -> None:
     """Draw the hub: a nurse station in its middle, and lifts, stairs and a store in its corners."""
-    # The station is a counter around a desk, open to one side.
-    reach = 2.0
+    _draw_nurse_station(drawing)
+    inner = half_hub - _HUB_CORNER_M
+    drawing.add_polygon(_outline_lifts(half_hub, inner))
+    # Stairs: two flights with a landing between them.
+    drawing.add_block(inner, half_hub - _STAIRS_WIDTH_M, half_hub, half_hub)
+    drawing.add_block(inner, inner, half_hub - _STAIRS_WIDTH_M, inner + _STAIRS_WIDTH_M)
+    # A store with a shelf.
+    drawing.add_wall_with_doors((-half_hub, -inner), (-inner, -inner), [2.6], thickness=_STORE_WALL_M)
+    corner_y = -inner - _STORE_WALL_M / 2.0
+    drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORE_WALL_M)
+    drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + 0.7)
+
+
+def _draw_nurse_station(drawing: Drawing) -> None:
+    """Draw a desk behind a counter that is open on its right side."""
     drawing.add_wall(
-        (reach, -0.6),
-        (reach, -reach),
-        (-reach, -reach),
-        (-reach, reach),
-        (reach, reach),
-        (reach, 0.6),
-        thickness=0.5,
+        (_COUNTER_M, -0.6),
+        (_COUNTER_M, -_COUNTER_M),
+        (-_COUNTER_M, -_COUNTER_M),
+        (-_COUNTER_M, _COUNTER_M),
+        (_COUNTER_M, _COUNTER_M),
+        (_COUNTER_M, 0.6),
+        thickness=_COUNTER_DEPTH_M,
     )
     drawing.add_centered_block(-0.4, 0.0, 0.8, 1.8)
-    corner = half_hub - 4.0
-    # Lifts with niches in front of their doors.
-    points = [(-half_hub, half_hub), (-half_hub, corner)]
+
+
+def _outline_lifts(half_hub: float, front: float) -> list[tuple[float, float]]:
+    """Return the outline of two lifts in the upper left corner of the hub, with niches before their doors."""
+    points = [(-half_hub, half_hub), (-half_hub, front)]
     for number in range(2):
-        middle = -half_hub + (number + 0.5) * 2.2
-        points += [
-            (middle - 0.6, corner),
-            (middle - 0.6, corner + 0.4),
-            (middle + 0.6, corner + 0.4),
-            (middle + 0.6, corner),
-        ]
-    lift_end = -half_hub + 4.4
-    drawing.add_polygon([*points, (lift_end, corner), (lift_end, half_hub)])
-    # Stairs: two flights with a landing between them.
-    drawing.add_block(corner, half_hub - 1.5, half_hub, half_hub)
-    drawing.add_block(corner, corner, half_hub - 1.5, corner + 1.5)
-    # A closed store.
-    drawing.add_wall_with_doors((-half_hub, -corner), (-corner, -corner), [2.6], thickness=0.2)
-    drawing.add_wall((-corner, -corner - 0.1), (-corner, -half_hub), thickness=0.2)
-    drawing.add_block(-half_hub, -half_hub, -corner, -half_hub + 0.7)
-    del corridor, directions
+        middle = -half_hub + (number + 0.5) * _LIFT_WIDTH_M
+        left = middle - _LIFT_DOOR_M / 2.0
+        right = middle + _LIFT_DOOR_M / 2.0
+        niche = front + _LIFT_NICHE_M
+        points += [(left, front), (left, niche), (right, niche), (right, front)]
+    end = -half_hub + 2.0 * _LIFT_WIDTH_M
+    return [*points, (end, front), (end, half_hub)]
 
 
-def _draw_wing(
-    rng: np.random.Generator,
-    part: Drawing,
-    start: float,
-    rooms: int,
-    room_width: float,
-    day_room: float,
-    depth: float,
-    corridor: float,
-) -> None:
+def _draw_wing(rng: np.random.Generator, part: Drawing, wing: _Wing) -> None:
     """Draw a wing along the x axis: rooms on both sides of its corridor, and a day room at its end."""
-    end = start + rooms * room_width
-    part_length = end + day_room
-    service = int(rng.integers(0, rooms))
-    for mirrored in (False, True):
-        side = part.open_part(0.0, corridor / 2.0 if not mirrored else -corridor / 2.0, mirrored=mirrored)
-        partitions = [start + number * room_width for number in range(rooms + 1)]
-        doors = []
-        for number, (low, high) in enumerate(itertools.pairwise(partitions)):
-            # Neighboring rooms have their baths side by side.
-            has_bath_on_left = number % 2 == 1
-            doors.append(high - 0.95 if has_bath_on_left else low + 0.95)
-            is_service = mirrored and number == service
-            if is_service:
-                _draw_service_room(side, low, high, depth)
-            else:
-                room = side.open_part(low if has_bath_on_left else high, 0.0, 0)
-                _draw_patient_room(rng, room, 1.0 if has_bath_on_left else -1.0, room_width, depth)
-        side.add_wall_with_doors(
-            (start, 0.0), (end, 0.0), [door - start for door in doors], width=_DOOR_WIDTH_M
-        )
-        for x in partitions:
-            side.add_wall((x, 0.0), (x, depth))
-        # Tables of the day room.
-        side.add_centered_block(end + day_room / 2.0, depth * 0.45, 1.2, 1.8)
-    part.add_centered_block(part_length - 0.4, 0.0, 0.8, 2.0)
+    service_room = int(rng.integers(0, wing.rooms))
+    half_corridor = wing.corridor / 2.0
+    left_side = part.open_part(0.0, half_corridor)
+    _draw_wing_side(rng, left_side, wing, None)
+    right_side = part.open_part(0.0, -half_corridor, mirrored=True)
+    _draw_wing_side(rng, right_side, wing, service_room)
+    # A cupboard of the day room.
+    part.add_centered_block(wing.end - 0.4, 0.0, 0.8, 2.0)
 
 
-def _draw_patient_room(
-    rng: np.random.Generator, room: Drawing, direction: float, width: float, depth: float
-) -> None:
-    """Draw a bath cell next to the door, and one or two beds. x starts at the wall with the bath."""
+def _draw_wing_side(rng: np.random.Generator, side: Drawing, wing: _Wing, service_room: int | None) -> None:
+    """Draw the rooms on one side of a wing; y is the distance from the corridor.
+
+    The number of the service room, which has shelves instead of beds, is None if there is none.
+    """
+    partitions = [wing.start + number * wing.room_width for number in range(wing.rooms + 1)]
+    doors = []
+    for number, (low, high) in enumerate(itertools.pairwise(partitions)):
+        # Two rooms have their baths side by side.
+        has_bath_on_left = number % 2 == 1
+        door = high - _DOOR_MARGIN_M if has_bath_on_left else low + _DOOR_MARGIN_M
+        doors.append(door - wing.start)
+        if number == service_room:
+            _draw_shelves(side, low, high, wing.depth)
+        elif has_bath_on_left:
+            _draw_patient_room(rng, side.open_part(low, 0.0), 1.0, wing.depth)
+        else:
+            _draw_patient_room(rng, side.open_part(high, 0.0), -1.0, wing.depth)
+    side.add_wall_with_doors((wing.start, 0.0), (wing.rooms_end, 0.0), doors, width=_DOOR_WIDTH_M)
+    side.add_partitions(partitions, wing.depth)
+    # A table of the day room.
+    side.add_centered_block(wing.rooms_end + wing.day_room / 2.0, wing.depth * 0.45, 1.2, 1.8)
+
+
+def _draw_patient_room(rng: np.random.Generator, room: Drawing, direction: float, depth: float) -> None:
+    """Draw a bath, and one or two beds; the room extends from x = 0 in a direction of 1 or -1."""
     edge = direction * _BATH_WIDTH_M
-    room.add_wall((0.0, _BATH_DEPTH_M), (edge, _BATH_DEPTH_M), (edge, _BATH_DOOR_M + 0.06))
-    beds = 2 if rng.random() < 0.6 else 1
+    room.add_wall((0.0, _BATH_DEPTH_M), (edge, _BATH_DEPTH_M), (edge, _BATH_DOOR_M))
+    beds = 2 if rng.random() < _TWO_BEDS_PROBABILITY else 1
+    left = min(0.0, direction * _BED_LENGTH_M)
     for number in range(beds):
-        y = depth - 0.7 - number * 1.6
-        x = sorted((0.0, direction * _BED_LENGTH_M))
-        room.add_block(x[0], y - _BED_WIDTH_M, x[1], y)
-    del width
+        top = depth - _BED_MARGIN_M - number * _BED_PITCH_M
+        room.add_block(left, top - _BED_WIDTH_M, left + _BED_LENGTH_M, top)
 
 
-def _draw_service_room(side: Drawing, low: float, high: float, depth: float) -> None:
-    """Draw shelves along three walls."""
+def _draw_shelves(side: Drawing, low: float, high: float, depth: float) -> None:
+    """Draw a shelf along the facade, and one in the middle of a room."""
     side.add_block(low, depth - 0.6, high, depth)
     side.add_block((low + high) / 2.0 - 0.3, 1.4, (low + high) / 2.0 + 0.3, depth - 1.8)
