@@ -15,10 +15,20 @@ from robocov.errors import InputError, ParameterError
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.benchmark import suite
+from robocov_app.benchmark.large_plans import LARGE_PLANS
 from robocov_app.benchmark.oracle import Oracle, assign_goals
 from robocov_app.benchmark.references import list_references
 
-SOME = ("rooms", "forklifts", "blocks-7001", "homes-7001", "traffic-7002", "dense-yards-7001")
+SOME = (
+    "rooms",
+    "forklifts",
+    "blocks-7001",
+    "homes-7001",
+    "traffic-7002",
+    "dense-yards-7001",
+    "wards-7001",
+    "tunnels-7003",
+)
 WALLED = Environment(
     "walled",
     ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)),
@@ -78,6 +88,14 @@ def test_names_that_are_unknown() -> None:
         suite.select_maps([], ["room"], quick=False)
     with pytest.raises(ParameterError, match="--maps: expected a map of ideal, got forklifts"):
         suite.select_maps(["ideal"], ["forklifts"], quick=False)
+
+
+def test_tracks_on_large_plans_have_each_plan_once() -> None:
+    tracks = [track for name, track in suite.TRACKS.items() if name.startswith("plans-")]
+    for track in tracks:
+        assert [suite.FAMILY_OF[name] for name in track.maps] == list(LARGE_PLANS)
+    names = [name for track in tracks for name in track.maps]
+    assert sorted(names) == sorted(name for kind in LARGE_PLANS for name in suite.OTHER_FAMILIES[kind])
 
 
 def test_quick_has_one_map_of_each_family() -> None:
