@@ -1,4 +1,4 @@
-"""Draw the figures in README and handbook with the commands that their captions name."""
+"""Draw the figures in README and handbook: with the commands that their captions name, and large plans."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
+from robocov_app.benchmark import suite
 from robocov_app.cli import main
+from robocov_app.figures.files import save_figure
+from robocov_app.figures.runs import plot_maps
 
 PICTURES = Path(__file__).parents[1] / "app/handbook/pictures"
 COMMANDS = {
@@ -24,6 +27,10 @@ FIGURES = {
     "trap": "trajectories.png",
 }
 """File in the result folder of the command that is shown."""
+PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
+"""Tracks of the benchmark whose maps are the large plans."""
+PLAN_COLORS = 16
+"""Number of colors of the figure of the large plans, which contains shades of two colors only."""
 WIDTH_PX = 1400
 SUFFIXES = {"light": "", "dark": "-dark"}
 
@@ -35,14 +42,30 @@ def draw_figure(name: str, theme: str) -> None:
         status = main([*COMMANDS[name], "--theme", theme, "--out", str(out)])
         if status:
             raise SystemExit(status)
-        image = Image.open(out / FIGURES[name]).convert("RGB")
+        save_small_image(out / FIGURES[name], f"{name}{SUFFIXES[theme]}.png")
+
+
+def draw_large_plans(theme: str) -> None:
+    """Draw the large plans of the benchmark in a theme, one track in each row."""
+    names = [name for track in PLAN_TRACKS for name in suite.TRACKS[track].maps]
+    figure = plot_maps([suite.build_map(name) for name in names], theme)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "plans.png"
+        save_figure(figure, path)
+        save_small_image(path, f"plans{SUFFIXES[theme]}.png", colors=PLAN_COLORS)
+
+
+def save_small_image(source: Path, name: str, colors: int = 256) -> None:
+    """Reduce an image to the width of the handbook and a number of colors, and save it."""
+    image = Image.open(source).convert("RGB")
     height = round(image.height * WIDTH_PX / image.width)
     image = image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
-    image = image.quantize(256, dither=Image.Dither.NONE)
-    image.save(PICTURES / f"{name}{SUFFIXES[theme]}.png", optimize=True)
+    image = image.quantize(colors, dither=Image.Dither.NONE)
+    image.save(PICTURES / name, optimize=True)
 
 
 if __name__ == "__main__":
-    for figure in COMMANDS:
-        for figure_theme in SUFFIXES:
-            draw_figure(figure, figure_theme)
+    for figure_theme in SUFFIXES:
+        for figure_name in COMMANDS:
+            draw_figure(figure_name, figure_theme)
+        draw_large_plans(figure_theme)
