@@ -138,6 +138,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results contain no run of the suite, so there is nothing to compare")
+    rated_tracks = {name: tracks[name] for name in tracks if name in suite.RATED_TRACKS}
     page = load_template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
@@ -145,7 +146,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
         styles=entries.styles,
-        overview=_build_overview(labels, tracks),
+        overview=_build_overview(labels, rated_tracks or tracks),
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],

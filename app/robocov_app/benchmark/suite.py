@@ -109,6 +109,8 @@ class Track:
         Options of the study that differ from those of the ideal track.
     failures : tuple of (int, float)
         Index of each robot that fails, and the time of its failure, s.
+    is_rated : bool
+        Whether the track is part of a complete entry, and counts in the overview of the results.
     """
 
     summary: str
@@ -118,6 +120,7 @@ class Track:
     duration: float = DEFAULT_DURATION_S
     changes: Mapping[str, Any] = field(default_factory=dict)
     failures: tuple[tuple[int, float], ...] = ()
+    is_rated: bool = True
 
     @property
     def survivors(self) -> int:
@@ -142,32 +145,38 @@ TRACKS: Mapping[str, Track] = {
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
-    "plans-small": Track("3 robots in large buildings and tunnels", _PLANS[0], robots=3, duration=240.0),
+    "plans-small": Track(
+        "3 robots on large plans; not rated", _PLANS[0], robots=3, duration=240.0, is_rated=False
+    ),
     "plans-medium": Track(
-        "12 robots in large buildings and tunnels, range of 12 m",
+        "12 robots on large plans, communication range of 12 m; not rated",
         _PLANS[1],
         robots=12,
         duration=180.0,
         changes={"communication_range": 12.0},
+        is_rated=False,
     ),
     "plans-large": Track(
-        "24 robots in large buildings and tunnels, range of 6 m",
+        "24 robots on large plans, communication range of 6 m; not rated",
         _PLANS[2],
         robots=24,
         duration=150.0,
         changes={"communication_range": 6.0},
+        is_rated=False,
     ),
     "plans-crowd": Track(
-        "50 robots in large buildings and tunnels, range of 3 m",
+        "50 robots on large plans, communication range of 3 m; not rated",
         _PLANS[3],
         robots=50,
         duration=120.0,
         changes={"communication_range": 3.0},
+        is_rated=False,
     ),
-    "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"]),
+    "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"], is_rated=False),
 }
 """All tracks by name; only `RATED_TRACKS` count."""
-RATED_TRACKS = tuple(name for name in TRACKS if name != "tuning")
+RATED_TRACKS = tuple(name for name, track in TRACKS.items() if track.is_rated)
+"""Names of the tracks of a complete entry."""
 QUICK_TRACKS = ("ideal", "short-range")
 """Tracks of ``--quick``, with the first map of each family and the first seed."""
 

@@ -181,7 +181,10 @@ def _print_suite(options: Arguments) -> int:
     from robocov_app.benchmark import suite
 
     if options.json:
-        tracks = {name: {"maps": track.maps, "seeds": track.seeds} for name, track in suite.TRACKS.items()}
+        tracks = {
+            name: {"maps": track.maps, "seeds": track.seeds, "rated": track.is_rated}
+            for name, track in suite.TRACKS.items()
+        }
         print_answer(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK_TRACKS})
         return 0
     rows = []

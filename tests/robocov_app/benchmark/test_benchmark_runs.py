@@ -111,7 +111,11 @@ def test_bundled_results_are_complete() -> None:
         controller = result["entry"]["controller"]
         if controller != "oracle":
             assert result["entry"]["label"] == load_controller_class(controller).label
-        assert {(row["track"], row["map"], row["seed"]) for row in result["rows"]} == runs
+        rows = {(row["track"], row["map"], row["seed"]) for row in result["rows"]}
+        assert {row for row in rows if row[0] in suite.RATED_TRACKS} == runs
+        # On a track that is not rated, an entry has either all runs or none.
+        for track in {row[0] for row in rows - runs}:
+            assert {row[1] for row in rows if row[0] == track} == set(suite.TRACKS[track].maps)
         for row in result["rows"]:
             assert "error" in row or row.items() >= compute_gaps(row["track"], row["map"], row).items()
     # A result of the same controller replaces the bundled one on the page.
@@ -223,6 +227,16 @@ def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: 
     assert [row[:3] for row in incomplete] == [("Few", "own", "3 of 142")]
     # RAPF is shown next to it, over the same runs.
     assert incomplete[0][3] in incomplete[0][4:]
+
+
+@pytest.mark.parametrize("track", ["tuning", "plans-small"])
+def test_runs_on_a_track_that_is_not_rated_do_not_change_the_overview(track: str) -> None:
+    results = load_bundled_results()
+    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
+    row = {**rapf["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
+    more = {**rapf, "rows": [*rapf["rows"], row]}
+    with_more = [more if result is rapf else result for result in results]
+    assert build_tables(with_more).overview == build_tables(results).overview
 
 
 class PageTables(NamedTuple):
