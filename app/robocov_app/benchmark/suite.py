@@ -146,10 +146,10 @@ TRACKS: Mapping[str, Track] = {
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
     "plans-small": Track(
-        "3 robots on large plans; not rated", _PLANS[0], robots=3, duration=240.0, is_rated=False
+        "large plans, unlimited communication; not rated", _PLANS[0], robots=3, duration=240.0, is_rated=False
     ),
     "plans-medium": Track(
-        "12 robots on large plans, communication range of 12 m; not rated",
+        "large plans, communication range of 12 m; not rated",
         _PLANS[1],
         robots=12,
         duration=180.0,
@@ -157,7 +157,7 @@ TRACKS: Mapping[str, Track] = {
         is_rated=False,
     ),
     "plans-large": Track(
-        "24 robots on large plans, communication range of 6 m; not rated",
+        "large plans, communication range of 6 m; not rated",
         _PLANS[2],
         robots=24,
         duration=150.0,
@@ -165,7 +165,7 @@ TRACKS: Mapping[str, Track] = {
         is_rated=False,
     ),
     "plans-crowd": Track(
-        "50 robots on large plans, communication range of 3 m; not rated",
+        "large plans, communication range of 3 m; not rated",
         _PLANS[3],
         robots=50,
         duration=120.0,
