@@ -36,10 +36,12 @@ def format_row(law: str, track: str) -> str:
 
 RIVALS = ("rapf", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
-RIVAL_TRACKS = ("ideal", "short-range", "large-team", *PLAN_TRACKS)
+PLAN_CONTROLLERS = ("rapf", "lloyd")
+"""Controllers with runs on large plans."""
 ROWS = [
     *((law, track) for track in suite.RATED_TRACKS for law in ("atlas", "atlas-shared")),
-    *((law, track) for track in RIVAL_TRACKS for law in RIVALS),
+    *((law, track) for track in ("ideal", "short-range", "large-team") for law in RIVALS),
+    *((law, track) for track in PLAN_TRACKS for law in PLAN_CONTROLLERS),
 ]
 
 
