@@ -174,7 +174,8 @@ def test_the_information_test_can_fail(controller: Controller) -> None:
     steps = {
         "dispersion": [0.5, 0.7],
         "geodesic-lloyd": [1.2, 0.6],
-        **dict.fromkeys(("local-search", "exemplar"), [-1.8, -1.0]),
+        "local-search": [-1.8, -1.0],
+        "exemplar": [-1.8, -1.0],
         "atlas": [-2.5, -3.0],
         "atlas-shared": [-0.9, -0.4],
         **{name: [-0.85, -0.45] for name in SHARING},
