@@ -50,7 +50,7 @@ def test_what_is_not_known(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="unknown format 'rosy': did you mean 'ros'"):
         export_map(ROOM, "a.yaml", format="rosy")
     with pytest.raises(
-        ParameterError, match="--mode: no option of the format picture, whose options are: --cell"
+        ParameterError, match="--mode: no option of the format image, whose options are: --cell"
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
     for options, expected in (

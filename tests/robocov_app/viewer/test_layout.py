@@ -40,6 +40,7 @@ def list_boxes(layout: Layout) -> list[Box]:
         layout.bar,
         layout.rail,
         layout.arena,
+        layout.handle,
         layout.panel,
         layout.chart,
         layout.time_slider,
@@ -89,8 +90,13 @@ def test_texts_fit_at_the_scale_of_the_layout(layout: Layout) -> None:
     min_size = MIN_SIZE_PX if width >= height else MIN_PORTRAIT_SIZE_PX
     assert width / layout.scale >= min_size[0]
     assert height / layout.scale >= min_size[1]
-    assert layout.panel.width in (0, round(320 * layout.scale))
-    assert layout.status.height == layout.time_slider.height == round(26 * layout.scale)
+    row_height = round(26 * layout.scale)
+    panel_width = round(320 * layout.scale)
+    if layout.has_sheet:
+        row_height = 0
+        panel_width = width
+    assert layout.panel.width in (0, panel_width)
+    assert layout.status.height == layout.time_slider.height == row_height
 
 
 @given(WIDTHS, HEIGHTS, SCALES)
