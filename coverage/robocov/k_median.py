@@ -280,7 +280,7 @@ def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, th
 
 @kernel
 def compute_costs_with_column(table: Array, distances: Array) -> Array:
-    """Compute, for each column, the cost of given sources and the column together.
+    """Compute the cost of given sources and one more column, for every column of the table.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Exemplar-based clustering of the known map: robots are placed greedily, and sent to their goals."""
+"""Exemplar-based clustering of the known map: goals are chosen greedily, one after another."""
 
 from __future__ import annotations
 
@@ -24,21 +24,22 @@ class Exemplar(PlacementController):
     Notes
     -----
     D. Ghimire, C. Nieto-Granda and S. S. Kia, "NavEX: A Multi-Agent Coverage in Non-Convex and Uneven
-    Environments via Exemplar-Clustering" (arXiv 2504.21113). With L(S) the mean distance from all points to
-    the nearest element of S, the utility of a set of exemplars S is
+    Environments via Exemplar-Clustering" (arXiv 2504.21113). Let L(S) be the mean distance from all points to
+    the nearest element of S. The utility of a set of exemplars S is
 
         f(S) = L({s0}) - L(S ∪ {s0}),
 
     where s0 is a phantom exemplar, farther from every point than any real one. The utility is monotone and
-    submodular for any measure of distance. The greedy choice therefore gains at least 1 - 1/e of the maximum
-    (Nemhauser, Wolsey and Fisher 1978); or 1/2 if the free space has several components, each of which gets
-    as many exemplars as it has robots. The bound is one of f, not of the coverage cost L(S).
+    submodular for any measure of distance. Therefore, the utility of the greedy choice is at least 1 - 1/e of
+    the maximum (Nemhauser, Wolsey and Fisher 1978), or at least 1/2 of it if the free space has several
+    components, each of which gets as many exemplars as it has robots. These bounds hold for f, not for the
+    coverage cost L(S).
 
     Each robot computes the exemplars for the robots that it knows of; see `PlacementController`.
 
     The implementation is based on the abstract of the paper, a summary of its method and general knowledge of
-    exemplar-based clustering, not on the full text. The paper's distances are those of a visibility graph,
-    which are the geodesic distances that are used here. It also covers uneven terrain, which robocov lacks.
+    exemplar-based clustering, not on the full text. The paper computes distances with a visibility graph;
+    these are the geodesic distances used here. It also covers uneven terrain, which robocov lacks.
     """
 
     name = "exemplar"
@@ -46,7 +47,7 @@ class Exemplar(PlacementController):
     summary = "greedy exemplars of the known map, without descent (after Ghimire et al. 2025, NavEX)"
 
     def choose_candidates(self, placement_map: PlacementMap, known_team: KnownTeam) -> IntArray:
-        """Choose as many exemplars in each component of the configuration space as robots are there."""
+        """Choose as many exemplars in each component of the configuration space as it has robots."""
         robot_counts = np.bincount(known_team.components)
         return _choose_cached_exemplars(placement_map, tuple(robot_counts.tolist()))
 
@@ -63,8 +64,8 @@ def choose_exemplars(placement_map: PlacementMap, robot_counts: IntArray) -> Int
     Returns
     -------
     (q,) int array
-        The chosen candidates in the order of their choice. There are fewer than robots if a component has
-        too few.
+        The candidates, in the order in which they were chosen. There are fewer of them than robots if a
+        component has too few.
     """
     components = placement_map.components
     remaining_counts = np.zeros(max(len(robot_counts), components.max(initial=-1) + 1), dtype=np.intp)

@@ -1,4 +1,4 @@
-"""Common parts of the controllers that place the team on the known map, and then move to their goals."""
+"""Common parts of the controllers that choose goals for the whole team on the known map."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from robocov.team import Team
 _MAX_LATTICE = 512
 """Maximum number of cells of the lattice along a side of the region."""
 _MISSING_PATH_FACTOR = 2.0
-"""Length that stands for a missing path, divided by that of the longest path on the map."""
+"""Length that stands for a missing path, as a multiple of the longest path on the map."""
 _POSITION_DECIMALS = 6
-"""Decimals of known positions, m. Without rounding errors, robots have exactly the same knowledge."""
+"""Decimals of known positions, m. Rounding lets robots have exactly the same knowledge."""
 
 
 class PlacementMap:
@@ -64,6 +64,7 @@ class PlacementMap:
         lattice = math.ceil(max(high_x - low_x, high_y - low_y) / spacing)
         self.planner = GeodesicPlanner(environment, clearance, min(lattice, _MAX_LATTICE), radius)
         cost = self.planner.cost
+        # A site is in the configuration space if it is itself the nearest point of that space.
         nearest = find_nearest_inside(self.planner.configuration_space, cost.points)
         self.candidates = cost.points[(nearest == cost.points).all(axis=1)]
         self.components = self.find_components(self.candidates)
@@ -93,13 +94,13 @@ class PlacementMap:
         return np.asarray(is_inside.argmax(axis=1))
 
     def find_nearest_candidates(self, positions: Array, components: IntArray) -> IntArray:
-        """Find the candidates nearest to given positions, all different.
+        """Find the nearest candidate to each position, without using any candidate twice.
 
         Parameters
         ----------
         positions : (k, 2) array, m
         components : (k,) int array
-            The component in which the candidate of each position must be.
+            The component that must contain the candidate of each position.
 
         Returns
         -------
@@ -127,7 +128,7 @@ class PlacementMap:
         Returns
         -------
         (k, 2) array, m
-            The goal of each robot; its position if no candidate is left to which there is a path.
+            The goal of each robot, or its position if no candidate that it can reach is left for it.
         """
         goals = positions.copy()
         if len(chosen) == 0:
@@ -143,7 +144,7 @@ class PlacementMap:
         return goals
 
 
-# Maps take long to build, and must not be copied with the memories of robots.
+# Maps take long to build. They are not part of the memory of robots, which is sometimes copied.
 _build_cached_map = lru_cache(maxsize=8)(PlacementMap)
 
 
@@ -187,8 +188,8 @@ class PlacementController(WholeMapController):
     that it assumes at their last known positions. It forgets a robot that has been silent for 5 s although it
     would certainly be heard at its last known position. Robots with the same knowledge make the same plan.
 
-    Goals are assigned to robots so that the sum of the squared lengths of the shortest paths is minimal, once
-    in each `period`. Then no robot has to pass another one that is at its goal.
+    Once in each `period`, goals are assigned to robots so that the sum of the squared lengths of the shortest
+    paths is minimal. With this assignment, no robot has to pass another one that is already at its goal.
     """
 
     scanning = Scanning(rays=240, period=0.5)
@@ -245,7 +246,7 @@ class PlacementController(WholeMapController):
         return Decision(command.forces, command.goals, terms, memory=memory)
 
     def _get_placement_map(self, team: Team) -> PlacementMap:
-        """Return the points for the goals of a team. Its paths fit the largest robot."""
+        """Return the placement map of a team. Its paths are wide enough for the largest robot."""
         clearance = float(team.radius.max()) + self.clearance
         return _build_cached_map(self.get_environment(), clearance, int(self.nodes), team.min_radius)
 
@@ -256,7 +257,7 @@ class PlacementController(WholeMapController):
         sightings = memory.sightings.update(seen, memory.team)
         goals = np.full_like(memory.goals, np.nan)
         routes = []
-        # Robots with the same knowledge share a plan, so that it is not computed again for each.
+        # Robots with the same knowledge share a plan, which is computed only once.
         plans: dict[bytes, Array] = {}
         for robot in range(len(goals)):
             known_positions = sightings.positions[robot].copy()
@@ -266,8 +267,8 @@ class PlacementController(WholeMapController):
             if knowledge not in plans:
                 plans[knowledge] = self._compute_goals(placement_map, known_positions, memory.goals[robot])
             goals[robot] = plans[knowledge]
-            inside = find_nearest_inside(planner.configuration_space, seen.positions[robot][None])[0]
-            path = planner.paths.find_path(inside, goals[robot, robot])
+            start = find_nearest_inside(planner.configuration_space, seen.positions[robot][None])[0]
+            path = planner.paths.find_path(start, goals[robot, robot])
             routes.append(path[1:])
         return replace(
             memory,
@@ -279,10 +280,15 @@ class PlacementController(WholeMapController):
         )
 
     def _compute_goals(self, placement_map: PlacementMap, known_positions: Array, previous: Array) -> Array:
-        """Return the goals of all robots, (n, 2) m, as one robot plans them; nan for unknown robots.
+        """Return the goals of all robots, (n, 2) m, in the plan of one robot; nan for unknown robots.
 
-        The robot knows the positions of some robots, (n, 2) m, and has its previous plan, (n, 2) m. Both are
-        nan for other robots.
+        Parameters
+        ----------
+        placement_map : PlacementMap
+        known_positions : (n, 2) array, m
+            Its own position and the last known ones of others; nan for robots that it does not know.
+        previous : (n, 2) array, m
+            Goals in its last plan; nan for robots that were not part of it.
         """
         is_known = np.isfinite(known_positions[:, 0])
         robots = np.flatnonzero(is_known)

@@ -1,4 +1,4 @@
-"""Local search for the k-median of the known map: robots move one at a time, wherever that saves most.
+"""Local search for the k-median of the known map: goals move one at a time, each to the best point.
 
 Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
 Non-Convex Environment".
@@ -21,10 +21,10 @@ from robocov.k_median import compute_costs_with_column
 class LocalSearch(PlacementController):
     """Local search for the k-median of the known map (after Sadeghi, Asghar and Smith 2020).
 
-    In turn, each robot compares all points of its own region and of those of the robots that it knows of. If
-    it moved to one of them, the others would take over its region. It takes the best point as its goal if the
-    cost of the team decreases by more than the fraction `threshold`. The search ends when no robot has such a
-    point. Then the robots move to their goals along shortest paths.
+    Robots take turns. In its turn, a robot compares all points of its own region and of the regions of the
+    robots that it knows of: if it moved to another region, the others would take over its own. The best point
+    becomes its goal if that lowers the cost of the team by more than the fraction `threshold`. The search
+    ends when no robot finds such a point. Then the robots move to their goals along shortest paths.
 
     Notes
     -----
@@ -36,12 +36,12 @@ class LocalSearch(PlacementController):
     little higher. It requires that all robots know of each other.
 
     The cost is (22) with the density, on the points of a square lattice and with geodesic distances. The
-    search starts from the goals of the previous plan, at first from the positions of the robots. Each robot
-    computes the turns of all robots that it knows of; see `PlacementController`.
+    search starts from the goals of the previous plan or, in the first plan, from the positions of the robots.
+    Each robot computes the turns of all robots that it knows of; see `PlacementController`.
 
     The implementation is based on the abstract and the introduction of the paper and on general knowledge of
-    local search, not on the full text. In the paper, robots exchange messages, and need twice the usual
-    communication range for the guarantee. Here they know only positions.
+    local search, not on the full text. In the paper, robots exchange messages, and the bound requires twice
+    the usual communication range. Here, robots know only positions.
     """
 
     name = "local-search"
@@ -51,7 +51,7 @@ class LocalSearch(PlacementController):
     threshold: float = gain(1e-4, "1", "fraction of the cost that a move must save", high=1.0)
 
     def choose_candidates(self, placement_map: PlacementMap, known_team: KnownTeam) -> IntArray:
-        """Choose candidates that no robot improves by moving alone, starting from the previous goals."""
+        """Choose candidates by local search, starting from the previous goals."""
         sources = placement_map.find_nearest_candidates(known_team.previous_goals, known_team.components)
         return _run_cached_search(placement_map, tuple(sources.tolist()), self.threshold)
 

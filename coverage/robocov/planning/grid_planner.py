@@ -33,11 +33,11 @@ from robocov.planning.window import Window
 _MAX_ROUTE_ENDS = 12
 """Maximum number of nodes that are tried as the first node of a route, and as the last."""
 _MAX_CANDIDATES = 180
-"""Maximum number of nodes that may become goals of a team, in a small window, apart from narrow passages."""
+"""Maximum number of nodes that `choose_regular_nodes` returns in a small window."""
 _NODES_PER_CANDIDATE = 9
-"""Minimum number of nodes for each node that may become a goal, in a large window."""
+"""Minimum number of nodes for each node that `choose_regular_nodes` returns in a large window."""
 _MAX_CANDIDATE_DISTANCE_STEPS = 1.5
-"""Maximum distance of a node from the nearest node that may become a goal, in steps between these nodes."""
+"""Maximum distance of a usable node from the nearest candidate, in steps between regular nodes."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose visible nodes are cached."""
 NO_NODE = -1
@@ -178,7 +178,7 @@ class GridPlanner(MapWindow):
         -------
         nodes : (c,) int array
         k : int
-            The smallest step for which there are not too many nodes; see `_MAX_CANDIDATES`.
+            The smallest step without too many nodes; see `_MAX_CANDIDATES` and `_NODES_PER_CANDIDATE`.
         """
         max_candidates = max(_MAX_CANDIDATES, len(self.nodes) // _NODES_PER_CANDIDATE)
         rows, columns = np.divmod(np.arange(len(self.nodes)), self.window.columns)
@@ -201,8 +201,8 @@ class GridPlanner(MapWindow):
         Returns
         -------
         (c,) int array
-            The nodes from `choose_regular_nodes` and, in narrow passages, which the rows and columns of these
-            nodes may miss, further ones, so that no usable node is far from all candidates.
+            The nodes from `choose_regular_nodes`, whose rows and columns may miss narrow passages, and as
+            many further nodes as are needed so that no usable node is far from all candidates.
         """
         candidates, step = self.choose_regular_nodes(is_usable)
         max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * step * self.spacing
@@ -227,8 +227,8 @@ class GridPlanner(MapWindow):
         TeamCandidates
         """
         is_usable = np.isfinite(self.get_distances(node)) & self.has_clearance
-        # Nodes with clearance that are connected have the same usable nodes, and no two connected components
-        # have the same first one.
+        # Connected nodes with clearance have the same usable nodes, and different components have none in
+        # common. The first usable node therefore identifies the component.
         first_node = int(is_usable.argmax())
         if first_node not in self._team_candidates:
             nodes = self.choose_candidates(is_usable)
@@ -306,7 +306,7 @@ class GridPlanner(MapWindow):
         return self._search(np.concatenate(first_nodes), np.concatenate(lengths))
 
     def look_up_distances(self, position: Array, table: Array) -> Array:
-        """Return the distances from a position to some nodes, whose distances to all nodes are known.
+        """Return the distances from a position to given nodes, based on a table of distances between nodes.
 
         This takes less time than a search from the position.
 
@@ -314,7 +314,8 @@ class GridPlanner(MapWindow):
         ----------
         position : (2,) array, m
         table : (k, m) array, m
-            Distances from each of k nodes with clearance to all nodes; see `compute_distance_table`.
+            Distances from the given nodes to all nodes; see `compute_distance_table`. The given nodes have
+            clearance.
 
         Returns
         -------

@@ -95,12 +95,13 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     Returns
     -------
     (k, 2) array, m
-        The previous goals if the robot that makes the plan cannot go anywhere.
+        The goals; the previous ones if the robot that makes the plan can reach no target, or fewer nodes that
+        may become goals than there are robots.
 
     Notes
     -----
-    Starting from the previous plan, Lloyd's iteration alternates with interchange (`robocov.k_median`). If
-    all robots except for the first are fixed, the first one gets the best goal in its own cell. Goals are
+    Starting from the previous plan, Lloyd's iteration alternates with larger changes (see `improve_sources`).
+    If all robots except for the first are fixed, the first one gets the best goal in its own cell. Goals are
     assigned so that the sum of the squared path lengths is minimal: then the assignment stays the same while
     the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
@@ -139,7 +140,9 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
 def _choose_previous_candidates(
     planner: GridPlanner, candidates: IntArray, distances: Array, team: TeamSituation
 ) -> IntArray:
-    """Return the candidate closest to each previous goal, (k,), all different; fixed robots choose first.
+    """Return the candidate closest to each previous goal, (k,), without using any candidate twice.
+
+    Fixed robots choose first.
 
     Parameters
     ----------
@@ -155,7 +158,7 @@ def _choose_previous_candidates(
     for robot in np.argsort(~team.is_fixed, kind="stable").tolist():
         goal = team.previous_goals[robot]
         goal_distances = planner.look_up_distances(goal, distances)
-        # Straight distances decide between candidates to which there is no path.
+        # Candidates to which there is no path come last. Straight distances decide between them.
         straight_distances = compute_point_distances(planner.nodes[candidates], goal)
         is_reachable = np.isfinite(goal_distances)
         goal_distances = np.where(is_reachable, goal_distances, UNREACHABLE_M + straight_distances)

@@ -92,8 +92,7 @@ def test_moves_must_save_the_threshold() -> None:
     placement_map = build_map(SQUARE)
     starts = np.array([0, 1])
     for threshold in (0.0, 0.05, 0.3):
-        sources = starts
-        moved = move_in_turn(placement_map, sources, threshold)
+        moved = move_in_turn(placement_map, starts, threshold)
         # The best single move from the result saves no more than the threshold.
         cost = compute_cost(placement_map, moved)
         for robot in range(2):
@@ -104,8 +103,8 @@ def test_moves_must_save_the_threshold() -> None:
     assert move_in_turn(placement_map, starts, threshold=1.0).tolist() == starts.tolist()
 
 
-def test_the_first_robot_takes_the_best_point_of_the_whole_map() -> None:
-    """Also in the regions of others: all robots start in the left room."""
+def test_local_search_moves_goals_to_another_room() -> None:
+    """All robots start in the left room, and some goals are then in the right one."""
     placement_map = build_map(DOOR)
     is_left = placement_map.candidates[:, 0] < 3
     starts = np.flatnonzero(is_left)[:3]
@@ -149,7 +148,7 @@ def test_exemplars_are_within_their_bound(environment: Environment) -> None:
     assert (1.0 - 1.0 / math.e) * best <= utility <= best * (1.0 + 1e-12)
 
 
-def test_too_many_robots_for_a_room_stay_where_they_are() -> None:
+def test_a_room_with_too_many_robots_has_fewer_goals() -> None:
     placement_map = build_map(SPLIT, nodes=16)
     count = np.count_nonzero(placement_map.components == 1)
     assert len(choose_exemplars(placement_map, np.array([0, count + 2]))) == count

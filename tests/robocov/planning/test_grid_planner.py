@@ -94,7 +94,7 @@ def test_distances_are_those_of_a_plain_search(seed: int) -> None:
 @settings(max_examples=15)
 @given(seed=st.integers(0, 1000))
 def test_routes_keep_their_clearance_from_walls(seed: int) -> None:
-    """Between its way-points a route keeps the clearance, up to half a cell."""
+    """Between waypoints, a route keeps the clearance, up to half a cell."""
     planner = build_planner(build_random_blocks(seed), max_nodes=400)
     rng = np.random.default_rng(seed)
     free_cells = np.argwhere(~planner.is_near_wall)
@@ -106,7 +106,7 @@ def test_routes_keep_their_clearance_from_walls(seed: int) -> None:
     is_too_close = dilate(planner.is_blocked, planner.clearance / 0.1 - 0.5)
     for start, end in zip(np.vstack([position, route[:-1]]), route, strict=True):
         points = start + (end - start) * np.linspace(0.0, 1.0, 400)[:, None]
-        # The first cells may be tight: a robot may come from anywhere.
+        # The first cells may be close to a wall, because a robot may start anywhere.
         is_first = np.hypot(*(points - position).T) <= 2.0 * planner.clearance + 0.1
         assert not is_too_close[RASTER.find_cells(points)][~is_first].any()
 

@@ -27,7 +27,7 @@ def compute_cost(planner: GridPlanner, positions: np.ndarray) -> float:
 
 
 def place_at_rest(planner: GridPlanner, positions: np.ndarray, fixed: tuple[int, ...] = ()) -> np.ndarray:
-    """Place a team that is at its previous goals, where some robots are fixed."""
+    """Place a team whose robots are at their previous goals. Some of them are fixed."""
     is_fixed = np.isin(np.arange(len(positions)), fixed)
     team = TeamSituation(positions, positions, is_fixed, NO_POSITIONS)
     return place_team(planner, compute_node_weights(planner), team, MinSavings(0.01, 0.01))
@@ -97,17 +97,17 @@ def test_fixed_robots_keep_their_goals() -> None:
 def test_goals_are_exchanged_only_if_that_saves_enough() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner)
-    nobody = np.zeros(2, dtype=bool)
+    is_fixed = np.zeros(2, dtype=bool)
     start = np.array([[2.0, 2.0], [6.0, 2.0]])
     goals = place_team(
-        planner, weights, TeamSituation(start, start, nobody, NO_POSITIONS), MinSavings(1.0, 1.0)
+        planner, weights, TeamSituation(start, start, is_fixed, NO_POSITIONS), MinSavings(1.0, 1.0)
     )
     left, right = goals[:, 0]
     assert left < right
     # Each robot is past the middle: 2.4 m from its own goal, 1.6 m from the other one.
     middle = 0.5 * (left + right)
     positions = np.array([[middle + 0.4, 2.25], [middle - 0.4, 2.25]])
-    team = TeamSituation(positions, goals, nobody, NO_POSITIONS)
+    team = TeamSituation(positions, goals, is_fixed, NO_POSITIONS)
     for min_saving, is_exchanged in ((0.0, True), (0.5, True), (0.6, False)):
         new_goals = place_team(planner, weights, team, MinSavings(1.0, 1.0, swap=min_saving))
         assert np.array_equal(new_goals, goals[::-1] if is_exchanged else goals)
@@ -180,13 +180,13 @@ def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
 
 
 def test_a_team_spreads_over_narrow_tunnels() -> None:
-    """The tunnels are so narrow that few of them lead through the middle of a block of candidates."""
+    """Tunnels are so narrow that three of the seven contain no node of `choose_regular_nodes`."""
     region = Region(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 24.0], [0.0, 24.0]]))
     raster = Raster(region, 0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)
-    for row in (12, 120):
+    for rows in (slice(12, 108), slice(120, 228)):
         for column in (12, 140, 270):
-            state[row : row + 108 - 12 * (row == 12), column : column + 118] = WALL
+            state[rows, column : column + 118] = WALL
     window = Window.build_around(raster, np.array([20.0, 12.0]), math.inf, 1000)
     planner = GridPlanner(DiscoveredMap(raster, state), window, 0.13)
     crowd = np.column_stack([np.linspace(2.0, 8.0, 6), np.full(6, 0.5)])

@@ -123,7 +123,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
-        """Build a candidate at each of the given nodes that has a weight, which robots can reach.
+        """Build a candidate at each of the given nodes whose weight is positive.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
-        """Build candidates on a regular lattice, at the nodes that robots can reach.
+        """Build candidates at regularly spaced nodes that robots can reach.
 
         Parameters
         ----------
