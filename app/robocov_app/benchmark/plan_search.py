@@ -19,7 +19,7 @@ _MAX_ATTEMPTS = 400
 _MIN_PASSAGE_M = 0.6
 """Minimum width of the passages that connect the free space."""
 _START_MARGIN_M = 0.01
-"""Distance of the start disc from walls, so that the disc is still free when its center has been rounded."""
+"""Distance of the start disc from walls, so that the disc stays free when its center is rounded."""
 
 
 def search_map(
@@ -40,7 +40,7 @@ def search_map(
     seed : int
         Seed of the random numbers.
     kind_number : int
-        Number of the kind, which makes its random numbers different from those of other kinds.
+        Number of the kind, so that different kinds have different random numbers.
     draw : callable
         Function that draws a plan from a random number generator.
     start_radius : float, m
@@ -56,7 +56,7 @@ def search_map(
     Raises
     ------
     ParameterError
-        If no plan with this seed is suitable.
+        If no suitable plan is found with this seed.
     """
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([kind_number, seed, attempt])
@@ -72,27 +72,27 @@ def search_map(
         with suppress(MapError):
             return from_json(document, plan.name)
     raise ParameterError(
-        f"map {kind}-{seed}: no plan of {_MAX_ATTEMPTS} is in one piece; expected another seed"
+        f"map {kind}-{seed}: none of {_MAX_ATTEMPTS} random plans is suitable. Try another seed."
     )
 
 
 def _is_connected(plan: Environment) -> bool:
-    """Return whether the free space is connected, even without its narrow passages."""
+    """Return whether the free space is connected, and stays so without its narrow passages."""
     wide_space = plan.free.buffer(-_MIN_PASSAGE_M / 2.0, quad_segs=16)
     return len(plan.free.geoms) == 1 and isinstance(wide_space, shapely.Polygon)
 
 
 def _has_enough_obstacles(plan: Environment, min_fraction: float) -> bool:
-    """Return whether the obstacles block at least a fraction of the map."""
+    """Return whether the obstacles cover at least a given fraction of the map."""
     blocked_area = sum(obstacle.polygon.area for obstacle in plan.obstacles)
     return bool(blocked_area >= min_fraction * plan.area)
 
 
 def _find_entry(plan: Environment, entrance: Point | None, radius: float) -> DiscStart | None:
-    """Return the free start disc nearest to the entrance; None if there is no space for it."""
+    """Return the free start disc nearest to the entrance, or None if there is no space for one."""
     centers = plan.static.free.buffer(-radius - _START_MARGIN_M)
     if centers.is_empty:
         return None
-    nearby = shapely.Point(entrance or plan.region.bounds[:2])
-    x, y = shapely.shortest_line(centers, nearby).coords[0]
+    target = shapely.Point(entrance or plan.region.bounds[:2])
+    x, y = shapely.shortest_line(centers, target).coords[0]
     return DiscStart((round(x, 2), round(y, 2)), radius)

@@ -60,7 +60,7 @@ def build_rotated_block(center: Array, width: float, height: float, angle: float
 def build_wall_with_door(
     offset: float, start: float, end: float, *, door: float, width: float, is_vertical: bool
 ) -> list[Obstacle]:
-    """Return the two pieces of a wall on either side of its door; very short pieces are left out.
+    """Build the pieces of a wall on either side of its door; very short pieces are left out.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def build_wall_with_door(
     start, end : float, m
         Ends of the wall along its direction.
     door, width : float, m
-        Middle and width of the door, along the wall.
+        Middle of the door, in the same coordinate as the ends of the wall, and its width.
     is_vertical : bool
         Whether the wall is parallel to the y axis, instead of the x axis.
     """

@@ -12,6 +12,7 @@ from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
 from robocov_app.benchmark.large_plans.tunnels import draw_tunnels
 
 SEEDS = range(7001, 7005)
+"""One seed for each layout."""
 LARGEST_TEAM = 50
 RADIUS_M = 0.1
 
@@ -37,6 +38,7 @@ def test_plans_are_connected_by_wide_passages(kind: str) -> None:
 
 def test_plans_depend_on_their_seed_only() -> None:
     assert build_large_plan("wards", 1) == build_large_plan("wards", 1)
+    # Seeds 1 and 5 have the same layout.
     assert build_large_plan("wards", 1).boundary != build_large_plan("wards", 5).boundary
 
 

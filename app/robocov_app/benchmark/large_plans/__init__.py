@@ -1,6 +1,6 @@
 """Plans of large buildings and tunnels, 30 to 60 m long, drawn after real kinds of places.
 
-Each module draws one kind. Its plans have four layouts; consecutive seeds take turns.
+Each module draws one kind of plan in four layouts, which consecutive seeds select in turn.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from robocov_app.benchmark.plan_search import search_map
 from robocov_app.benchmark.plan_shapes import FloorPlan
 
 _FIRST_KIND_NUMBER = 100
-"""Number of the first kind, which makes its random numbers different from those of the smaller maps."""
+"""Number of the first kind, chosen so that no kind shares its random numbers with the smaller maps."""
 _LAYOUTS = 4
 """Number of layouts of each kind."""
 _START_RADIUS_M = 1.2
@@ -32,9 +32,9 @@ LARGE_PLANS: dict[str, Callable[[np.random.Generator, int], FloorPlan]] = {
     "schools": draw_school,
     "tunnels": draw_tunnels,
 }
-"""Functions that draw a plan with a given layout, by the name of its kind.
+"""Functions that draw a plan with a given layout, by the name of the kind.
 
-The order determines the random numbers; append new kinds, so that other maps do not change.
+The order determines the random numbers; append new kinds, so that existing maps do not change.
 """
 
 
@@ -56,7 +56,7 @@ def build_large_plan(kind: str, seed: int) -> Environment:
     Raises
     ------
     ParameterError
-        If no plan with this seed is suitable.
+        If no suitable plan is found with this seed.
     """
     layout = seed % _LAYOUTS
     return search_map(

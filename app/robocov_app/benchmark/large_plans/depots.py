@@ -29,7 +29,7 @@ _FENCE_M = 0.1
 _OFFICE_WIDTH_M = 6.5
 _OFFICE_HEIGHT_M = 6.0
 _CUT_M = (13.0, 11.0)
-"""Width and height of what is missing in the upper right corner of a hall in the shape of an L."""
+"""Width and height of the missing upper right corner of an L-shaped hall."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class _Hall:
 
 
 def draw_depot(rng: np.random.Generator, layout: int) -> FloorPlan:
-    """Draw a depot; its layout selects the direction of the racks, and whether the hall is an L."""
+    """Draw a depot; its layout selects the direction of the racks, and whether the hall is L-shaped."""
     hall = _Hall(
         width=rng.uniform(44.0, 56.0),
         height=rng.uniform(30.0, 36.0),
@@ -76,7 +76,7 @@ def draw_depot(rng: np.random.Generator, layout: int) -> FloorPlan:
         _draw_racks_across(rng, drawing, hall)
     else:
         _draw_racks_along(rng, drawing, hall)
-    return FloorPlan(build_outline([hall.outline, *bay_shapes]), drawing.obstacles, (9.0, 3.0))
+    return FloorPlan(build_outline([hall.outline, *bay_shapes]), drawing.obstacles, entrance=(9.0, 3.0))
 
 
 def _draw_office(drawing: Drawing) -> None:
@@ -91,7 +91,7 @@ def _draw_office(drawing: Drawing) -> None:
 
 
 def _draw_staging(rng: np.random.Generator, drawing: Drawing, bays_x: list[float]) -> None:
-    """Draw rows of pallets between the loading bays."""
+    """Draw the staging area: rows of one or two pallets between the loading bays."""
     length, depth = _PALLET_SIZE_M
     for low, high in itertools.pairwise(bays_x):
         rows = int(rng.integers(1, 4))
@@ -102,7 +102,7 @@ def _draw_staging(rng: np.random.Generator, drawing: Drawing, bays_x: list[float
 
 
 def _draw_racks_across(rng: np.random.Generator, drawing: Drawing, hall: _Hall) -> None:
-    """Draw racks that run away from the loading bays, with a cross aisle, and on their right a cage."""
+    """Draw racks at right angles to the side with the loading bays, a cross aisle, and a cage."""
     aisle = rng.uniform(2.7, 3.1)
     cross_y = hall.dock_depth + (hall.height - hall.dock_depth) * rng.uniform(0.48, 0.58)
     cage_left = hall.width - _CAGE_M
@@ -114,14 +114,15 @@ def _draw_racks_across(rng: np.random.Generator, drawing: Drawing, hall: _Hall) 
         drawing.add_block(left, hall.dock_depth, right, cross_y - _CROSS_AISLE_M / 2.0)
         if top - cross_y > 4.0:
             drawing.add_block(left, cross_y + _CROSS_AISLE_M / 2.0, right, top)
-    top = hall.right_height
-    _draw_cage(rng, drawing, (cage_left, top - 9.0, hall.width, top))
-    _draw_pallets(rng, drawing, (cage_left + 1.0, hall.dock_depth, hall.width - 1.2, top - 10.5))
+    cage_top = hall.right_height
+    _draw_cage(rng, drawing, (cage_left, cage_top - 9.0, hall.width, cage_top))
+    _draw_pallets(rng, drawing, (cage_left + 1.0, hall.dock_depth, hall.width - 1.2, cage_top - 10.5))
 
 
 def _draw_racks_along(rng: np.random.Generator, drawing: Drawing, hall: _Hall) -> None:
-    """Draw racks along the side with the loading bays, in three blocks, pallets, and sometimes a cage."""
+    """Draw racks parallel to the side with the loading bays, pallets, and a cage in a rectangular hall."""
     aisle = rng.uniform(2.7, 3.1)
+    # Cross aisles divide the racks into three blocks.
     blocks_x = np.linspace(_WALL_AISLE_M, hall.width - _WALL_AISLE_M, 4).tolist()
     pitch = _RACK_DEPTH_M + aisle
     for bottom in np.arange(hall.dock_depth, hall.height - _RACK_DEPTH_M - 3.6, pitch).tolist():
@@ -163,7 +164,7 @@ def _draw_cage(rng: np.random.Generator, drawing: Drawing, bounds: tuple[float, 
 def _draw_pallets(
     rng: np.random.Generator, drawing: Drawing, bounds: tuple[float, float, float, float]
 ) -> None:
-    """Draw pallets in a grid, some of whose places are empty; the bounds are left, bottom, right and top."""
+    """Draw a grid of pallets with some empty places; the bounds are left, bottom, right and top."""
     left, bottom, right, top = bounds
     columns = divide_evenly(left, right, 2.2)[:-1].tolist()
     rows = divide_evenly(bottom, top, 2.0)[:-1].tolist()

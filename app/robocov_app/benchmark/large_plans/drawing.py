@@ -80,28 +80,29 @@ class Drawing:
         start, end : (2,) sequence, m
             Ends of the wall.
         doors : sequence of float, m
-            Distances of the middles of the doors from the start.
+            Distance of the middle of each door from the start.
         width : float, m
             Width of the doors.
         thickness : float, m
             Thickness of the wall.
         """
-        first = np.array(start)
-        length = float(np.hypot(*(np.array(end) - first)))
-        direction = (np.array(end) - first) / length
+        origin = np.array(start)
+        length = float(np.hypot(*(np.array(end) - origin)))
+        direction = (np.array(end) - origin) / length
         piece_start = 0.0
+        # The last piece ends at an imaginary door beyond the end of the wall.
         for door in [*sorted(doors), length + width]:
             piece_end = min(door - width / 2.0, length)
             if piece_end - piece_start >= _MIN_WALL_PIECE_M:
-                low = first + piece_start * direction
-                high = first + piece_end * direction
+                low = origin + piece_start * direction
+                high = origin + piece_end * direction
                 self.add_wall(tuple(low), tuple(high), thickness=thickness)
             piece_start = door + width / 2.0
 
     def add_partitions(
         self, positions: Iterable[float], depth: float, *, thickness: float = INNER_WALL_M
     ) -> None:
-        """Add walls between the rooms of a row, from y = 0 to y = `depth`, at given x."""
+        """Add the walls between the rooms of a row: one from y = 0 to y = `depth` at each x."""
         for x in positions:
             self.add_wall((x, 0.0), (x, depth), thickness=thickness)
 
@@ -123,13 +124,13 @@ class Drawing:
 
 
 def build_octagon(x: float, y: float, radius: float) -> Ring:
-    """Build a regular octagon with two sides parallel to each axis, by the radius of its corners."""
+    """Build a regular octagon of a given circumradius, with two sides parallel to each axis."""
     angles = (np.arange(8) + 0.5) * np.pi / 4.0
     return round_points(np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)]))
 
 
 def build_outline(parts: Iterable[shapely.Geometry]) -> Ring:
-    """Return the outer ring of the union of shapes that are connected, counterclockwise."""
+    """Return the outer ring of the union of connected shapes, counterclockwise."""
     union = shapely.union_all(list(parts))
     if not isinstance(union, shapely.Polygon):
         raise ValueError(f"parts: expected connected shapes, got a {union.geom_type}")
@@ -140,6 +141,6 @@ def build_outline(parts: Iterable[shapely.Geometry]) -> Ring:
 
 
 def divide_evenly(start: float, end: float, width: float) -> Array:
-    """Return the partitions of a range into equal rooms whose width is as near as possible to `width`."""
+    """Divide a range into equal rooms about `width` wide, and return their walls, both ends included."""
     rooms = max(1, round((end - start) / width))
     return np.linspace(start, end, rooms + 1)

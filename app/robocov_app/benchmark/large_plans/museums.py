@@ -31,7 +31,7 @@ _PORTICO_M = 2.4
 _PROJECTION_M = 1.4
 """Depth by which the corner pavilions project from the facades."""
 _APSE_RADIUS_M = 4.6
-_MIDDLE_GALLERY_M = 3.6
+_HALF_MIDDLE_GALLERY_M = 3.6
 """Half the width of the gallery between two atriums."""
 _MAX_ROTUNDA_RADIUS_M = 6.4
 
@@ -75,6 +75,7 @@ def draw_museum(rng: np.random.Generator, layout: int) -> FloorPlan:
     drawing = Drawing()
     has_apse = layout in (1, 2)
     if has_apse:
+        # A plinth in the apse.
         drawing.add_octagon(building.middle, building.height + 1.6, 0.8)
     _draw_galleries(rng, drawing, building)
     _draw_entrance(drawing, building)
@@ -84,12 +85,12 @@ def draw_museum(rng: np.random.Generator, layout: int) -> FloorPlan:
         _draw_light_wells(rng, drawing, building)
     else:
         _draw_two_atriums(rng, drawing, building)
-    outline = _build_outline(building, has_apse=has_apse, has_pavilions=layout != 2)
-    return FloorPlan(build_outline(outline), drawing.obstacles, (building.middle, 0.4))
+    floor_parts = _build_floor_parts(building, has_apse=has_apse, has_pavilions=layout != 2)
+    return FloorPlan(build_outline(floor_parts), drawing.obstacles, entrance=(building.middle, 0.4))
 
 
-def _build_outline(building: _Building, *, has_apse: bool, has_pavilions: bool) -> list[shapely.Geometry]:
-    """Return the parts of the floor: the main part, the portico, and the corner pavilions and the apse."""
+def _build_floor_parts(building: _Building, *, has_apse: bool, has_pavilions: bool) -> list[shapely.Geometry]:
+    """Build the parts of the floor: the main building, the portico, and any corner pavilions and apse."""
     width = building.width
     height = building.height
     depth = building.depth
@@ -113,23 +114,23 @@ def _draw_galleries(rng: np.random.Generator, drawing: Drawing, building: _Build
     west = drawing.open_part(depth, 0.0, 1)
     east = drawing.open_part(building.inner_right, 0.0, 1, mirrored=True)
     _draw_entrance_row(rng, south, building)
+    # The number of galleries is odd, so that the door in the middle leads to a gallery, not to a partition.
     galleries = 2 * round((building.inner_right - depth) / rng.uniform(7.0, 9.5) / 2.0 - 0.5) + 1
-    # The number of galleries is odd, so that the door from the atrium leads to the middle one.
     partitions = np.linspace(depth, building.inner_right, galleries + 1).tolist()
     _draw_row(rng, north, partitions, depth, [building.middle])
     partitions = divide_evenly(depth, building.inner_top, rng.uniform(8.0, 10.0)).tolist()
-    gallery = (len(partitions) - 1) // 2
-    door = (partitions[gallery] + partitions[gallery + 1]) / 2.0
+    middle_gallery = (len(partitions) - 1) // 2
+    door = (partitions[middle_gallery] + partitions[middle_gallery + 1]) / 2.0
     for part in (west, east):
         _draw_row(rng, part, partitions, depth, [door])
-    columns = (depth / 2.0, building.width - depth / 2.0)
-    rows = (depth / 2.0, building.height - depth / 2.0)
-    for x, y in itertools.product(columns, rows):
+    plinths_x = (depth / 2.0, building.width - depth / 2.0)
+    plinths_y = (depth / 2.0, building.height - depth / 2.0)
+    for x, y in itertools.product(plinths_x, plinths_y):
         drawing.add_octagon(x, y, 0.9)
 
 
 def _draw_entrance_row(rng: np.random.Generator, part: Drawing, building: _Building) -> None:
-    """Draw the galleries on both sides of the entrance hall, which has two doors to the middle."""
+    """Draw the galleries on both sides of the entrance hall, and two doors in its inner wall."""
     width = rng.uniform(6.5, 8.5)
     middle = building.middle
     left = divide_evenly(building.depth, middle - building.half_hall, width).tolist()
@@ -212,8 +213,8 @@ def _draw_two_atriums(rng: np.random.Generator, drawing: Drawing, building: _Bui
     """Draw an atrium on either side of a gallery in the middle."""
     bottom = building.depth
     top = building.inner_top
-    left = building.middle - _MIDDLE_GALLERY_M
-    right = building.middle + _MIDDLE_GALLERY_M
+    left = building.middle - _HALF_MIDDLE_GALLERY_M
+    right = building.middle + _HALF_MIDDLE_GALLERY_M
     for x in (left, right):
         drawing.add_wall_with_doors(
             (x, bottom), (x, top), [(top - bottom) / 2.0], width=_DOOR_WIDTH_M, thickness=_WALL_M
@@ -225,7 +226,7 @@ def _draw_two_atriums(rng: np.random.Generator, drawing: Drawing, building: _Bui
 
 
 def _draw_light_wells(rng: np.random.Generator, drawing: Drawing, building: _Building) -> None:
-    """Draw an atrium between two light wells, which are closed."""
+    """Draw an atrium between two closed light wells."""
     width = rng.uniform(5.0, 6.0)
     left = building.depth + 1.8
     right = building.inner_right - 1.8
@@ -241,11 +242,9 @@ def _draw_atrium(drawing: Drawing, building: _Building, left: float, right: floa
     lowest = building.depth + inset
     highest = building.inner_top - inset
     columns_y = divide_evenly(lowest, highest, _COLUMN_DISTANCE_M).tolist()
-    positions = [
-        *itertools.product(columns_x, (columns_y[0], columns_y[-1])),
-        *((x, y) for y in columns_y[1:-1] for x in (columns_x[0], columns_x[-1])),
-    ]
-    for x, y in positions:
+    for x, y in itertools.product(columns_x, (columns_y[0], columns_y[-1])):
+        drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+    for y, x in itertools.product(columns_y[1:-1], (columns_x[0], columns_x[-1])):
         drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
     drawing.add_octagon((left + right) / 2.0, building.height / 2.0, 1.3)
 
@@ -268,7 +267,7 @@ def _draw_rotunda(part: Drawing, radius: float) -> None:
     """Draw an octagonal wall with doors on four sides around the origin."""
     corners = np.array(build_octagon(0.0, 0.0, radius))
     for number in range(0, 8, 2):
-        # Each piece of the wall is a whole side, with parts of both sides next to it.
+        # Each piece of the wall is a whole side, with the parts of both adjacent sides up to their doors.
         first = corners[number]
         second = corners[number + 1]
         start = _stop_at_door(first, corners[number - 1])
@@ -278,7 +277,7 @@ def _draw_rotunda(part: Drawing, radius: float) -> None:
 
 
 def _stop_at_door(corner: Array, next_corner: Array) -> Array:
-    """Return the end of the wall that goes from a corner to a door in the middle of a side."""
+    """Return the point where the wall from a corner ends, at the door in the middle of the side."""
     side = next_corner - corner
     length = float(np.hypot(*side))
     return corner + side * ((length - _DOOR_WIDTH_M) / 2.0 / length)

@@ -26,7 +26,7 @@ _DESK_DEPTH_M = 1.6
 """Depth of two desks that face each other."""
 _DESK_WIDTH_M = 1.6
 _DESK_PROBABILITY = 0.75
-"""Probability of a desk in a cell; the others have a cupboard."""
+"""Probability that a cell has a desk instead of a cupboard."""
 _CELL_WIDTH_M = 3.6
 _LARGE_CELL_M = 5.0
 """Width of a cell above which it has two desks."""
@@ -77,11 +77,12 @@ def draw_office_floor(rng: np.random.Generator, layout: int) -> FloorPlan:
     recess = _choose_recess(rng, floor, layout)
     _draw_sides(rng, drawing, floor, _USES[layout], recess)
     outline = shapely.box(0.0, 0.0, floor.width, floor.height) - recess
-    return FloorPlan(build_outline([outline]), drawing.obstacles, (floor.width / 2.0, floor.height / 2.0))
+    center = (floor.width / 2.0, floor.height / 2.0)
+    return FloorPlan(build_outline([outline]), drawing.obstacles, entrance=center)
 
 
 def _choose_recess(rng: np.random.Generator, floor: _Floor, layout: int) -> shapely.Geometry:
-    """Return what is missing from the rectangular floor: corners, a recess in the facade, or nothing."""
+    """Choose the area cut from the rectangular floor: two corners, a recess in the facade, or nothing."""
     width = floor.width
     height = floor.height
     cut = rng.uniform(2.6, 3.4)
@@ -149,22 +150,23 @@ def _outline_lifts(lobby_x: float, side: int, bottom: float, top: float) -> list
 def _draw_core_row(
     rng: np.random.Generator, part: Drawing, length: float, depth: float, *, has_stairs: bool
 ) -> None:
-    """Draw a row of rooms from the outer end of the core to the lifts: stairs or toilets, and others."""
-    first = 3.2 if has_stairs else 3.8
-    partitions = [0.0, first, *divide_evenly(first, length, 4.2)[1:].tolist()]
-    doors = [(low + high) / 2.0 for low, high in itertools.pairwise(partitions)]
+    """Draw a row of rooms from the end of the core to the lifts; the first has stairs or toilets."""
+    first_end = 3.2 if has_stairs else 3.8
+    partitions = [0.0, first_end, *divide_evenly(first_end, length, 4.2)[1:].tolist()]
+    doors = _find_middles(partitions)
     doors[0] = 0.9
     part.add_wall_with_doors((0.0, 0.0), (length, 0.0), doors, thickness=_CORE_WALL_M)
     part.add_partitions(partitions[1:-1], depth)
     if has_stairs:
         # Two flights of stairs, a passage between them, and the landing behind.
         part.add_block(0.0, 1.6, 1.35, depth)
-        part.add_block(2.15, 1.6, first, depth)
+        part.add_block(2.15, 1.6, first_end, depth)
         part.add_block(1.3, depth - 1.3, 2.2, depth)
     else:
         # A row of cubicles and a row of washbasins.
-        part.add_block(0.0, depth - 1.5, first, depth)
-        part.add_block(first - 0.6, 0.0, first, depth - 2.4)
+        part.add_block(0.0, depth - 1.5, first_end, depth)
+        part.add_block(first_end - 0.6, 0.0, first_end, depth - 2.4)
+    # The furniture of the other rooms is in the middle or along the back wall.
     for low, high in itertools.pairwise(partitions[1:]):
         middle = (low + high) / 2.0
         if rng.random() < 0.5:
@@ -201,7 +203,7 @@ def _draw_sides(
         else:
             partitions = divide_evenly(0.0, length, _MEETING_ROOM_WIDTH_M).tolist()
             _draw_meeting_rooms(part, partitions, depth)
-        # Towards an open space in the corner, these rooms need a wall.
+        # These rooms need a wall towards an open space in the corner.
         for x, neighbor in ((0.0, "south"), (length, "north")):
             if uses[neighbor] == "open":
                 part.add_wall((x, 0.0), (x, depth))
@@ -248,10 +250,10 @@ def _draw_meeting_rooms(part: Drawing, partitions: Sequence[float], depth: float
 def _draw_open_space(
     rng: np.random.Generator, part: Drawing, length: float, depth: float, recess: shapely.Geometry
 ) -> None:
-    """Draw an open space: columns along the corridor, and benches of desks across.
+    """Draw an open space: columns along the corridor, and rows of desks at right angles to it.
 
-    In a long open space, some benches are replaced by a telephone box and a round table. Nothing is near the
-    recess in the facade.
+    In a long open space, some rows are replaced by a telephone box and a round table. There are no desks near
+    the recess in the facade.
     """
     for x in divide_evenly(0.0, length, _COLUMN_DISTANCE_M)[1:-1].tolist():
         part.add_centered_block(x, 0.3, _COLUMN_M, _COLUMN_M)
@@ -261,7 +263,7 @@ def _draw_open_space(
     end = depth - 0.9
     for number in range(benches):
         x = first_x + number * pitch
-        # The number is drawn even if it is not used, because the other numbers depend on it.
+        # Chosen even where it is not used, because the random numbers that follow depend on it.
         is_short = rng.random() < _SHORT_BENCH_PROBABILITY
         space = part.to_plan(build_box(x - 1.1, 0.0, x + 1.1, depth))
         if not recess.is_empty and shapely.Polygon(space).distance(recess) < _RECESS_MARGIN_M:

@@ -19,6 +19,8 @@ _SIMPLIFICATION_M = 0.08
 """Maximum distance by which the walls are moved when needless corners are removed."""
 _SHAFT_RADIUS_M = 2.2
 """Radius of the chamber in which the robots start."""
+_HEADING_PROBABILITY = 0.86
+"""Probability that neighboring crossings inside a pillar mine are connected."""
 _PLATFORM_WIDTH_M = 3.0
 _TICKET_HALL_M = (10.0, 6.0)
 """Width and height of the ticket hall of a metro station."""
@@ -45,7 +47,7 @@ class _Network:
         self._spaces.append(shapely.Polygon(build_box(left, bottom, right, top)))
 
     def cut(self, entrance: Point, furniture: Sequence[Obstacle] = ()) -> FloorPlan:
-        """Return the plan, whose obstacles are the rock between the tunnels, and some furniture."""
+        """Build the plan; its obstacles are the furniture and the rock between the tunnels."""
         union = shapely.union_all(self._spaces)
         if not isinstance(union, shapely.Polygon):
             # Tunnels that are not connected to the others are left out.
@@ -68,13 +70,13 @@ def draw_tunnels(rng: np.random.Generator, layout: int) -> FloorPlan:
 
 
 def _move(point: Array, x: float, y: float) -> Array:
-    """Return a point at the given offset from another."""
+    """Return a point moved by `x` and `y`, m."""
     moved: Array = point + np.array([x, y])
     return moved
 
 
 def _bend(rng: np.random.Generator, start: Array, end: Array, amount: float) -> Array:
-    """Return a line from start to end with a bend in its middle, of at most the given amount, m."""
+    """Return a line from start to end whose middle is shifted sideways by at most `amount`, m."""
     across = np.array([start[1] - end[1], end[0] - start[0]]) / np.hypot(*(end - start))
     middle = (start + end) / 2.0 + rng.uniform(-amount, amount) * across
     return np.array([start, middle, end])
@@ -84,14 +86,14 @@ def _draw_pillar_mine(rng: np.random.Generator) -> FloorPlan:
     """Draw a room-and-pillar mine: headings that cross around pillars, some not yet cut through."""
     columns = int(rng.integers(6, 8))
     rows = int(rng.integers(4, 6))
-    crossings = _draw_crossings(rng, rows, columns)
+    crossings = _choose_crossings(rng, rows, columns)
     network = _Network()
     for row, column in itertools.product(range(rows), range(columns)):
         crossing = crossings[row, column]
         # The lowest heading and those on both sides are complete, so that the network is connected.
-        if column + 1 < columns and (row == 0 or rng.random() < 0.86):
+        if column + 1 < columns and (row == 0 or rng.random() < _HEADING_PROBABILITY):
             network.dig([crossing, crossings[row, column + 1]], rng.uniform(2.2, 3.0))
-        if row + 1 < rows and (column in (0, columns - 1) or rng.random() < 0.86):
+        if row + 1 < rows and (column in (0, columns - 1) or rng.random() < _HEADING_PROBABILITY):
             network.dig([crossing, crossings[row + 1, column]], rng.uniform(2.2, 3.0))
         network.add_chamber(crossing, rng.uniform(1.6, 2.0))
     # Headings at the face of the mine end in the rock.
@@ -108,8 +110,8 @@ def _draw_pillar_mine(rng: np.random.Generator) -> FloorPlan:
     return network.cut((shaft[0], shaft[1]))
 
 
-def _draw_crossings(rng: np.random.Generator, rows: int, columns: int) -> Array:
-    """Return the crossings of headings, (rows, columns, 2) m: a skewed grid with random shifts."""
+def _choose_crossings(rng: np.random.Generator, rows: int, columns: int) -> Array:
+    """Choose the crossings of headings, (rows, columns, 2) m: a skewed grid with random shifts."""
     pitch_x = rng.uniform(6.6, 7.4)
     pitch_y = rng.uniform(6.4, 7.2)
     skew = rng.uniform(0.08, 0.22)
@@ -141,7 +143,7 @@ def _draw_drift_mine(rng: np.random.Generator) -> FloorPlan:
         end = _move(lower[station], rng.uniform(-2.5, 2.5), rng.uniform(-9.5, -7.0))
         _dig_stope(rng, network, lower[station], end, max_radius=2.6)
         if station + 2 < stations and rng.random() < 0.6:
-            # A drift towards the next stope, which ends before it.
+            # A drift towards the next stope, which ends before reaching it.
             network.dig([end, _move(end, rng.uniform(5.0, 8.0), rng.uniform(-1.0, 1.0))], 1.6)
     adit = _move(lower[0], -4.5, 0.0)
     network.dig([adit, lower[0]], 3.0)
@@ -150,7 +152,7 @@ def _draw_drift_mine(rng: np.random.Generator) -> FloorPlan:
 
 
 def _dig_cross_cuts(rng: np.random.Generator, network: _Network, lower: Array, upper: Array) -> None:
-    """Dig cross-cuts between two drifts: at both ends and three other stations; others end in the rock."""
+    """Dig cross-cuts from the lower drift; those at both ends and three others reach the upper drift."""
     stations = len(lower)
     chosen = rng.choice(np.arange(1, stations - 1), 3, replace=False).tolist()
     connected = {0, stations - 1, *chosen}
@@ -258,7 +260,7 @@ def _draw_metro(rng: np.random.Generator) -> FloorPlan:
 
 
 def _dig_first_line(rng: np.random.Generator, network: _Network, length: float, gap: float) -> list[float]:
-    """Dig two platforms with a concourse between them, and return the x of its cross passages."""
+    """Dig platforms at y = 0 and y = `gap` and a concourse between them; return the x of its passages."""
     network.dig([(0.0, 0.0), (length, 0.0)], _PLATFORM_WIDTH_M)
     network.dig([(0.0, gap), (length, gap)], _PLATFORM_WIDTH_M)
     network.dig([(length * 0.2, gap / 2.0), (length * 0.8, gap / 2.0)], 2.8)
@@ -286,7 +288,7 @@ def _dig_second_line(rng: np.random.Generator, network: _Network, x: float, y: f
     Returns
     -------
     start, link : (2,) sequence, m
-        Two points on the first platform.
+        Points on the first platform, near its start and beyond its middle.
     """
     first = np.array([x, y])
     direction = np.array([0.42, 0.91])
@@ -294,18 +296,18 @@ def _dig_second_line(rng: np.random.Generator, network: _Network, x: float, y: f
     length = rng.uniform(19.0, 23.0)
     distance = 8.0
     for offset in (0.0, distance):
-        start = first + offset * across
-        network.dig([start, start + length * direction], _PLATFORM_WIDTH_M)
+        platform = first + offset * across
+        network.dig([platform, platform + length * direction], _PLATFORM_WIDTH_M)
     for fraction in (0.15, 0.5, 0.85):
-        start = first + fraction * length * direction
-        network.dig([start, start + distance * across], 1.6)
-    near = first + 2.0 * direction
-    far = first + 0.62 * length * direction
-    return (near[0], near[1]), (far[0], far[1])
+        passage = first + fraction * length * direction
+        network.dig([passage, passage + distance * across], 1.6)
+    start = first + 2.0 * direction
+    link = first + 0.62 * length * direction
+    return (start[0], start[1]), (link[0], link[1])
 
 
 def _build_ticket_hall_furniture(x: float, y: float) -> list[Obstacle]:
-    """Return two ticket gates and a booth in the ticket hall around a point."""
+    """Build two ticket gates and a booth in the ticket hall around a point."""
     boxes = [
         build_box(x - 3.0, y + 1.0, x - 2.6, y + 2.2),
         build_box(x - 1.6, y + 1.0, x - 1.2, y + 2.2),

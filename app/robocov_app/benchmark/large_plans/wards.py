@@ -18,7 +18,7 @@ _DOOR_MARGIN_M = 0.95
 _BATH_WIDTH_M = 1.8
 _BATH_DEPTH_M = 2.2
 _BATH_DOOR_M = 0.91
-"""Distance of the wall of a bath from the middle of the wall along the corridor."""
+"""Distance of the side wall of a bath from the center line of the corridor wall; the gap is its door."""
 _BED_WIDTH_M = 1.0
 _BED_LENGTH_M = 2.1
 _BED_PITCH_M = 1.6
@@ -89,7 +89,8 @@ def draw_ward(rng: np.random.Generator, layout: int) -> FloorPlan:
         outline = part.to_plan(build_box(0.0, -half_hub, wing.end, half_hub))
         shapes.append(shapely.Polygon(outline))
     _draw_hub(drawing, half_hub)
-    return FloorPlan(build_outline(shapes), drawing.obstacles, (half_hub * 0.45, -half_hub * 0.45))
+    entrance = (half_hub * 0.45, -half_hub * 0.45)
+    return FloorPlan(build_outline(shapes), drawing.obstacles, entrance=entrance)
 
 
 def _draw_hub(drawing: Drawing, half_hub: float) -> None:
@@ -139,22 +140,24 @@ def _draw_wing(rng: np.random.Generator, part: Drawing, wing: _Wing) -> None:
     service_room = int(rng.integers(0, wing.rooms))
     half_corridor = wing.corridor / 2.0
     left_side = part.open_part(0.0, half_corridor)
-    _draw_wing_side(rng, left_side, wing, None)
+    _draw_wing_side(rng, left_side, wing, service_room=None)
     right_side = part.open_part(0.0, -half_corridor, mirrored=True)
-    _draw_wing_side(rng, right_side, wing, service_room)
+    _draw_wing_side(rng, right_side, wing, service_room=service_room)
     # A cupboard of the day room.
     part.add_centered_block(wing.end - 0.4, 0.0, 0.8, 2.0)
 
 
-def _draw_wing_side(rng: np.random.Generator, side: Drawing, wing: _Wing, service_room: int | None) -> None:
+def _draw_wing_side(
+    rng: np.random.Generator, side: Drawing, wing: _Wing, *, service_room: int | None
+) -> None:
     """Draw the rooms on one side of a wing; y is the distance from the corridor.
 
-    The number of the service room, which has shelves instead of beds, is None if there is none.
+    `service_room` is the number of the room that has shelves instead of beds, or None.
     """
     partitions = [wing.start + number * wing.room_width for number in range(wing.rooms + 1)]
     doors = []
     for number, (low, high) in enumerate(itertools.pairwise(partitions)):
-        # Two rooms have their baths side by side.
+        # The baths of adjacent rooms are side by side, in pairs.
         has_bath_on_left = number % 2 == 1
         door = high - _DOOR_MARGIN_M if has_bath_on_left else low + _DOOR_MARGIN_M
         doors.append(door - wing.start)
@@ -171,7 +174,7 @@ def _draw_wing_side(rng: np.random.Generator, side: Drawing, wing: _Wing, servic
 
 
 def _draw_patient_room(rng: np.random.Generator, room: Drawing, direction: float, depth: float) -> None:
-    """Draw a bath, and one or two beds; the room extends from x = 0 in a direction of 1 or -1."""
+    """Draw a bath, and one or two beds; the room extends from x = 0 to the right (1) or left (-1)."""
     edge = direction * _BATH_WIDTH_M
     room.add_wall((0.0, _BATH_DEPTH_M), (edge, _BATH_DEPTH_M), (edge, _BATH_DOOR_M))
     beds = 2 if rng.random() < _TWO_BEDS_PROBABILITY else 1
