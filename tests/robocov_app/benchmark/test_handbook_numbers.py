@@ -37,12 +37,18 @@ def format_row(law: str, track: str) -> str:
 
 RIVALS = ("rapf", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
-PLAN_CONTROLLERS = ("rapf", "lloyd")
-"""Controllers with runs on large plans."""
+PLAN_ROWS = [
+    *((law, track) for track in PLAN_TRACKS for law in ("rapf", "lloyd")),
+    *(
+        (law, "plans-small")
+        for law in ("atlas-shared", "frontier-median", "greedy-submodular", "geodesic-lloyd")
+    ),
+]
+"""Controllers and tracks with runs on large plans."""
 ROWS = [
     *((law, track) for track in suite.RATED_TRACKS for law in ("atlas", "atlas-shared")),
     *((law, track) for track in ("ideal", "short-range", "large-team") for law in RIVALS),
-    *((law, track) for track in PLAN_TRACKS for law in PLAN_CONTROLLERS),
+    *PLAN_ROWS,
 ]
 
 
@@ -84,8 +90,15 @@ FAILURES_OF_ATLAS = (
     ("large-team", "large-caves-7002"),
 )
 CONTROLLERS_OF_FAILURES = ("atlas", "atlas-shared", "greedy-submodular", "rapf")
-TUNNELS: tuple[tuple[str, str], ...] = ()
-CONTROLLERS_OF_TUNNELS = ("atlas-shared", "greedy-submodular", "local-search", "geodesic-lloyd", "rapf")
+TUNNELS = (("plans-small", "tunnels-7001"),)
+CONTROLLERS_OF_TUNNELS = (
+    "atlas-shared",
+    "greedy-submodular",
+    "frontier-median",
+    "geodesic-lloyd",
+    "rapf",
+    "lloyd",
+)
 FAILURES = [
     *((track, name, CONTROLLERS_OF_FAILURES) for track, name in FAILURES_OF_ATLAS),
     *((track, name, CONTROLLERS_OF_TUNNELS) for track, name in TUNNELS),
