@@ -66,7 +66,7 @@ def test_the_source_archive_has_the_tests_and_no_film(tmp_path: Path) -> None:
     assert {"README.md", PROJECT["readme"], "tests/test_package.py", "maps/rooms.json"} <= sizes.keys()
     assert not [name for name in sizes if re.search(r"mp4$|__pycache__|\.nb[ic]$|handbook/reference/", name)]
     assert max(sizes.values()) < 250_000
-    assert Path(archive).stat().st_size < 5e6
+    assert Path(archive).stat().st_size < 5.5e6
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_the_wheel_carries_maps_entries_and_a_handbook_that_needs_no_sphinx(tmp_
     empty = tmp_path / "empty"
     with zipfile.ZipFile(wheel) as files:
         files.extractall(site)
-    assert Path(wheel).stat().st_size < 5.5e6
+    assert Path(wheel).stat().st_size < 6e6
     assert {path.name for path in site.iterdir() if "-" not in path.name} == {"robocov", "robocov_app"}
     assert (site / "robocov/__init__.pyi").is_file(), "the list of public names"
     assert (site / "robocov_app/pages/searchindex.js").is_file() and (

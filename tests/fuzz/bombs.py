@@ -250,7 +250,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
         "1000 files",
     ),
     "imdf: levels": (lambda: Case(build_imdf_files(_LEVELS)), Job("folder"), "objects"),
-    "picture: unpacked": (_build_case("a.png", _build_png), Job("import", None, {"cell": 1.0}), "million"),
+    "image: unpacked": (_build_case("a.png", _build_png), Job("import", None, {"cell": 1.0}), "million"),
     "study: runs": (
         _build_case("study.toml", _build_study),
         Job("study"),
