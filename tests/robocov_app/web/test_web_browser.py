@@ -13,6 +13,8 @@ from sub_path_proxy import PREFIX, SubPathProxy
 pytest.importorskip("websockets")
 
 MAPS = Path(__file__).parents[3] / "maps"
+DOWNLOADS_HEIGHT = 32
+"""Height of the bar of saved files on pages without touch, CSS px."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -120,37 +122,37 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         )
         browser.run_script(upload, (MAPS / "trap.json").read_text())
         browser.wait_until(lambda: read_picture(browser) != begun)
-        assert not browser.find_all("#saved a"), "what was dropped has not been saved"
+        assert not browser.find_all("#downloads a"), "what was dropped has not been saved"
         wait_for_rest(browser)
         press_with_control(browser, "s")
-        browser.wait_until(lambda: browser.find_all("#saved a"))
+        browser.wait_until(lambda: browser.find_all("#downloads a"))
         message = browser.find("#status").get_property("textContent")
         assert "saved" in message
         assert str(tmp_path) not in message
-        assert browser.find("#saved").get_property("open")
-        browser.find("#saved a").click()
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720 - DOWNLOADS_HEIGHT])
+        browser.find("#downloads a").click()
         browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))
         teacher = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
         set_size(browser, 1024, 900)
         browser.driver.get(link)
-        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
-        browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900])
+        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "saved", "watching"})
+        browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900 - DOWNLOADS_HEIGHT])
         set_size(browser, 1280, 720)
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
-        browser.wait_until(lambda: get_classes(browser) == {"watching"})
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
+        browser.wait_until(lambda: get_classes(browser) == {"saved", "watching"})
+        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720 - DOWNLOADS_HEIGHT])
         browser.find("summary").click()
         browser.run_script("prompt = () => 'Ada'")
         browser.find_all("#here button")[1].click()
         browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
         browser.find("#here button").click()  # a second window of the teacher's takes control
-        browser.wait_until(lambda: get_classes(browser) == set())
+        browser.wait_until(lambda: get_classes(browser) == {"saved"})
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
-        browser.wait_until(lambda: get_classes(browser) == set())
+        browser.wait_until(lambda: get_classes(browser) == {"saved"})
         assert not browser.read_console()
 
 
@@ -384,6 +386,56 @@ def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(
             browser.find("#lesson").click()
             browser.wait_until(lambda: browser.find("#lesson").get_attribute("aria-pressed") == "true")
             assert not browser.find("#panel").is_enabled()
+            assert browser.read_console() == []
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+def find_covering_elements(browser):
+    """Return the selectors of the elements of saved files that overlap the window."""
+    script = (
+        "const window = canvas.getBoundingClientRect();"
+        "const covers = (box) => box.height > 0 && box.top < window.bottom;"
+        "return ['#saved', '#downloads', '#touch'].filter("
+        "(selector) => covers(document.querySelector(selector).getBoundingClientRect()))"
+    )
+    return browser.run_script(script)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "has_touch"), [(390, 844, True), (844, 390, True), (1280, 720, False)]
+)
+def test_saved_files_cover_the_window_only_when_the_user_opens_them(
+    browser, tmp_path, width, height, has_touch
+):
+    touch = {"enabled": has_touch}
+    if has_touch:
+        touch["maxTouchPoints"] = 2
+    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    try:
+        set_size(browser, width, height)
+        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+            browser.driver.get(link)
+            browser.wait_until(lambda: "blank" not in get_classes(browser))
+            wait_for_rest(browser)
+            browser.run_script("tell({kind: 'command', name: 'save:session'})")
+            browser.wait_until(lambda: "saved" in get_classes(browser))
+            wait_for_rest(browser)
+            assert find_covering_elements(browser) == []
+            if not has_touch:
+                assert browser.find("#downloads a").is_displayed()
+                return
+            assert not browser.find("#downloads").is_displayed()
+            button = browser.find("#to-saved")
+            assert min(button.size.values()) >= 48
+            button.click()
+            assert browser.find("#saved a").text == "rooms-1.robocov"
+            assert find_covering_elements(browser) == ["#saved"]
+            button.click()
+            assert find_covering_elements(browser) == []
+            button.click()
+            browser.find("#to-tools").click()
+            assert find_covering_elements(browser) == [], "another sheet takes its place"
             assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
