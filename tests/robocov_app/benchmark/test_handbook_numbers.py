@@ -41,7 +41,7 @@ PLAN_ROWS = [
     *((law, track) for track in PLAN_TRACKS for law in ("rapf", "lloyd")),
     *(
         (law, "plans-small")
-        for law in ("atlas-shared", "frontier-median", "greedy-submodular", "geodesic-lloyd")
+        for law in ("atlas-shared", "frontier-median", "greedy-submodular", "geodesic-lloyd", "local-search")
     ),
 ]
 """Controllers and tracks with runs on large plans."""
