@@ -149,7 +149,7 @@ _build_cached_map = lru_cache(maxsize=8)(PlacementMap)
 
 
 class KnownTeam(NamedTuple):
-    """What a robot knows about the k robots of its team, itself included, in the order of their indices."""
+    """Knowledge of a robot about the k robots that it knows of, itself included, in the order of indices."""
 
     robots: IntArray
     """(k,) Their indices."""

@@ -17,7 +17,7 @@ _MAX_ROBOTS_WITH_MESSAGES = 30
 
 
 class Knowledge(NamedTuple):
-    """What the robots remember at a state.
+    """Knowledge of the robots at a recorded state.
 
     Attributes
     ----------
