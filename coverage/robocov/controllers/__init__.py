@@ -7,10 +7,11 @@
 - `user_modules`: controllers in files of users
 - `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers without
   a map of the region
-- `geodesic_lloyd`, `diffeomorphism`, `local_search`, `exemplar`: controllers that know the whole map
+- `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
+- `placement`: controllers that place the whole team on the known map
 - `exploration`: controllers that build the map while they cover the region
-- `known_cells`, `known_map`, `known_placement`, `convex_chart`, `driving`: cells, maps, goals, velocities and
-  forces, for several controllers
+- `known_cells`, `known_map`, `convex_chart`, `driving`: cells, maps, velocities and forces, for several
+  controllers
 - `density_exchange`: messages with measurements of the density
 """
 
@@ -19,7 +20,6 @@ from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, get_information, inform_controller
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
-from robocov.controllers.exemplar import Exemplar
 from robocov.controllers.exploration.atlas import Atlas
 from robocov.controllers.exploration.atlas_shared import AtlasShared
 from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
@@ -30,7 +30,8 @@ from robocov.controllers.gains import get_gain_values, get_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.individual import IndividualController, IndividualControllerAdapter, OwnView
 from robocov.controllers.lloyd import Lloyd, RangeLimited
-from robocov.controllers.local_search import LocalSearch
+from robocov.controllers.placement.exemplar import Exemplar
+from robocov.controllers.placement.local_search import LocalSearch
 from robocov.controllers.registry import (
     CONTROLLERS,
     RECOMMENDED_CONTROLLERS,

@@ -18,7 +18,6 @@ from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.boosting import Boosting
 from robocov.controllers.diffeomorphism import Diffeomorphism
-from robocov.controllers.exemplar import Exemplar
 from robocov.controllers.exploration.atlas import Atlas
 from robocov.controllers.exploration.atlas_shared import AtlasShared
 from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
@@ -29,7 +28,8 @@ from robocov.controllers.gains import Option, Value, get_gains, instantiate_cont
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.individual import to_team_controller
 from robocov.controllers.lloyd import Lloyd, RangeLimited
-from robocov.controllers.local_search import LocalSearch
+from robocov.controllers.placement.exemplar import Exemplar
+from robocov.controllers.placement.local_search import LocalSearch
 from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import ControllerSource, explain_fault, load_class

@@ -13,7 +13,7 @@ import numpy as np
 
 from robocov.arrays import IntArray
 from robocov.controllers.gains import gain
-from robocov.controllers.known_placement import KnownTeam, PlacementController, PlacementMap
+from robocov.controllers.placement.placement_controller import KnownTeam, PlacementController, PlacementMap
 from robocov.k_median import compute_costs_with_column
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from robocov.controllers import Exemplar, LocalSearch, inform_controller, make_controller
-from robocov.controllers.exemplar import choose_exemplars
-from robocov.controllers.known_placement import PlacementController, PlacementMap
-from robocov.controllers.local_search import move_in_turn
+from robocov.controllers.placement.exemplar import choose_exemplars
+from robocov.controllers.placement.local_search import move_in_turn
+from robocov.controllers.placement.placement_controller import PlacementController, PlacementMap
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, WallObstacle
