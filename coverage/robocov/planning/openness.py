@@ -26,6 +26,8 @@ _TOLERANCE = 1e-5
 """The relaxation ends when no openness changes by more than this in an iteration."""
 _OUTSIDE = 255
 """State that marks cells outside the region."""
+_SIDE_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1))
+"""Steps from a cell to its four neighbors: rows up, columns right."""
 
 
 class _BlockGrid(NamedTuple):
@@ -112,36 +114,47 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
         link_counts_up=np.zeros((block_rows + 1, block_columns + 1)),
         link_counts_right=np.zeros((block_rows + 1, block_columns + 1)),
     )
-    for row in range(rows):
-        i = row // block_side
-        for column in range(columns):
-            j = column // block_side
-            state = cells[row, column]
-            if state == UNKNOWN:
-                blocks.unknown_counts[i, j] += 1.0
-            if row + 1 < rows:
-                i_above = (row + 1) // block_side
-                if state == UNKNOWN and cells[row + 1, column] == UNKNOWN and i_above > i:
-                    blocks.link_counts_up[i, j] += 1.0
-                _count_side(state, cells[row + 1, column], i, j, blocks)
-                _count_side(cells[row + 1, column], state, i_above, j, blocks)
-            if column + 1 < columns:
-                j_right = (column + 1) // block_side
-                if state == UNKNOWN and cells[row, column + 1] == UNKNOWN and j_right > j:
-                    blocks.link_counts_right[i, j] += 1.0
-                _count_side(state, cells[row, column + 1], i, j, blocks)
-                _count_side(cells[row, column + 1], state, i, j_right, blocks)
+    for i in range(block_rows):
+        for j in range(block_columns):
+            counts = _count_block(cells, i, j, block_side)
+            blocks.unknown_counts[i, j] = counts[0]
+            blocks.free_side_counts[i, j] = counts[1]
+            blocks.wall_side_counts[i, j] = counts[2]
+            blocks.link_counts_up[i, j] = counts[3]
+            blocks.link_counts_right[i, j] = counts[4]
     return blocks
 
 
 @kernel
-def _count_side(state: int, neighbor_state: int, i: int, j: int, blocks: _BlockGrid) -> None:
-    """Count the side between a cell in block (i, j) and its neighbor if only the cell itself is unknown."""
-    if state == UNKNOWN and neighbor_state != UNKNOWN and neighbor_state != _OUTSIDE:
-        if neighbor_state == FREE:
-            blocks.free_side_counts[i, j] += 1.0
-        else:
-            blocks.wall_side_counts[i, j] += 1.0
+def _count_block(cells: NDArray[np.uint8], i: int, j: int, block_side: int) -> tuple[int, int, int, int, int]:
+    """Count the unknown cells of block (i, j), and their sides in the order of `_BlockGrid`."""
+    rows, columns = cells.shape
+    end_row = min((i + 1) * block_side, rows)
+    end_column = min((j + 1) * block_side, columns)
+    unknown_count = 0
+    free_side_count = 0
+    wall_side_count = 0
+    link_count_up = 0
+    link_count_right = 0
+    for row in range(i * block_side, end_row):
+        for column in range(j * block_side, end_column):
+            if cells[row, column] != UNKNOWN:
+                continue
+            unknown_count += 1
+            for up, right in _SIDE_STEPS:
+                neighbor_row = row + up
+                neighbor_column = column + right
+                if not (0 <= neighbor_row < rows and 0 <= neighbor_column < columns):
+                    continue
+                state = cells[neighbor_row, neighbor_column]
+                if state == FREE:
+                    free_side_count += 1
+                elif state == UNKNOWN:
+                    link_count_up += neighbor_row == end_row
+                    link_count_right += neighbor_column == end_column
+                elif state != _OUTSIDE:
+                    wall_side_count += 1
+    return unknown_count, free_side_count, wall_side_count, link_count_up, link_count_right
 
 
 @kernel
