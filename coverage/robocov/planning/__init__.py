@@ -3,8 +3,11 @@
 - `raster`, `discovered_map`: square cells, and the occupancy grid that a robot builds from scans
 - `scan_log`: the scans that a robot has, and the map that it builds from them
 - `openness`: the probability that an unknown cell is free
-- `window`, `map_window`, `lattice`, `grid_planner`: distances and routes on a lattice of nodes in the map
-- `portals`: connections through passages that a coarse lattice misses
+- `window`, `map_window`: the cells of the map in a window, and a lattice of nodes
+- `lattice`, `portals`, `lattice_graph`: the edges between the nodes, and the shortest distances along them
+- `node_visibility`: lines of sight, and the nodes that are visible from a position
+- `routes`, `goal_candidates`: routes of robots, and the nodes that may become goals
+- `grid_planner`: all of these for one window, shared by the robots that share a map
 - `team_placement`, `own_goal`: goals of a team, and the goal of one robot
 - `viewpoint`: positions from which a robot can look into unknown space
 - `voronoi_roadmap`: the generalized Voronoi graph of a map

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.planning.grid_planner import NO_NODE, GridPlanner
-from robocov.planning.map_window import SIDE_STEPS
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.map_window import SIDE_STEPS, MapWindow
+from robocov.planning.node_visibility import NO_NODE
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_MOVES = 6
@@ -80,7 +81,7 @@ def find_own_goal(
         node = best
         neighbors = search.evaluate_neighbors(node)
     cell_distances = search.compute_cell_distances(node)
-    goal, excess = _refine_goal(planner, node, neighbors, search.costs, previous_goal)
+    goal, excess = _refine_goal(planner.map_window, node, neighbors, search.costs, previous_goal)
     if np.isfinite(previous_goal).all():
         cell_cost = float((search.target_weights * cell_distances[search.targets]).sum())
         if excess < min_saving * cell_cost:
@@ -114,24 +115,25 @@ class _NodeSearch:
         first_node : int
         """
         self._planner = planner
-        distances = planner.get_distances(first_node)
+        distances = planner.graph.get_distances(first_node)
         self.targets: IntArray = np.flatnonzero(np.isfinite(distances) & (weights > 0.0))
         self.target_weights: Array = weights[self.targets]
         other_distances = planner.compute_distances_from(other_positions)[self.targets]
         self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
         own_distances = distances[self.targets]
         cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
+        spacing = planner.map_window.spacing
         # Nodes beyond the limit cannot become part of the robot's cell within the few moves of the search.
-        self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_SPACINGS * planner.spacing
+        self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_SPACINGS * spacing
         self._node_count = len(weights)
         self._distances: dict[int, Array] = {}
         self.costs: dict[int, float] = {}
 
     def evaluate_neighbors(self, node: int) -> list[int]:
         """Add the costs of a node and its neighbors to `costs`. Return the neighbors."""
-        neighbors = _list_neighbors(self._planner, node)
+        neighbors = _list_neighbors(self._planner.map_window, node)
         new_nodes = [k for k in (node, *neighbors) if k != NO_NODE and k not in self._distances]
-        tables = self._planner.compute_distances_within(new_nodes, self._limit)
+        tables = self._planner.graph.compute_distances_within(new_nodes, self._limit)
         for new_node, table in zip(new_nodes, tables, strict=True):
             distances = table[self.targets]
             nearest = np.minimum(self._other_distances, distances)
@@ -148,24 +150,24 @@ class _NodeSearch:
         return cell_distances
 
 
-def _list_neighbors(planner: GridPlanner, node: int) -> list[int]:
+def _list_neighbors(map_window: MapWindow, node: int) -> list[int]:
     """Return the nodes on the four sides of a node, in the order of `SIDE_STEPS`.
 
     `NO_NODE` stands for a node without clearance or outside the window.
     """
-    rows = planner.window.rows
-    columns = planner.window.columns
+    rows = map_window.window.rows
+    columns = map_window.window.columns
     row, column = divmod(node, columns)
     neighbors = []
     for up, right in SIDE_STEPS:
         is_inside = 0 <= row + up < rows and 0 <= column + right < columns
         neighbor = node + up * columns + right
-        neighbors.append(neighbor if is_inside and planner.has_clearance[neighbor] else NO_NODE)
+        neighbors.append(neighbor if is_inside and map_window.has_clearance[neighbor] else NO_NODE)
     return neighbors
 
 
 def _refine_goal(
-    planner: GridPlanner, node: int, neighbors: list[int], costs: Mapping[int, float], previous_goal: Array
+    map_window: MapWindow, node: int, neighbors: list[int], costs: Mapping[int, float], previous_goal: Array
 ) -> tuple[Array, float]:
     """Return the position of minimum cost near a node, and the excess cost of the previous goal.
 
@@ -176,10 +178,10 @@ def _refine_goal(
     """
     # The order is that of `SIDE_STEPS`. Axis 0 is x, and axis 1 is y.
     right, up, left, down = neighbors
-    goal = planner.nodes[node].copy()
+    goal = map_window.nodes[node].copy()
     excess = 0.0
     for axis, (ahead, behind) in enumerate(((right, left), (up, down))):
-        offset = (previous_goal[axis] - planner.nodes[node][axis]) / planner.spacing
+        offset = (previous_goal[axis] - map_window.nodes[node][axis]) / map_window.spacing
         if abs(offset) > 1.0:
             excess = math.inf
         if NO_NODE in (ahead, behind):
@@ -188,7 +190,7 @@ def _refine_goal(
         curvature = costs[ahead] + costs[behind] - 2.0 * costs[node]
         if curvature > 0.0:
             shift = min(max(-slope / curvature, -_MAX_SHIFT_SPACINGS), _MAX_SHIFT_SPACINGS)
-            goal[axis] += shift * planner.spacing
+            goal[axis] += shift * map_window.spacing
             previous_cost = slope * offset + 0.5 * curvature * offset * offset
             min_cost = slope * shift + 0.5 * curvature * shift * shift
             excess += previous_cost - min_cost

@@ -19,7 +19,9 @@ import scipy
 from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.density import Density
 from robocov.k_median import improve_sources, move_first_source
-from robocov.planning.grid_planner import NO_NODE, GridPlanner
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.map_window import MapWindow
+from robocov.planning.node_visibility import NO_NODE
 
 UNREACHABLE_M = 1e9
 """Finite value used in place of the infinite distance to a node that cannot be reached."""
@@ -57,13 +59,13 @@ class MinSavings(NamedTuple):
 
 
 def compute_node_weights(
-    planner: GridPlanner, density: Density | None = None, *, only_known: bool = False
+    map_window: MapWindow, density: Density | None = None, *, only_known: bool = False
 ) -> Array:
-    """Compute the weights w of the nodes.
+    """Compute the weights w of the nodes of a map window.
 
     Parameters
     ----------
-    planner : GridPlanner
+    map_window : MapWindow
     density : Density or None
         It is evaluated at each node; None means 1 everywhere.
     only_known : bool
@@ -74,9 +76,9 @@ def compute_node_weights(
     (m,) array
         Number of free cells that each node represents, times the density.
     """
-    weights = planner.free_counts if only_known else planner.expected_free_counts
+    weights = map_window.free_counts if only_known else map_window.expected_free_counts
     if density is not None and not density.is_uniform:
-        weights = weights * density.evaluate(planner.nodes)
+        weights = weights * density.evaluate(map_window.nodes)
     return weights
 
 
@@ -106,12 +108,12 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
-    own_node = planner.find_visible_node(team.positions[0])
+    own_node = planner.visibility.find_visible_node(team.positions[0])
     if own_node == NO_NODE:
         return team.previous_goals
     # Candidates are the nodes that may become goals, and targets the nodes that count in the cost.
     candidates, distances = planner.get_team_candidates(own_node)
-    is_target = np.isfinite(planner.get_distances(own_node)) & (weights > 0.0)
+    is_target = np.isfinite(planner.graph.get_distances(own_node)) & (weights > 0.0)
     if len(candidates) < len(team.positions) or not is_target.any():
         return team.previous_goals
     other_distances = np.minimum(planner.compute_distances_from(team.other_positions), UNREACHABLE_M)
@@ -133,7 +135,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     )
     assignment = _assign_goals(path_lengths, min_savings.swap)
     goals = team.previous_goals.copy()
-    goals[mobile] = planner.nodes[candidates[chosen[mobile[assignment]]]]
+    goals[mobile] = planner.map_window.nodes[candidates[chosen[mobile[assignment]]]]
     return goals
 
 
@@ -159,7 +161,7 @@ def _choose_previous_candidates(
         goal = team.previous_goals[robot]
         goal_distances = planner.look_up_distances(goal, distances)
         # Candidates to which there is no path come last. Straight distances decide between them.
-        straight_distances = compute_point_distances(planner.nodes[candidates], goal)
+        straight_distances = compute_point_distances(planner.map_window.nodes[candidates], goal)
         is_reachable = np.isfinite(goal_distances)
         goal_distances = np.where(is_reachable, goal_distances, UNREACHABLE_M + straight_distances)
         goal_distances[is_taken] = np.inf

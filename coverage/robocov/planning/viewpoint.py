@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.planning.grid_planner import GridPlanner
-from robocov.planning.map_window import SIDE_STEPS
+from robocov.planning.map_window import SIDE_STEPS, MapWindow
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
@@ -25,7 +24,7 @@ class _Candidates(NamedTuple):
 
 
 def find_viewpoint(
-    planner: GridPlanner,
+    map_window: MapWindow,
     cell_distances: Array,
     path_lengths: Array,
     min_cost: float,
@@ -37,7 +36,7 @@ def find_viewpoint(
 
     Parameters
     ----------
-    planner : GridPlanner
+    map_window : MapWindow
     cell_distances : (m,) array, m
         Distances from the robot's goal to the nodes of its own cell, 0 for all other nodes.
     path_lengths : (m,) array, m
@@ -61,8 +60,8 @@ def find_viewpoint(
     close to zero for the inside of an obstacle. The viewpoint maximizes the expected cost of the patch,
     divided by (1 m + path length).
     """
-    frontier = planner.frontier
-    frontier_costs = _compute_patch_costs(planner, cell_distances)[frontier.patches]
+    frontier = map_window.frontier
+    frontier_costs = _compute_patch_costs(map_window, cell_distances)[frontier.patches]
     is_worth_visiting = frontier_costs > min_cost
     if not is_worth_visiting.any():
         return None
@@ -73,49 +72,49 @@ def find_viewpoint(
         rows=frontier.rows[is_worth_visiting, None] + rows_up,
         columns=frontier.columns[is_worth_visiting, None] + columns_right,
     )
-    lengths = _get_path_lengths(planner, path_lengths, candidates)
+    lengths = _get_path_lengths(map_window, path_lengths, candidates)
     cost_per_length = frontier_costs[is_worth_visiting, None] / (_ADDED_LENGTH_M + lengths)
     values = frontier.is_side_free[is_worth_visiting] * cost_per_length
-    _exclude_visited(values, planner, candidates, previous_viewpoints)
+    _exclude_visited(values, map_window, candidates, previous_viewpoints)
     best = values.argmax()
     if not values.flat[best] > 0.0:
         return None
     cell = np.array([candidates.columns.flat[best], candidates.rows.flat[best]])
-    return np.asarray(_compute_first_center(planner) + cell * planner.known_map.raster.cell_size)
+    return np.asarray(_compute_first_center(map_window) + cell * map_window.known_map.raster.cell_size)
 
 
-def _compute_patch_costs(planner: GridPlanner, cell_distances: Array) -> Array:
+def _compute_patch_costs(map_window: MapWindow, cell_distances: Array) -> Array:
     """Return the expected cost of each unknown patch, by label; see `find_viewpoint`."""
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
-    unknown = planner.unknown_area
+    unknown = map_window.unknown_area
     costs = cell_distances[unknown.nodes] * unknown.expected_free_counts
     label_count = 1 + unknown.patches.max(initial=0)
     return np.asarray(np.bincount(unknown.patches, costs, minlength=label_count))
 
 
-def _get_path_lengths(planner: GridPlanner, path_lengths: Array, candidates: _Candidates) -> Array:
+def _get_path_lengths(map_window: MapWindow, path_lengths: Array, candidates: _Candidates) -> Array:
     """Return the length of the path to each candidate, (b, 4) m, from the lengths to all nodes, (m,) m."""
-    window = planner.window
+    window = map_window.window
     nodes = candidates.rows // window.stride * window.columns + candidates.columns // window.stride
     # A cell beyond the window is not free: its node does not matter, but must exist.
     return np.asarray(path_lengths[np.clip(nodes, 0, len(path_lengths) - 1)])
 
 
 def _exclude_visited(
-    values: Array, planner: GridPlanner, candidates: _Candidates, previous_viewpoints: Sequence[Array]
+    values: Array, map_window: MapWindow, candidates: _Candidates, previous_viewpoints: Sequence[Array]
 ) -> None:
     """Set the values, (b, 4), of all candidates close to a previous viewpoint to zero."""
-    cell_size = planner.known_map.raster.cell_size
+    cell_size = map_window.known_map.raster.cell_size
     # Positions are expressed in cells, like the rows and columns of the candidates.
-    offsets = np.array(previous_viewpoints).reshape(-1, 2) - _compute_first_center(planner)
+    offsets = np.array(previous_viewpoints).reshape(-1, 2) - _compute_first_center(map_window)
     min_distance = _MIN_VIEWPOINT_DISTANCE_M / cell_size
     for column, row in offsets / cell_size:
         squared_distances = (column - candidates.columns) ** 2 + (row - candidates.rows) ** 2
         values[squared_distances < min_distance**2] = 0.0
 
 
-def _compute_first_center(planner: GridPlanner) -> Array:
+def _compute_first_center(map_window: MapWindow) -> Array:
     """Return the center of the first cell of the window, in row 0 and column 0, (2,) m."""
-    window = planner.window
-    raster = planner.known_map.raster
+    window = map_window.window
+    raster = map_window.known_map.raster
     return raster.compute_centers(np.array(window.first_row), np.array(window.first_column))

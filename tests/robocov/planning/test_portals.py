@@ -14,7 +14,8 @@ from scipy import ndimage
 from scipy.sparse.csgraph import connected_components
 
 from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap
-from robocov.planning.grid_planner import GridPlanner, _build_graph
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.lattice_graph import build_matrix
 from robocov.planning.window import Window
 
 COARSE = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, 30)
@@ -36,17 +37,17 @@ def planner() -> GridPlanner:
 
 
 def test_the_moves_alone_miss_the_door(planner):
-    first = planner.find_nearest_node(LEFT)
-    last = planner.find_nearest_node(RIGHT)
-    _, pieces = connected_components(_build_graph(planner._moves), directed=True, connection="strong")
+    first = planner.visibility.find_nearest_node(LEFT)
+    last = planner.visibility.find_nearest_node(RIGHT)
+    _, pieces = connected_components(build_matrix(planner.graph.moves), directed=True, connection="strong")
     assert pieces[first] != pieces[last]
 
 
 def test_distances_lead_through_a_door_that_the_moves_miss(planner):
     distances = planner.compute_distances_from(LEFT[None])
-    node = planner.find_nearest_node(RIGHT)
+    node = planner.visibility.find_nearest_node(RIGHT)
     door = np.array([4.0, 2.45])
-    length = math.dist(LEFT, door) + math.dist(door, planner.nodes[node])
+    length = math.dist(LEFT, door) + math.dist(door, planner.map_window.nodes[node])
     assert 0.98 * length <= distances[node] <= 1.25 * length
 
 
@@ -55,7 +56,7 @@ def test_a_route_leads_through_the_door_at_a_distance_from_walls(planner):
     np.testing.assert_array_equal(route[-1], RIGHT)
     points = np.vstack([LEFT, route])
     for start, end in pairwise(points):
-        assert planner.find_clear_lines(start, end[None], planner.is_near_wall)[0]
+        assert planner.visibility.find_clear_lines(start, end[None], planner.map_window.is_near_wall)[0]
 
 
 def test_a_door_that_has_not_been_seen_is_no_portal():
@@ -63,11 +64,11 @@ def test_a_door_that_has_not_been_seen_is_no_portal():
     state = known_map.state.copy()
     state[22:27, 39:41] = UNKNOWN
     planner = build_coarse_planner(DiscoveredMap(RASTER, state))
-    assert not len(planner._portals.paths)
+    assert not len(planner.graph.portals.paths)
 
 
 def test_there_are_no_portals_where_moves_connect_all_nodes():
-    assert not len(build_coarse_planner(build_map())._portals.paths)
+    assert not len(build_coarse_planner(build_map()).graph.portals.paths)
 
 
 @settings(max_examples=60)
@@ -86,10 +87,10 @@ def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_node
             walls.append((slice(row, row + length), slice(column, column + 1)))
     window = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, max_nodes)
     planner = GridPlanner(build_map(*walls), window, 0.15)
-    is_passable = planner.is_free & ~planner.is_near_wall
-    cells = np.column_stack(RASTER.find_cells(planner.nodes))
+    is_passable = planner.map_window.is_free & ~planner.map_window.is_near_wall
+    cells = np.column_stack(RASTER.find_cells(planner.map_window.nodes))
     check_portals(planner, cells, is_passable)
-    _, pieces = connected_components(planner._graph, directed=True, connection="strong")
+    _, pieces = connected_components(planner.graph.matrix, directed=True, connection="strong")
     areas, _ = ndimage.label(is_passable)
     node_areas = areas[tuple(cells.T)]
     for area in np.unique(node_areas[node_areas > 0]):
@@ -98,7 +99,7 @@ def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_node
 
 def check_portals(planner: GridPlanner, cells, is_passable) -> None:
     """Check that each portal is a path of neighboring free cells between its nodes, and its length."""
-    portals = planner._portals
+    portals = planner.graph.portals
     for first, last, length, path in zip(*portals, strict=True):
         np.testing.assert_array_equal(path[[0, -1]], cells[[first, last]])
         steps = np.abs(np.diff(path, axis=0))

@@ -9,6 +9,7 @@ from robocov.density import Gaussian, Gaussians
 from robocov.observation.region import Region
 from robocov.planning import team_placement
 from robocov.planning.discovered_map import FREE, WALL, DiscoveredMap
+from robocov.planning.goal_candidates import choose_candidates
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.own_goal import find_own_goal
 from robocov.planning.raster import Raster
@@ -20,7 +21,7 @@ NO_POSITIONS = np.empty((0, 2))
 
 
 def compute_cost(planner: GridPlanner, positions: np.ndarray) -> float:
-    weights = compute_node_weights(planner)
+    weights = compute_node_weights(planner.map_window)
     distances = planner.compute_distances_from(positions)
     is_target = np.isfinite(distances) & (weights > 0)
     return float((weights[is_target] * distances[is_target]).sum())
@@ -30,22 +31,24 @@ def place_at_rest(planner: GridPlanner, positions: np.ndarray, fixed: tuple[int,
     """Place a team whose robots are at their previous goals. Some of them are fixed."""
     is_fixed = np.isin(np.arange(len(positions)), fixed)
     team = TeamSituation(positions, positions, is_fixed, NO_POSITIONS)
-    return place_team(planner, compute_node_weights(planner), team, MinSavings(0.01, 0.01))
+    return place_team(planner, compute_node_weights(planner.map_window), team, MinSavings(0.01, 0.01))
 
 
 def test_weights_of_nodes_are_numbers_of_free_cells() -> None:
     planner = build_planner(HALVES)
-    assert compute_node_weights(planner).sum() == np.count_nonzero(~build_map(HALVES).is_blocked)
+    assert compute_node_weights(planner.map_window).sum() == np.count_nonzero(~build_map(HALVES).is_blocked)
 
 
 def test_weights_of_nodes_are_multiplied_by_the_density() -> None:
     density = Gaussians((Gaussian((6.0, 2.0), 3.0, 0.5),), floor=1.0)
     planner = build_planner()
-    plain = compute_node_weights(planner)
-    dense = compute_node_weights(planner, density)
+    plain = compute_node_weights(planner.map_window)
+    dense = compute_node_weights(planner.map_window, density)
     assert (dense >= plain).all()
-    node = planner.find_visible_node(np.array([6.0, 2.0]))
-    np.testing.assert_allclose(dense[node] / plain[node], density.evaluate(planner.nodes[[node]])[0])
+    node = planner.visibility.find_visible_node(np.array([6.0, 2.0]))
+    np.testing.assert_allclose(
+        dense[node] / plain[node], density.evaluate(planner.map_window.nodes[[node]])[0]
+    )
 
 
 def test_unknown_insides_of_obstacles_hardly_count_and_shadows_do() -> None:
@@ -55,17 +58,17 @@ def test_unknown_insides_of_obstacles_hardly_count_and_shadows_do() -> None:
     state[10:20, 50:60] = 0
     planner = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, 0.0)
     free_cells = np.count_nonzero(state == FREE)
-    np.testing.assert_allclose(compute_node_weights(planner).sum(), free_cells + 100, rtol=1e-3)
-    assert compute_node_weights(planner, only_known=True).sum() == free_cells
+    np.testing.assert_allclose(compute_node_weights(planner.map_window).sum(), free_cells + 100, rtol=1e-3)
+    assert compute_node_weights(planner.map_window, only_known=True).sum() == free_cells
 
 
 def test_unknown_cells_can_be_left_out() -> None:
     state = np.full(RASTER.shape, FREE, dtype=np.uint8)
     state[:, 40:] = 0
     planner = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, 0.15)
-    known = compute_node_weights(planner, only_known=True).sum()
+    known = compute_node_weights(planner.map_window, only_known=True).sum()
     assert known == 40 * 40
-    assert compute_node_weights(planner).sum() > 1.5 * known
+    assert compute_node_weights(planner.map_window).sum() > 1.5 * known
 
 
 def test_a_team_spreads_over_both_rooms() -> None:
@@ -96,7 +99,7 @@ def test_fixed_robots_keep_their_goals() -> None:
 
 def test_goals_are_exchanged_only_if_that_saves_enough() -> None:
     planner = build_planner()
-    weights = compute_node_weights(planner)
+    weights = compute_node_weights(planner.map_window)
     is_fixed = np.zeros(2, dtype=bool)
     start = np.array([[2.0, 2.0], [6.0, 2.0]])
     goals = place_team(
@@ -119,28 +122,28 @@ def test_a_viewpoint_is_at_the_border_of_an_open_patch_and_away_from_previous_on
     state[11:19, 11:19] = 0
     state[10:20, 50:60] = 0
     planner = GridPlanner(DiscoveredMap(RASTER, state), WINDOW, 0.0)
-    ones = np.ones(len(planner.nodes))
-    first = find_viewpoint(planner, ones, ones, 5.0, ())
+    ones = np.ones(len(planner.map_window.nodes))
+    first = find_viewpoint(planner.map_window, ones, ones, 5.0, ())
     assert first is not None
     assert 4.9 < first[0] < 6.1
     assert 0.9 < first[1] < 2.1
-    second = find_viewpoint(planner, ones, ones, 5.0, (first,))
+    second = find_viewpoint(planner.map_window, ones, ones, 5.0, (first,))
     assert second is not None
     assert math.dist(first, second) > 0.5
-    assert find_viewpoint(planner, ones, ones, 101.0, ()) is None
+    assert find_viewpoint(planner.map_window, ones, ones, 101.0, ()) is None
 
 
 def test_there_is_no_viewpoint_if_everything_is_known() -> None:
     planner = build_planner(HALVES)
-    ones = np.ones(len(planner.nodes))
-    assert find_viewpoint(planner, ones, ones, 0.0, ()) is None
+    ones = np.ones(len(planner.map_window.nodes))
+    assert find_viewpoint(planner.map_window, ones, ones, 0.0, ()) is None
 
 
 def test_the_own_goal_minimizes_the_cost() -> None:
     planner = build_planner()
-    weights = compute_node_weights(planner)
+    weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.find_visible_node(np.array([0.7, 0.7]))
+    first_node = planner.visibility.find_visible_node(np.array([0.7, 0.7]))
     no_goal = np.full(2, np.nan)
     own = find_own_goal(planner, weights, others, first_node, no_goal, 0.0)
     own = find_own_goal(planner, weights, others, own.node, no_goal, 0.0)
@@ -148,14 +151,14 @@ def test_the_own_goal_minimizes_the_cost() -> None:
     for shift in ([0.3, 0], [-0.3, 0], [0, 0.3], [0, -0.3]):
         assert compute_cost(planner, np.vstack([own.goal + shift, others])) > cost
     np.testing.assert_allclose(own.goal[1], 2.0, atol=0.1)
-    assert (own.cell_distances[planner.nodes[:, 0] > 5.5] == 0.0).all()
+    assert (own.cell_distances[planner.map_window.nodes[:, 0] > 5.5] == 0.0).all()
 
 
 def test_the_previous_goal_is_kept_if_the_new_one_saves_little() -> None:
     planner = build_planner()
-    weights = compute_node_weights(planner)
+    weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.find_visible_node(np.array([2.0, 2.0]))
+    first_node = planner.visibility.find_visible_node(np.array([2.0, 2.0]))
     own = find_own_goal(planner, weights, others, first_node, np.full(2, np.nan), 0.0)
     close = own.goal + [0.05, -0.02]
     kept = find_own_goal(planner, weights, others, own.node, close, 0.01)
@@ -167,12 +170,12 @@ def test_the_previous_goal_is_kept_if_the_new_one_saves_little() -> None:
 def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
     """The parabolas say nothing about points more than one node away, however low they are there."""
     planner = build_planner()
-    weights = compute_node_weights(planner)
+    weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.find_visible_node(np.array([2.0, 2.0]))
+    first_node = planner.visibility.find_visible_node(np.array([2.0, 2.0]))
     own = find_own_goal(planner, weights, others, first_node, np.full(2, np.nan), 0.0)
-    node = planner.nodes[own.node]
-    for shift in ([1.05 * planner.spacing, 0.0], [0.0, -1.05 * planner.spacing]):
+    node = planner.map_window.nodes[own.node]
+    for shift in ([1.05 * planner.map_window.spacing, 0.0], [0.0, -1.05 * planner.map_window.spacing]):
         far = node + shift
         assert find_own_goal(planner, weights, others, own.node, far, 1.0).goal.tolist() == own.goal.tolist()
         close = node + 0.9 * np.array(shift)
@@ -206,7 +209,7 @@ def test_goals_are_assigned_by_the_lengths_of_paths() -> None:
     positions = np.array([[4.35, 0.5], [3.6, 2.6]])
     for goals in (np.array([left, right]), np.array([right, left])):
         team = TeamSituation(positions, goals, np.zeros(2, dtype=bool), NO_POSITIONS)
-        new_goals = place_team(planner, compute_node_weights(planner), team, MinSavings(1.0, 1.0))
+        new_goals = place_team(planner, compute_node_weights(planner.map_window), team, MinSavings(1.0, 1.0))
         assert new_goals[0, 0] < 4.4 < new_goals[1, 0]
 
 
@@ -214,16 +217,16 @@ def test_the_candidate_closest_to_a_previous_goal_is_on_the_same_side_of_a_wall(
     planner = build_planner(WALL_BESIDE_CANDIDATES)
     goals = np.array([[4.35, 0.7], [4.8, 0.7]])
     team = TeamSituation(goals, goals, np.zeros(2, dtype=bool), NO_POSITIONS)
-    candidates, distances = planner.get_team_candidates(planner.find_visible_node(goals[0]))
+    candidates, distances = planner.get_team_candidates(planner.visibility.find_visible_node(goals[0]))
     chosen = team_placement._choose_previous_candidates(planner, candidates, distances, team)
-    left, right = planner.nodes[candidates[chosen]]
+    left, right = planner.map_window.nodes[candidates[chosen]]
     assert left[0] < 4.4 < right[0]
 
 
 def test_distances_that_are_looked_up_are_those_of_a_search() -> None:
     planner = build_planner(HALVES)
-    nodes = planner.choose_candidates(planner.has_clearance)
-    table = planner.compute_distance_table(nodes)
+    nodes = choose_candidates(planner.graph, planner.map_window.has_clearance)
+    table = planner.graph.compute_distance_table(nodes)
     for position in np.random.default_rng(0).uniform([0.2, 0.2], [3.8, 3.8], (20, 2)):
         searched = planner.compute_distances_from(position[None])[nodes]
         np.testing.assert_allclose(planner.look_up_distances(position, table), searched, atol=1e-12)

@@ -46,7 +46,8 @@ from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
-from robocov.planning.grid_planner import NO_NODE, GridPlanner
+from robocov.planning.grid_planner import GridPlanner
+from robocov.planning.node_visibility import NO_NODE
 from robocov.planning.own_goal import OwnGoal, find_own_goal
 from robocov.planning.team_placement import MinSavings, compute_node_weights
 from robocov.planning.viewpoint import find_viewpoint
@@ -461,7 +462,7 @@ class Atlas(BaseController):
         assert state.basis is not None and state.team_goals is not None
         planner = state.basis.planner
         team_goals = state.team_goals.goals
-        first_node = planner.find_visible_node(team_goals[0])
+        first_node = planner.visibility.find_visible_node(team_goals[0])
         if first_node == NO_NODE:
             return None
         is_mobile = ~cooperation.is_fixed
@@ -471,7 +472,7 @@ class Atlas(BaseController):
         other_positions[is_mobile] = team_goals[1:][is_mobile_in_plan]
         return find_own_goal(
             planner,
-            compute_node_weights(planner, seen.density),
+            compute_node_weights(planner.map_window, seen.density),
             other_positions,
             first_node,
             previous_goal=np.full(2, np.nan) if state.motion is None else state.motion.goal,
@@ -493,7 +494,7 @@ class Atlas(BaseController):
         if is_away_from_goal and not is_heading_for_viewpoint:
             return OwnMotion(own.goal)
         viewpoint = None
-        node = planner.find_visible_node(position)
+        node = planner.visibility.find_visible_node(position)
         # The goal of a lone robot hardly depends on unknown space, so it needs no viewpoints.
         has_others = len(state.basis.robots) > 1
         if node != NO_NODE and self.stake < 1.0 and has_others:
@@ -502,9 +503,9 @@ class Atlas(BaseController):
             doubling_length = patience * state.known_map.raster.region.diameter
             doublings = min(path.viewpoint_length / doubling_length, _MAX_DOUBLINGS)
             viewpoint = find_viewpoint(
-                planner,
+                planner.map_window,
                 own.cell_distances,
-                path_lengths=planner.get_distances(node),
+                path_lengths=planner.graph.get_distances(node),
                 min_cost=self.stake * own.cost * 2.0**doublings,
                 previous_viewpoints=path.viewpoints,
             )

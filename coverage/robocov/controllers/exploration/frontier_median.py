@@ -99,14 +99,14 @@ class FrontierMedian(SharedMapController):
     def _find_targets(self, situation: Situation, inspected: Array) -> Array:
         """Return positions on the frontiers, (t, 2) m."""
         raster = situation.known_map.raster
-        planner = situation.planner
-        window = planner.window
+        map_window = situation.planner.map_window
+        window = map_window.window
         labels = self._label_frontiers(situation)
         rows, columns = np.nonzero(labels)
         # Choose one target for each pair of a frontier and a block of cells that a node represents. Each pair
         # is one number, so that the cells can be grouped by pair.
         blocks = rows // window.stride * window.columns + columns // window.stride
-        pairs = labels[rows, columns] * len(planner.nodes) + blocks
+        pairs = labels[rows, columns] * len(map_window.nodes) + blocks
         _, first = np.unique(pairs, return_index=True)
         targets = raster.compute_centers(rows[first] + window.first_row, columns[first] + window.first_column)
         squared_distances = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
@@ -114,12 +114,12 @@ class FrontierMedian(SharedMapController):
 
     def _label_frontiers(self, situation: Situation) -> IntArray:
         """Return the label of the frontier, from 1, to which each cell of the window belongs; 0 for none."""
-        planner = situation.planner
-        state = planner.window.crop(situation.known_map.state, np.uint8(FREE))
-        is_unknown = (state == UNKNOWN) & ~planner.is_outside
+        map_window = situation.planner.map_window
+        state = map_window.window.crop(situation.known_map.state, np.uint8(FREE))
+        is_unknown = (state == UNKNOWN) & ~map_window.is_outside
         # Gaps between neighboring rays are not worth a visit.
-        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~planner.is_near_wall
-        is_frontier = (state == FREE) & ~planner.is_near_wall & ndimage.binary_dilation(is_unknown_area)
+        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~map_window.is_near_wall
+        is_frontier = (state == FREE) & ~map_window.is_near_wall & ndimage.binary_dilation(is_unknown_area)
         labels, _ = ndimage.label(is_frontier, _BLOCK)
         cell_size = situation.known_map.raster.cell_size
         is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
@@ -128,10 +128,11 @@ class FrontierMedian(SharedMapController):
     def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
         """Return the path length from each robot to each target, (k, t) m; infinite without a path."""
         planner = situation.planner
-        clear_nodes = np.flatnonzero(planner.has_clearance)
+        map_window = planner.map_window
+        clear_nodes = np.flatnonzero(map_window.has_clearance)
         if not len(targets) or not len(clear_nodes):
             return np.full((len(situation.positions), len(targets)), np.inf)
-        squared_distances = ((targets[:, None] - planner.nodes[clear_nodes]) ** 2).sum(axis=2)
+        squared_distances = ((targets[:, None] - map_window.nodes[clear_nodes]) ** 2).sum(axis=2)
         target_nodes = clear_nodes[squared_distances.argmin(axis=1)]
         return np.array(
             [planner.compute_distances_from(position[None])[target_nodes] for position in situation.positions]
@@ -156,7 +157,9 @@ class FrontierMedian(SharedMapController):
             is_unassigned[robot] = False
             # The robot will also see the other targets in view of its own, so these become less useful.
             distances = np.sqrt(((targets - targets[target]) ** 2).sum(axis=1))
-            is_clear = planner.find_clear_lines(targets[target], targets, planner.is_blocked)
+            is_clear = planner.visibility.find_clear_lines(
+                targets[target], targets, planner.map_window.is_blocked
+            )
             is_in_view = (distances < situation.sensing_range) & is_clear
             utilities -= np.where(is_in_view, 1.0 - distances / situation.sensing_range, 0.0)
         return goals

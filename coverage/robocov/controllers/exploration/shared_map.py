@@ -21,6 +21,7 @@ from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.goal_candidates import choose_regular_nodes
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.raster import Raster
 from robocov.planning.team_placement import UNREACHABLE_M
@@ -106,10 +107,11 @@ class Situation(NamedTuple):
             Number of counted cells that each node represents, times the density. 0 for nodes that no robot
             can reach.
         """
-        weights = self.planner.sum_by_node(self.planner.window.crop(is_counted, fill=False))
+        map_window = self.planner.map_window
+        weights = map_window.sum_by_node(map_window.window.crop(is_counted, fill=False))
         weights = weights * np.isfinite(self.planner.compute_distances_from(self.positions))
         if self.density is not None and not self.density.is_uniform:
-            weights = weights * self.density.evaluate(self.planner.nodes)
+            weights = weights * self.density.evaluate(map_window.nodes)
         return np.asarray(weights, dtype=np.float64)
 
 
@@ -139,9 +141,9 @@ class Candidates(NamedTuple):
         """
         targets = np.flatnonzero(weights > 0.0)
         nodes = nodes[weights[nodes] > 0.0]
-        distances = situation.planner.compute_distance_table(nodes)[:, targets]
+        distances = situation.planner.graph.compute_distance_table(nodes)[:, targets]
         table = (np.minimum(distances, UNREACHABLE_M) * weights[targets]).T
-        return cls(positions=situation.planner.nodes[nodes], table=np.ascontiguousarray(table))
+        return cls(positions=situation.planner.map_window.nodes[nodes], table=np.ascontiguousarray(table))
 
     @classmethod
     def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
@@ -157,7 +159,8 @@ class Candidates(NamedTuple):
         -------
         Candidates
         """
-        nodes, _ = situation.planner.choose_regular_nodes(situation.planner.has_clearance)
+        map_window = situation.planner.map_window
+        nodes, _ = choose_regular_nodes(map_window.window, map_window.has_clearance)
         return cls.build_at_nodes(situation, weights, nodes)
 
     def compute_cost(self, chosen: IntArray) -> float:
@@ -196,12 +199,12 @@ class Candidates(NamedTuple):
         (k, 2) array, m
             Positions of nodes.
         """
-        planner = situation.planner
+        map_window = situation.planner.map_window
         positions = self.positions[chosen]
         # Candidates are farther apart than nodes.
-        spacing = planner.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
-        squared_distances = ((planner.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
-        is_close = planner.has_clearance & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
+        spacing = map_window.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
+        squared_distances = ((map_window.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
+        is_close = map_window.has_clearance & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
         fine = Candidates.build_at_nodes(situation, weights, np.flatnonzero(is_close))
         return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 
@@ -222,7 +225,7 @@ def assign_goals(situation: Situation, goals: Array) -> Array:
         The goals in the order of the robots.
     """
     planner = situation.planner
-    nodes = [planner.find_nearest_node(goal) for goal in goals]
+    nodes = [planner.visibility.find_nearest_node(goal) for goal in goals]
     distances = np.array(
         [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
     )

@@ -95,7 +95,7 @@ def compute_team_goals(
         goals = _place_agreed_team(planner, density, group, situation, min_savings)
     else:
         # A robot that plans for itself alone does not move to cells that may not be free.
-        weights = compute_node_weights(planner, density, only_known=not cooperation.is_joint)
+        weights = compute_node_weights(planner.map_window, density, only_known=not cooperation.is_joint)
         goals = place_team(planner, weights, situation, min_savings)
     return TeamGoals(planner=planner, robots=group, goals=goals)
 
@@ -162,7 +162,7 @@ def _place_agreed_team(
     )
     plan = _LATEST_PLANS.get(planner)
     if plan is None or plan.key != key or plan.density is not density:
-        weights = compute_node_weights(planner, density)
+        weights = compute_node_weights(planner.map_window, density)
         goals = place_team(planner, weights, situation, min_savings)
         plan = _AgreedPlan(key=key, density=density, goals=goals)
         _LATEST_PLANS[planner] = plan

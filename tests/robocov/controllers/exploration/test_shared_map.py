@@ -126,8 +126,8 @@ def test_goals_are_assigned_with_the_smallest_sum_of_squared_path_lengths() -> N
     rng = np.random.default_rng(1)
     situation = build_situation(np.full(RASTER.shape, FREE), rng.uniform(1, 7, (5, 2)).tolist())
     planner = situation.planner
-    nodes = rng.choice(np.flatnonzero(planner.has_clearance), 5, replace=False)
-    goals = planner.nodes[nodes]
+    nodes = rng.choice(np.flatnonzero(planner.map_window.has_clearance), 5, replace=False)
+    goals = planner.map_window.nodes[nodes]
     path_lengths = np.array(
         [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
     )

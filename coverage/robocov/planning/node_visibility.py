@@ -1,0 +1,147 @@
+"""Lines of sight in a map window, and the nodes that are visible from a position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.planning.lattice import Frame, find_clear_lines, find_nearest_nodes
+from robocov.planning.map_window import MapWindow
+
+NO_NODE = -1
+"""Index that stands for no node."""
+_MAX_CLOSE_NODES = 12
+"""Maximum number of nodes close to a position that are considered."""
+_MAX_CACHED_POSITIONS = 1000
+"""Maximum number of positions whose visible nodes are cached."""
+
+
+@dataclass(eq=False)
+class NodeVisibility:
+    """Lines of sight in a map window, and the nodes that are visible from a position.
+
+    Visible nodes are stored for the latest positions, because several robots need them several times.
+
+    Parameters
+    ----------
+    map_window : MapWindow
+    """
+
+    map_window: MapWindow
+    _visible_nodes: dict[bytes, IntArray] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def _frame(self) -> Frame:
+        """Position of the window's cells. The last row and column do not exceed those of the raster."""
+        window = self.map_window.window
+        raster = self.map_window.known_map.raster
+        rows, columns = raster.shape
+        height, width = window.shape
+        low_x, low_y = raster.origin
+        return Frame(
+            low_x=low_x,
+            low_y=low_y,
+            cell_size=raster.cell_size,
+            first_row=window.first_row,
+            first_column=window.first_column,
+            last_row=min(window.first_row + height, rows) - 1,
+            last_column=min(window.first_column + width, columns) - 1,
+        )
+
+    def find_clear_lines(
+        self, position: Array, ends: Array, is_obstructing: BoolArray, ignored_length: float = 0.0
+    ) -> BoolArray:
+        """Find the straight lines from a position that cross no obstructing cell.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+        ends : (k, 2) array, m
+        is_obstructing : (h, w) bool array
+            For example `MapWindow.is_blocked` or `MapWindow.is_near_wall`.
+        ignored_length : float, m
+            Cells closer to the position do not obstruct a line. Routes start at the position of a robot,
+            which may itself be too close to a wall.
+
+        Returns
+        -------
+        (k,) bool array
+            Whether each line is clear.
+        """
+        return find_clear_lines(position, ends, is_obstructing, self._frame, ignored_length)
+
+    def find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
+        """Find the candidates closest to a position, whether they are visible or not.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+        is_candidate : (m,) bool array
+            Whether each node is a candidate.
+
+        Returns
+        -------
+        (k,) int array
+            The nearest first. k is at most `_MAX_CLOSE_NODES`.
+        """
+        return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_CLOSE_NODES)
+
+    def find_nearest_node(self, position: Array) -> int:
+        """Find the nearest node with clearance, whether it is visible or not.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+
+        Returns
+        -------
+        int
+            `NO_NODE` if no node has clearance.
+        """
+        has_clearance = self.map_window.has_clearance
+        if not has_clearance.any():
+            return NO_NODE
+        squared_distances = ((self.map_window.nodes - position) ** 2).sum(axis=1)
+        return int(np.where(has_clearance, squared_distances, np.inf).argmin())
+
+    def find_visible_node(self, position: Array) -> int:
+        """Find the nearest node with clearance that is visible from a position.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+
+        Returns
+        -------
+        int
+            If no node is visible, the nearest one with clearance. `NO_NODE` if no node has clearance.
+        """
+        visible = self.get_visible_nodes(position)
+        return int(visible[0]) if len(visible) else NO_NODE
+
+    def get_visible_nodes(self, position: Array) -> IntArray:
+        """Return the nodes with clearance that are close to a position and visible from it.
+
+        Parameters
+        ----------
+        position : (2,) array, m
+
+        Returns
+        -------
+        (k,) int array
+            The nearest first. If no node is visible, only the nearest one with clearance. Empty if no node
+            has clearance.
+        """
+        key = position.tobytes()
+        if key not in self._visible_nodes:
+            if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
+                self._visible_nodes.clear()
+            close_nodes = self.find_close_nodes(position, self.map_window.has_clearance)
+            ends = self.map_window.nodes[close_nodes]
+            is_visible = self.find_clear_lines(position, ends, self.map_window.is_blocked)
+            # A robot in a cell that counts as wall is actually next to the wall, and sees no node.
+            self._visible_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
+        return self._visible_nodes[key]
