@@ -79,7 +79,7 @@ class EditorDriver(Driver):
 
     def __init__(self, window: EditorWindow) -> None:
         self.window = window
-        window.catches_exceptions = False
+        window.guard.is_enabled = False
         self.editor = window.editor
         self.at = (5, 5)
 

@@ -106,7 +106,7 @@ class Driver:
 
     def __init__(self, window: ViewerWindow) -> None:
         self.window = window
-        window.catches_exceptions = False
+        window.guard.is_enabled = False
         self.viewer = window.viewer
         self.at = (5, 5)
 

@@ -171,8 +171,8 @@ class ViewerLauncher:
         try:
             viewer = self._build_presenter(costs, settings)
             window = ViewerWindow(viewer, size, scale, is_unattended=self.headless)
-            window.exceptions = ExceptionLog(self._draft_folder)
-            window.catches_exceptions = not self.headless
+            window.guard.log = ExceptionLog(self._draft_folder)
+            window.guard.is_enabled = not self.headless
         except BaseException:
             costs.close()
             raise
@@ -227,7 +227,7 @@ class ViewerLauncher:
         view = viewer.view
         usual = _list_usual_layers(before)
         layers = view.layers - (self.shown_layers - usual) | (self.hidden_layers & usual)
-        width, height = limit_window_size(window.windowed_size or window.screen.get_size())
+        width, height = limit_window_size(window.display.windowed_size or window.screen.get_size())
         changes = {
             "theme": view.theme,
             "fade": view.fades_trajectories,

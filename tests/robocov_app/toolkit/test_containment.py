@@ -72,7 +72,7 @@ def window(tmp_path: Path) -> Iterator[Fragile]:
     with open_display(headless=True):
         pygame.event.clear()
         fragile = Fragile()
-        fragile.exceptions = ExceptionLog(tmp_path)
+        fragile.guard.log = ExceptionLog(tmp_path)
         yield fragile
 
 
@@ -109,7 +109,7 @@ def test_a_part_that_always_fails_is_retried_rarely_and_recovers(
     assert window.calls.count(part) < 20, "it is retried rarely"
     assert (tmp_path / LOG_FILE).read_text().count("Traceback") == 1
     window.raises.clear()
-    window._retry_at_s.clear()
+    window.guard._retry_at_s.clear()
     window.calls.clear()
     window.run_frame(0.02)
     assert part in window.calls
@@ -193,7 +193,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
     with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:
         window = driver.window
         editor = driver.editor
-        window.catches_exceptions = True
+        window.guard.is_enabled = True
         editor.apply(add_circle(editor.sketch, (2.0, 2.0), 0.5))
         before = editor.sketch
 
@@ -216,7 +216,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
 
 def test_a_dialog_that_cannot_be_drawn_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_editor(tmp_path) as driver:
-        driver.window.catches_exceptions = True
+        driver.window.guard.is_enabled = True
         driver.press_key("ctrl+k")
         palette = driver.editor.dialogs.current
         assert palette is not None
@@ -237,7 +237,7 @@ def test_an_edit_of_a_session_that_raises_is_reverted(
     with open_viewer(tmp_path) as driver:
         window = driver.window
         session = driver.session
-        window.catches_exceptions = True
+        window.guard.is_enabled = True
         for _ in range(20):
             session.playback.step()
         session.fail_robot(2)
@@ -278,7 +278,7 @@ def test_a_step_that_raises_is_reverted_and_pauses_the_session(
     with open_viewer(tmp_path) as driver:
         window = driver.window
         session = driver.session
-        window.catches_exceptions = True
+        window.guard.is_enabled = True
         for _ in range(20):
             session.playback.step()
         pane = session.timeline.panes[0]

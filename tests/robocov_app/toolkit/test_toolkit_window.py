@@ -92,12 +92,12 @@ def test_a_resting_window_runs_few_frames(window: Counting) -> None:
 
 def test_full_screen_can_be_switched_on_and_off(window: Counting, tmp_path: Path) -> None:
     window.toggle_fullscreen()
-    assert window.windowed_size == (900, 600)
+    assert window.display.windowed_size == (900, 600)
     window.toggle_fullscreen()
-    assert window.windowed_size is None
+    assert window.display.windowed_size is None
     assert window.screen.get_size() == (900, 600)
     window.screen.fill("red")
-    message = window.save_screenshot(tmp_path)
+    message = window.display.save_screenshot(tmp_path)
     (saved,) = tmp_path.iterdir()
     assert str(saved) in message
     assert Image.open(saved).getpixel((10, 10))[:3] == (255, 0, 0)

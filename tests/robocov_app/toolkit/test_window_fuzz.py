@@ -32,9 +32,9 @@ def _work_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def contain_faults(window: BaseWindow, folder: Path) -> ExceptionLog:
     """Let a window continue after a fault, so that one run finds all faults."""
-    window.catches_exceptions = True
-    window.exceptions = ExceptionLog(folder / "faults")
-    return window.exceptions
+    window.guard.is_enabled = True
+    window.guard.log = ExceptionLog(folder / "faults")
+    return window.guard.log
 
 
 def assert_no_fault(log: ExceptionLog) -> None:

@@ -36,7 +36,7 @@ def open_page(
 ) -> Iterator[StartPage]:
     with open_display(headless=True):
         page = StartPage(size, 1.0, recent=recent or [], can_open_viewer=can_open_viewer)
-        page.catches_exceptions = False
+        page.guard.is_enabled = False
         yield page
 
 

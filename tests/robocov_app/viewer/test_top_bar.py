@@ -51,7 +51,7 @@ def test_buttons_stay_in_place_when_the_name_of_the_file_changes(driver: Driver)
 def test_buttons_of_the_bar_lie_in_it_side_by_side(tmp_path: Path, size: tuple[int, int]) -> None:
     with open_viewer(tmp_path) as driver:
         # A browser may ask for a picture that is smaller than any window.
-        driver.window.screen = pygame.Surface(size)
+        driver.window.display.surface = pygame.Surface(size)
         driver.viewer.attempt(lambda: driver.session.fail_robot(1))
         driver.run_frames(2)
         bar = driver.window.top_bar.ui

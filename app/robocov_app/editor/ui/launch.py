@@ -153,8 +153,8 @@ class EditorLauncher:
         scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
         size = self._choose_size(settings)
         window = EditorWindow(editor, size, scale, drafts, waits_for_workers=self.headless)
-        window.exceptions = ExceptionLog(drafts)
-        window.catches_exceptions = not self.headless
+        window.guard.log = ExceptionLog(drafts)
+        window.guard.is_enabled = not self.headless
         window.panel.show_tab(settings.tab)
         if editor.document.path is not None:
             window.documents.remember(editor.document.path)
@@ -196,7 +196,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 def read_settings(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     """Return the current settings of a window; settings that cannot change there are as in `before`."""
     editor = window.editor
-    width, height = limit_window_size(window.windowed_size or window.screen.get_size())
+    width, height = limit_window_size(window.display.windowed_size or window.screen.get_size())
     changes: dict[str, object] = {
         setting: getattr(editor, attribute) for setting, attribute in SETTING_ATTRIBUTES.items()
     }

@@ -149,7 +149,7 @@ class EditorWindow(CommandWindow):
         """Build the actions of the window for the commands that run them."""
         return EditorWindowActions(
             start_play_mode=self.play_mode.start,
-            save_screenshot=lambda: self.save_screenshot(self.editor.folder),
+            save_screenshot=lambda: self.display.save_screenshot(self.editor.folder),
             edit_name=self._edit_name,
             edit_width=self._edit_width,
             open_menu=lambda: self.open_menu(self.pointer.pixel),

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 import pygame
-from pygame import Surface
 
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.commands.command import CommandTable
@@ -19,6 +18,7 @@ from robocov_app.toolkit.tools.pointer import Pointer
 from robocov_app.toolkit.window.input import COMMAND_EVENT, MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.toolkit.window.window import BaseWindow
+from robocov_app.toolkit.window.window_display import WindowDisplay
 from robocov_app.toolkit.window.window_model import WindowModel
 from robocov_app.toolkit.window_part import WindowPart, offer_event
 
@@ -62,8 +62,8 @@ class CommandWindow(BaseWindow):
     size : (width, height), px
     scale : float
         Size of texts and widgets.
-    screen : pygame.Surface, optional
-        Surface to draw on; by default a new window is opened.
+    display : WindowDisplay, optional
+        Display of another window, which this one replaces for a time; by default a new window is opened.
 
     Attributes
     ----------
@@ -109,10 +109,10 @@ class CommandWindow(BaseWindow):
         dialogs: Dialogs,
         size: tuple[int, int],
         scale: float,
-        screen: Surface | None = None,
+        display: WindowDisplay | None = None,
     ) -> None:
         """Open the window; subclasses build the commands, the panel and the pointer."""
-        super().__init__(size, screen)
+        super().__init__(size, display)
         self.model = model
         self.dialogs = dialogs
         self.scale = scale
@@ -248,4 +248,4 @@ class CommandWindow(BaseWindow):
             commands = self.commands.commands
             draw_help_page(self.screen, self.theme, scale, commands, groups=self.groups, hint=self.keys_hint)
         self.dialogs.draw(self.screen, self.theme, scale)
-        self.show_screen()
+        self.display.show()

@@ -320,7 +320,7 @@ class StartPage(BaseWindow):
             draw_help_page(self.screen, theme, scale, self._commands.commands, groups=_GROUPS, hint=_HINT)
         self._draw_message()
         self.dialogs.draw(self.screen, theme, scale)
-        self.show_screen()
+        self.display.show()
 
     def _draw_message(self) -> None:
         message = self.model.message

@@ -19,6 +19,7 @@ from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, get_key_name, get_wheel_notches
 from robocov_app.toolkit.window.layout import Box, build_layout, is_inside, uses_sheet
 from robocov_app.toolkit.window.window import FPS, WindowControls
+from robocov_app.toolkit.window.window_display import WindowDisplay
 from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.canvas.layer_bar import LayerBar
@@ -85,8 +86,8 @@ class ViewerWindow(CommandWindow):
     is_unattended : bool
         Whether there is no user. Then videos wait for their encoder instead of dropping frames, and lessons
         answer their own questions.
-    screen : Surface, optional
-        Surface of an existing window to draw on; by default a new window is opened.
+    display : WindowDisplay, optional
+        Display of another window, which this one replaces for a time; by default a new window is opened.
 
     Attributes
     ----------
@@ -143,10 +144,10 @@ class ViewerWindow(CommandWindow):
         scale: float,
         *,
         is_unattended: bool = False,
-        screen: pygame.Surface | None = None,
+        display: WindowDisplay | None = None,
     ) -> None:
         """Build all parts of the window, and draw the first frame."""
-        super().__init__(viewer, Dialogs(), size, scale, screen)
+        super().__init__(viewer, Dialogs(), size, scale, display)
         self.viewer = viewer
         set_title(viewer.files.title)
         self.is_unattended = is_unattended
@@ -195,7 +196,7 @@ class ViewerWindow(CommandWindow):
             zoom=lambda factor: self.pointer.zoom(factor),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
-            save_screenshot=lambda: self.save_screenshot(self.viewer.files.folder),
+            save_screenshot=lambda: self.display.save_screenshot(self.viewer.files.folder),
             toggle_recording=lambda: self.video_recorder.toggle(self.screen),
             save_run=self.save_run,
             open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer)),

@@ -56,9 +56,8 @@ class PlayMode:
         if editor.toolbox.selector.is_busy:
             # A drag is cancelled, but an unfinished drawing is kept.
             editor.toolbox.selector.cancel(editor)
-        window = open_play_window(editor, host.screen, host.scale, waits_for_workers=self._waits_for_workers)
+        window = open_play_window(editor, host.display, host.scale, waits_for_workers=self._waits_for_workers)
         window.reduce_motion(is_reduced=self._is_motion_reduced)
-        window.windowed_size = host.windowed_size
         window.cursor = host.cursor
         window.model.hidden_folder = host.model.hidden_folder
         self.window = window
@@ -75,7 +74,6 @@ class PlayMode:
         window = self.window
         if window is None:
             return
-        window.screen = self._host.screen
         window.frame_rate = self._host.frame_rate
         if not window.returns_to_editor and not window.closed:
             window.update(seconds)
@@ -91,8 +89,6 @@ class PlayMode:
         window.run_saver.finish()
         self.window = None
         host.replacement = None
-        host.adopt_display()
-        host.windowed_size = window.windowed_size
         self._adopt_changes(window)
         # If the key is still held down, its repetitions must not start play mode again.
         if pygame.key.get_pressed()[pygame.K_F5]:

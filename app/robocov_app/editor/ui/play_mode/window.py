@@ -13,6 +13,7 @@ from robocov_app.toolkit.command_bar import BarCell, measure_cells
 from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import get_key_name
+from robocov_app.toolkit.window.window_display import WindowDisplay
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
@@ -54,7 +55,7 @@ class PlayWindow(ViewerWindow):
         self,
         viewer: PlayPresenter,
         drafts: PlayDrafts,
-        screen: pygame.Surface,
+        display: WindowDisplay,
         scale: float,
         *,
         is_unattended: bool,
@@ -62,7 +63,9 @@ class PlayWindow(ViewerWindow):
         self.returns_to_editor = False
         self.ignored_key: int | None = None
         self.drafts = drafts
-        super().__init__(viewer, screen.get_size(), scale, is_unattended=is_unattended, screen=screen)
+        super().__init__(
+            viewer, display.surface.get_size(), scale, is_unattended=is_unattended, display=display
+        )
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; F5 returns to the editor."""
@@ -102,7 +105,7 @@ class PlayWindow(ViewerWindow):
 
 
 def open_play_window(
-    editor: Editor, screen: pygame.Surface, scale: float, *, waits_for_workers: bool
+    editor: Editor, display: WindowDisplay, scale: float, *, waits_for_workers: bool
 ) -> PlayWindow:
     """Open the map of an editor in the viewer.
 
@@ -110,8 +113,8 @@ def open_play_window(
     ----------
     editor : Editor
         The editor.
-    screen : Surface
-        Screen of the window in which the viewer is shown.
+    display : WindowDisplay
+        Display of the window in which the viewer is shown.
     scale : float
         Size of text and widgets.
     waits_for_workers : bool
@@ -143,7 +146,7 @@ def open_play_window(
         viewer = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
         viewer.view.theme = editor.theme
         drafts = PlayDrafts(editor.document, viewer.files.edited_map)
-        play_window = PlayWindow(viewer, drafts, screen, scale, is_unattended=waits_for_workers)
+        play_window = PlayWindow(viewer, drafts, display, scale, is_unattended=waits_for_workers)
     except BaseException:
         costs.close()
         raise
