@@ -15,6 +15,7 @@ from driven_window import MODIFIERS, build_key_event
 
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.web import events as page_events
 
@@ -299,10 +300,14 @@ class RandomEvents:
         kind = self.random.choice((pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED))
         self.post(kind, size=size, w=size[0], h=size[1], x=size[0], y=size[1])
         if self.random.random() < 0.3:
-            theme = self.random.choice(("light", "dark"))
-            self.window.set_appearance(
-                self.random.choice(SCALES), theme, panel=self.random.choice((None, True, False))
+            appearance = PageAppearance(
+                scale=self.random.choice(SCALES),
+                theme=self.random.choice(("light", "dark")),
+                shows_panel=self.random.choice((None, True, False)),
+                is_compact=self.random.choice((True, False)),
+                is_motion_reduced=self.random.choice((True, False)),
             )
+            self.window.set_appearance(appearance)
 
     def post_other(self) -> None:
         pygame.key.set_mods(self.random.choice((0, 0, 0, *MODIFIERS.values())))

@@ -31,7 +31,7 @@ from robocov_app.viewer.session.clock import FRAME_BUDGET_S
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window.dialogs import build_lesson_offer
+from robocov_app.viewer.window.dialogs import build_lesson_offer, offer_recovery
 from robocov_app.viewer.window.window import ViewerWindow
 
 HEADLESS_FPS = 30  # frames per second of simulated real time without a display
@@ -157,7 +157,7 @@ class ViewerLauncher:
         """Offer to recover unsaved work; otherwise, offer the lesson to users who open their first window."""
         drafts = find_recoverable_drafts(self._draft_folder)
         if drafts:
-            window.offer_recovery(drafts)
+            offer_recovery(window.viewer, window.dialogs, drafts)
         elif self.offers_lesson and settings_file is not None and not settings_file.exists():
             window.dialogs.ask(build_lesson_offer(window.viewer, window.lesson.toggle))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pygame
 
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.web.events import (
     EventTranslator,
     InputMessage,
@@ -124,6 +125,11 @@ class WindowInput:
         if is_small != self._is_small:
             shows_panel = not is_small
         self._is_small = is_small
-        window.set_appearance(page.ratio, theme, panel=shows_panel)
-        window.set_compact(is_compact=page.is_compact)
-        window.reduce_motion(is_reduced=page.reduced_motion)
+        appearance = PageAppearance(
+            scale=page.ratio,
+            theme=theme,
+            shows_panel=shows_panel,
+            is_compact=page.is_compact,
+            is_motion_reduced=page.reduced_motion,
+        )
+        window.set_appearance(appearance)

@@ -16,6 +16,7 @@ from robocov.environment import Environment
 from robocov_app.editor.edits.create import add_circle
 from robocov_app.editor.model.history import UndoHistory
 from robocov_app.toolkit.window.exceptions import ExceptionLog
+from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.costs.costs import Costs
 
@@ -104,7 +105,10 @@ def leave_everything(driver: Driver | EditorDriver) -> None:
     pygame.display.set_mode((900, 600), pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
     driver.post(pygame.WINDOWFOCUSLOST)
-    driver.window.set_appearance(1.0, "light", panel=True)
+    appearance = PageAppearance(
+        scale=1.0, theme="light", shows_panel=True, is_compact=False, is_motion_reduced=False
+    )
+    driver.window.set_appearance(appearance)
     for _ in range(8):
         driver.press_key("escape")
         driver.window.closed = False

@@ -68,13 +68,13 @@ def test_motion_can_be_switched_off(driver: Driver) -> None:
 def test_reduced_motion_of_the_system_is_respected(driver: Driver) -> None:
     canvas = driver.window.canvas
     canvas.camera.is_animated = True
-    driver.window.reduce_motion(is_reduced=True)
+    driver.viewer.view.is_motion_reduced = True
     driver.window.do("zoom:in")
     assert not canvas.camera.is_moving
     for _ in range(2):
         driver.window.do("motion")
     assert driver.viewer.message == "Zooming is instant, because the system asks for reduced motion"
-    driver.window.reduce_motion(is_reduced=False)
+    driver.viewer.view.is_motion_reduced = False
     driver.window.do("zoom:in")
     assert canvas.camera.is_moving
 

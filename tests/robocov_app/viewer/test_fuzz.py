@@ -191,7 +191,7 @@ class RandomUser:
             return rng.randint(box.left, box.right), rng.randint(box.top, box.bottom)
         layout = window.layout
         boxes = [*layout.panes, layout.time_slider, layout.chart, layout.panel, layout.panel]
-        if target > 0.7 and window._layout_key and window.canvas._scenes:
+        if target > 0.7 and window._arrangement.key and window.canvas._scenes:
             session = self.driver.session
             pane = rng.randrange(min(len(session.timeline.panes), len(layout.panes)))
             x, y = rng.choice(session.displayed.get_positions(session.timeline.panes[pane]).tolist())

@@ -28,7 +28,7 @@ MAX_TAPS = 100
 def open_phone(folder: Path, size: tuple[int, int]) -> Iterator[Driver]:
     """Open a window on a phone, with the panel closed."""
     with open_viewer(folder, size=size, scale=RATIO) as driver:
-        driver.window.set_compact(is_compact=True)
+        driver.viewer.view.is_compact = True
         driver.window.lesson.is_unattended = False
         driver.viewer.view.has_panel = False
         driver.settle()

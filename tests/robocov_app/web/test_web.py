@@ -676,14 +676,8 @@ class FakeWindow:
         self.has_dialog = False
         self.shade = 0
 
-    def set_appearance(self, scale, theme, *, panel):
-        pass
-
-    def set_compact(self, *, is_compact):
-        self.is_compact = is_compact
-
-    def reduce_motion(self, *, is_reduced):
-        self.is_motion_reduced = is_reduced
+    def set_appearance(self, appearance):
+        self.is_motion_reduced = appearance.is_motion_reduced
 
     def draw(self, size, scale):
         if self.has_dialog:

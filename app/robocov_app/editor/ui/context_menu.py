@@ -1,9 +1,12 @@
-"""Commands of the context menu, which depend on the selection."""
+"""The context menu: what it selects, and its commands, which depend on the selection."""
 
-from robocov.environment import PolygonObstacle, WallObstacle
+from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov_app.editor.editor import Editor
+from robocov_app.editor.model.hit_test import find_owners
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.actions import select_owners
+from robocov_app.toolkit.tools.viewport import REACH_PX
 
 DRAW_COMMANDS = (
     "tool:polygon",
@@ -13,6 +16,15 @@ DRAW_COMMANDS = (
     "tool:boundary",
     "tool:disc",
 )
+
+
+def select_for_menu(editor: Editor, point: Point) -> None:
+    """Select the object at a point, m, unless it is selected already or vertices are selected."""
+    if editor.selection.vertices:
+        return
+    owners = find_owners(editor.sketch, point, 0.5 * REACH_PX * editor.pixel)
+    if not any(owner in editor.selection.owners for owner in owners):
+        editor.select(Selection.of(*owners[:1]))
 
 
 def list_menu_commands(editor: Editor) -> list[str]:

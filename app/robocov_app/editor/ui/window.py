@@ -9,22 +9,22 @@ import pygame
 from robocov.environment import Point
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.editor import Editor
-from robocov_app.editor.model import require
-from robocov_app.editor.model.hit_test import find_owners
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem
-from robocov_app.editor.team import Team, TeamRequest, TeamSampler
+from robocov_app.editor.team import Team
 from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.editor.ui.commands import GROUPS, PALETTE_HINT, EditorWindowActions, list_commands
-from robocov_app.editor.ui.context_menu import list_menu_commands
+from robocov_app.editor.ui.context_menu import list_menu_commands, select_for_menu
+from robocov_app.editor.ui.field_focus import FieldFocus
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
-from robocov_app.editor.ui.panel import EditorPanel, find_object_kind
+from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
+from robocov_app.editor.ui.team_preview import TeamPreview
 from robocov_app.editor.ui.top_bar import EditorTopBar
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.editor.ui.typed_values import edit_typed_value
@@ -35,11 +35,11 @@ from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.tool_rail import ToolRail
 from robocov_app.toolkit.tools.tool import CursorShape
-from robocov_app.toolkit.tools.viewport import REACH_PX
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
+from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.toolkit.window_part import WindowPart
 
 STATUS_HINT = "F5: try it · F1: keys"
@@ -106,8 +106,10 @@ class EditorWindow(CommandWindow):
         The mouse over the map.
     play_mode : PlayMode
         Shows the viewer in this window to try the map.
-    team_sampler : TeamSampler
-        Computes the positions of the team at a start.
+    team_preview : TeamPreview
+        Shows the team at a start.
+    field_focus : FieldFocus
+        Puts the text cursor into fields of the panel.
     """
 
     groups = GROUPS
@@ -137,7 +139,8 @@ class EditorWindow(CommandWindow):
         self.top_bar = EditorTopBar(editor, self.commands, self.do)
         self.tool_rail = ToolRail(editor.toolbox, self.commands, self.do)
         self.pointer = EditorPointer(editor, self.canvas, self.parts, self.open_menu)
-        self.team_sampler = TeamSampler()
+        self.team_preview = TeamPreview(editor, self.canvas)
+        self.field_focus = FieldFocus(editor, self.panel, self._arrange)
         editor.snapper.waits_for_targets = waits_for_workers
         self._layout_key: tuple[object, ...] | None = None
         self._arrange()
@@ -150,8 +153,8 @@ class EditorWindow(CommandWindow):
         return EditorWindowActions(
             start_play_mode=self.play_mode.start,
             save_screenshot=lambda: self.display.save_screenshot(self.editor.folder),
-            edit_name=self._edit_name,
-            edit_width=self._edit_width,
+            edit_name=lambda: self.field_focus.edit_name(),
+            edit_width=lambda: self.field_focus.edit_width(),
             open_menu=lambda: self.open_menu(self.pointer.pixel),
             hold_pan=lambda: self.pointer.hold_pan(),
             show_next_tab=lambda: self.panel.show_next_tab(),
@@ -197,7 +200,7 @@ class EditorWindow(CommandWindow):
     def close(self) -> None:
         """End play mode and all background work."""
         self.play_mode.close()
-        self.team_sampler.close()
+        self.team_preview.close()
         self.dialogs.close()
         self.editor.snapper.close()
 
@@ -234,24 +237,14 @@ class EditorWindow(CommandWindow):
             caption=pygame.display.get_caption(),
         )
 
-    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Set scale and theme, and show or hide the panel; `panel` None leaves the panel as it is."""
-        self.scale = scale
-        self.editor.theme = theme
-        if panel is not None:
-            self.editor.shows_panel = panel
+    def set_appearance(self, appearance: PageAppearance) -> None:
+        """Adopt the appearance that suits the browser page that shows the window; see `BaseWindow`."""
+        self.scale = appearance.scale
+        self.editor.theme = appearance.theme
+        if appearance.shows_panel is not None:
+            self.editor.shows_panel = appearance.shows_panel
         self.editor.revision += 1
-        if self.play_mode.window is not None:
-            self.play_mode.window.set_appearance(scale, theme, panel=panel)
-
-    def set_compact(self, *, is_compact: bool) -> None:
-        """Leave the buttons of play mode to the page of a phone, or show them again."""
-        if self.play_mode.window is not None:
-            self.play_mode.window.set_compact(is_compact=is_compact)
-
-    def reduce_motion(self, *, is_reduced: bool) -> None:
-        """Adopt the setting of the user's system for reduced motion, which matters in play mode."""
-        self.play_mode.reduce_motion(is_reduced=is_reduced)
+        self.play_mode.set_appearance(appearance)
 
     def update(self, seconds: float) -> None:
         """Advance the clock, poll files and workers, and update layout, parts, cursor and title."""
@@ -265,7 +258,7 @@ class EditorWindow(CommandWindow):
         editor.pass_time(seconds)
         if not self.pointer.is_busy:
             self.documents.poll()
-            self._update_team()
+            self.team_preview.update()
         if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
         editor.show_message(editor.document.autosaver.problem, is_error=True)
@@ -283,16 +276,6 @@ class EditorWindow(CommandWindow):
         if editor.document.history.has_unsaved_changes:
             title = f"● {title}"
         set_title(f"{title} · robocov edit")
-
-    def _update_team(self) -> None:
-        editor = self.editor
-        if "robots" not in editor.shown:
-            return
-        request = TeamRequest(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
-        team = self.team_sampler.poll(request)
-        if team is not None:
-            self.canvas.team = team
-            editor.show_message(team.message, is_error=True)
 
     def _choose_cursor(self) -> CursorShape:
         if not self.canvas.contains(self.pointer.pixel):
@@ -342,35 +325,11 @@ class EditorWindow(CommandWindow):
     def _show_problem(self) -> None:
         self.canvas.show_problem(self.editor.problem)
 
-    def _edit_name(self) -> None:
-        """Put the text cursor into the name of the selected object or, if there is none, of the map."""
-        if len(self.editor.selection.owners) == 1:
-            self._edit_field("object", "name")
-        else:
-            self._edit_field("map", "title")
-
-    def _edit_width(self) -> None:
-        """Put the text cursor into the field for the width of the selected wall."""
-        require(find_object_kind(self.editor) == "wall", "select one wall first")
-        self._edit_field("object", "width")
-
-    def _edit_field(self, tab: str, field: str) -> None:
-        """Put the text cursor into a field of a page of the panel."""
-        self.editor.shows_panel = True
-        self._arrange()
-        self.panel.show_tab(tab)
-        self.panel.ui.run(None, None)
-        self.panel.ui.set_focus(field)
-
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the context menu at a pixel; first select the object there unless it is selected already."""
-        editor = self.editor
-        if self.canvas.contains(pixel) and not editor.selection.vertices:
-            reach = 0.5 * REACH_PX * editor.pixel
-            owners = find_owners(editor.sketch, self.canvas.to_world(pixel), reach)
-            if not any(owner in editor.selection.owners for owner in owners):
-                editor.select(Selection.of(*owners[:1]))
-        commands = [self.commands[name] if name else None for name in list_menu_commands(editor)]
+        if self.canvas.contains(pixel):
+            select_for_menu(self.editor, self.canvas.to_world(pixel))
+        commands = [self.commands[name] if name else None for name in list_menu_commands(self.editor)]
         self.dialogs.ask(Menu(commands, pixel, self.do))
 
     def handle_event(self, event: pygame.event.Event) -> None:

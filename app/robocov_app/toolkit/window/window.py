@@ -1,6 +1,5 @@
 """A window and its main loop, which handles events and draws a frame if something has changed."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Protocol
@@ -15,6 +14,7 @@ from robocov_app.toolkit.window.exception_guard import ExceptionGuard, RollBack
 from robocov_app.toolkit.window.input import clean_event, drop_late_repeats
 from robocov_app.toolkit.window.layout import Box
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
+from robocov_app.toolkit.window.page_view import MapDrawing, PageAppearance, WindowControls
 from robocov_app.toolkit.window.termination import is_ending
 from robocov_app.toolkit.window.window_display import WindowDisplay
 
@@ -56,75 +56,6 @@ class Remote(Protocol):
 
     def send(self, surface: Surface, cursor: int) -> None:
         """Show the current frame and the shape of the cursor (a pygame constant)."""
-
-
-@dataclass(frozen=True)
-class WindowControls:
-    """State of a window that the buttons of a phone's page show.
-
-    Attributes
-    ----------
-    theme : str
-        ``light`` or ``dark``.
-    is_compact : bool
-        Whether the window leaves its buttons to the page.
-    is_playing : bool
-    can_undo : bool
-    tool : str
-        Name of the tool in use.
-    lesson : str
-        ``shown`` while a lesson is shown, ``left`` while the user has taken over from it, or else empty.
-    has_panel : bool
-        Whether the panel is open.
-    is_typing : bool
-        Whether typed text goes to a text field.
-    scroll_box : Box or None
-        Part of the window that a vertical drag of a finger scrolls.
-    """
-
-    theme: str
-    is_compact: bool
-    is_playing: bool
-    can_undo: bool
-    tool: str
-    lesson: str
-    has_panel: bool
-    is_typing: bool
-    scroll_box: Box | None
-
-
-class MapDrawing(Protocol):
-    """Draws the map of a window without its controls, for small screens."""
-
-    def draw(self, size: tuple[int, int], scale: float) -> Surface | None:
-        """Draw the map.
-
-        Parameters
-        ----------
-        size : (width, height), px
-        scale : float
-            Size of texts and symbols.
-
-        Returns
-        -------
-        pygame.Surface or None
-            None if the window itself must be seen now, because it shows a dialog, for example.
-        """
-
-    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return the pixel of the window that shows the same point of the map.
-
-        Parameters
-        ----------
-        size : (width, height), px
-            Size of a picture that `draw` has returned.
-        pixel : (x, y)
-            Pixel of that picture.
-
-        Returns
-        -------
-        (x, y)
-        """
 
 
 class BaseWindow:
@@ -201,23 +132,8 @@ class BaseWindow:
     def close(self) -> None:
         """Stop threads and processes that the window has started."""
 
-    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Adopt the appearance that suits the display of a `Remote`.
-
-        Parameters
-        ----------
-        scale : float
-            Size of texts and widgets.
-        theme : str
-        panel : bool or None
-            Whether the panel is shown; None to leave it as it is.
-        """
-
-    def set_compact(self, *, is_compact: bool) -> None:
-        """Leave the buttons of the bar and of the rail to the page of a phone, or show them again."""
-
-    def reduce_motion(self, *, is_reduced: bool) -> None:
-        """Adopt the setting of the user's system for reduced motion."""
+    def set_appearance(self, appearance: PageAppearance) -> None:
+        """Adopt the appearance that suits the browser page that shows the window."""
 
     def hide_folder(self, folder: Path) -> None:
         """Omit a folder from the paths in messages, because a browser's user cannot open it."""

@@ -8,6 +8,7 @@ from robocov_app.storage.autosave import Draft, remove_draft
 from robocov_app.toolkit.dialogs import (
     Answer,
     Choice,
+    Dialogs,
     Option,
     Question,
     create_file_choice,
@@ -70,19 +71,17 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
     return Question("Welcome to robocov", text, answers, play)
 
 
-def build_recovery_offer(
-    viewer: Presenter, drafts: Sequence[Draft], offer_others: Callable[[Sequence[Draft]], None]
-) -> Question:
-    """Return the dialog that offers to recover unsaved work, and pause the session until the answer.
+def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft]) -> None:
+    """Open a dialog that offers to recover unsaved work, and pause the session until the answer.
 
     Parameters
     ----------
     viewer : Presenter
         The viewer.
+    dialogs : Dialogs
+        Shows the open dialog.
     drafts : sequence of Draft
-        Drafts of unsaved work, newest first.
-    offer_others : callable
-        Offers the other drafts after the newest one was discarded.
+        Drafts of unsaved work, newest first. If the newest one is discarded, the next one is offered.
     """
     newest = drafts[0]
     others = drafts[1:]
@@ -96,15 +95,16 @@ def build_recovery_offer(
         remove_draft(newest.folder)
         play()
         if others:
-            offer_others(others)
+            offer_recovery(viewer, dialogs, others)
 
-    return create_recovery_question(
+    question = create_recovery_question(
         f"A window ended without saving: {describe_draft(newest)}.",
         other_count=len(others),
         recover=recover,
         discard=discard,
         postpone=play,
     )
+    dialogs.ask(question)
 
 
 def _pause(viewer: Presenter) -> Callable[[], None]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
+from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.sharing.share import ShareActions
 
@@ -16,7 +17,7 @@ LINK_COMMAND = "share:link"
 
 
 class WindowMenus:
-    """Builds the menus of a window.
+    """Opens the menus of a window.
 
     Parameters
     ----------
@@ -26,6 +27,8 @@ class WindowMenus:
         Actions of the share menu.
     commands : CommandTable
         All commands.
+    dialogs : Dialogs
+        Shows the open menu.
     run_command : callable
         Runs the command with a given name.
     """
@@ -35,28 +38,30 @@ class WindowMenus:
         viewer: Presenter,
         share: ShareActions,
         commands: CommandTable,
+        dialogs: Dialogs,
         run_command: Callable[[str], object],
     ) -> None:
         self._viewer = viewer
         self._share = share
         self._commands = commands
+        self._dialogs = dialogs
         self._run_command = run_command
 
-    def build_context_menu(self, pixel: tuple[int, int]) -> Menu:
-        """Build the context menu of the selection at a pixel."""
-        return self._build_menu(list_context_commands(self._viewer), pixel)
+    def open_context_menu(self, pixel: tuple[int, int]) -> None:
+        """Open the context menu of the selection at a pixel."""
+        self._open_menu(list_context_commands(self._viewer), pixel)
 
-    def build_share_menu(self, pixel: tuple[int, int]) -> Menu:
-        """Build the menu of what can be shared at a pixel; links need a served window."""
+    def open_share_menu(self, pixel: tuple[int, int]) -> None:
+        """Open the menu of what can be shared at a pixel; links need a served window."""
         names = list(SHARE_COMMANDS)
         if self._share.has_link:
             names.append(LINK_COMMAND)
-        return self._build_menu(names, pixel)
+        self._open_menu(names, pixel)
 
-    def _build_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> Menu:
-        """Build a menu of commands; an empty name separates two groups."""
+    def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
+        """Open a menu of commands; an empty name separates two groups."""
         rows = [self._commands[name] if name else None for name in names]
-        return Menu(rows, pixel, self._run_command)
+        self._dialogs.ask(Menu(rows, pixel, self._run_command))
 
 
 def list_context_commands(viewer: Presenter) -> tuple[str, ...]:

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import pygame
 
 from robocov_app.look.theme import get_theme
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.storage.autosave import Draft
 from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.keyboard_focus import FocusGroup, KeyboardFocus
@@ -17,8 +15,9 @@ from robocov_app.toolkit.tools.pointer import LEFT_BUTTON
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, get_key_name, get_wheel_notches
-from robocov_app.toolkit.window.layout import Box, build_layout, is_inside, uses_sheet
-from robocov_app.toolkit.window.window import FPS, WindowControls
+from robocov_app.toolkit.window.layout import is_inside
+from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
+from robocov_app.toolkit.window.window import FPS
 from robocov_app.toolkit.window.window_display import WindowDisplay
 from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
@@ -34,13 +33,11 @@ from robocov_app.viewer.panel.robot_inspector import RobotInspector
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.sharing.share import ShareActions
-from robocov_app.viewer.window.dialogs import (
-    build_branch_dialog,
-    build_file_dialog,
-    build_recovery_offer,
-)
+from robocov_app.viewer.window.arrangement import Arrangement
+from robocov_app.viewer.window.dialogs import build_branch_dialog, build_file_dialog
 from robocov_app.viewer.window.map_picture import MapPictures, PictureSources
 from robocov_app.viewer.window.menus import WindowMenus
+from robocov_app.viewer.window.page_controls import PageControls
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import HINT, list_facts
@@ -51,25 +48,6 @@ from robocov_app.viewer.window.video_recorder import VideoRecorder
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
 _FOCUS_KEYS = ("tab", "shift+tab")
-_ASPECT_DECIMALS = 3  # smaller changes of the shape of the map do not change the layout
-
-
-class _FrameSettings(NamedTuple):
-    """Settings on which all parts of the layout depend."""
-
-    size: tuple[int, int]
-    scale: float
-    has_panel: bool
-    is_compact: bool
-    theme: str
-
-
-class _LayoutKey(NamedTuple):
-    """Everything on which the layout depends, to detect changes."""
-
-    frame: _FrameSettings
-    pane_count: int
-    aspect: float
 
 
 class ViewerWindow(CommandWindow):
@@ -162,7 +140,7 @@ class ViewerWindow(CommandWindow):
         window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands, *self.list_more_commands()]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
-        self._menus = WindowMenus(viewer, self.share, self.commands, self.do)
+        self._menus = WindowMenus(viewer, self.share, self.commands, self.dialogs, self.do)
         self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
         self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
         self.top_bar = self.top_bar_class(viewer, self.commands, self.do)
@@ -172,7 +150,7 @@ class ViewerWindow(CommandWindow):
         targets = PointerTargets(self.canvas, self.chart, self.layer_bar, self.parts)
         actions = PointerActions(
             leave_lesson=self.lesson.leave,
-            open_menu=lambda pixel: self.dialogs.ask(self._menus.build_context_menu(pixel)),
+            open_menu=self._menus.open_context_menu,
             show_robot_page=lambda: self.panel.show_tab("robot"),
         )
         self.pointer = ViewerPointer(viewer, targets, actions)
@@ -180,9 +158,10 @@ class ViewerWindow(CommandWindow):
         self._runner = SessionRunner(viewer)
         self._status = StatusDisplay(viewer, self.lesson, self.hint, can_suggest=not is_unattended)
         sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
-        self.map_pictures = MapPictures(viewer, sources, lambda: self._is_map_covered)
+        self.map_pictures = MapPictures(viewer, sources, lambda: self.is_help_open or self.dialogs.is_open)
         self._inspector = RobotInspector(viewer, self.panel)
-        self._layout_key: _LayoutKey | None = None  # of the current layout
+        self._page_controls = PageControls(viewer, self.lesson, self.layer_bar, self.dialogs, self.parts)
+        self._arrangement = Arrangement(viewer, self.lesson, self.canvas, self.chart, self.parts)
         self._arrange()
         self.draw()
 
@@ -192,28 +171,25 @@ class ViewerWindow(CommandWindow):
 
     def _build_actions(self) -> ViewerWindowActions:
         """Return the functions of this window that commands call."""
+        viewer = self.viewer
         return ViewerWindowActions(
             zoom=lambda factor: self.pointer.zoom(factor),
             show_next_tab=lambda: self.panel.show_next_tab(),
             toggle_fullscreen=self.toggle_fullscreen,
-            save_screenshot=lambda: self.display.save_screenshot(self.viewer.files.folder),
+            save_screenshot=lambda: self.display.save_screenshot(viewer.files.folder),
             toggle_recording=lambda: self.video_recorder.toggle(self.screen),
-            save_run=self.save_run,
-            open_file=lambda: self.dialogs.ask(build_file_dialog(self.viewer)),
-            list_branches=lambda: self.dialogs.ask(build_branch_dialog(self.viewer)),
+            save_run=lambda: self.run_saver.save(viewer.session, viewer.files.folder, viewer.files.map_name),
+            open_file=lambda: self.dialogs.ask(build_file_dialog(viewer)),
+            list_branches=lambda: self.dialogs.ask(build_branch_dialog(viewer)),
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
             toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),
             focus_next=lambda: self.focus.step(1),
             focus_previous=lambda: self.focus.step(-1),
-            open_share_menu=self.open_share_menu,
+            open_share_menu=lambda: self._menus.open_share_menu(self.top_bar.find_menu_position("share")),
             toggle_lesson=self.lesson.toggle,
-            quit=self.quit,
+            quit=self.handle_quit,
         )
-
-    def open_share_menu(self) -> None:
-        """Open the menu of what can be shared, below its button."""
-        self.dialogs.ask(self._menus.build_share_menu(self.top_bar.find_menu_position("share")))
 
     @property
     def parts(self) -> Sequence[WindowPart]:
@@ -237,10 +213,6 @@ class ViewerWindow(CommandWindow):
         """Show the message of a command of the palette, and update the report on the robot."""
         super().show_result(message)
         self.panel.report = None
-
-    def offer_recovery(self, drafts: Sequence[Draft]) -> None:
-        """Offer to recover unsaved work, starting with the newest draft."""
-        self.dialogs.ask(build_recovery_offer(self.viewer, drafts, self.offer_recovery))
 
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that reverts all later changes."""
@@ -272,64 +244,25 @@ class ViewerWindow(CommandWindow):
         self.video_recorder.close()
         self.viewer.costs.close()
 
-    def set_appearance(self, scale: float, theme: str, *, panel: bool | None) -> None:
+    def set_appearance(self, appearance: PageAppearance) -> None:
         """Adopt the appearance that suits the browser page that shows the window; see `BaseWindow`."""
-        self.scale = scale
+        self.scale = appearance.scale
         view = self.viewer.view
-        view.theme = theme
-        if panel is not None:
-            view.has_panel = panel
-        self.viewer.revision += 1
-
-    @property
-    def _is_map_covered(self) -> bool:
-        """Whether the help page or a dialog is shown."""
-        return self.is_help_open or self.dialogs.current is not None
-
-    def set_compact(self, *, is_compact: bool) -> None:
-        """Leave the buttons of the bar and of the rail to the page of a phone, or show them again."""
-        self.viewer.view.is_compact = is_compact
+        view.theme = appearance.theme
+        if appearance.shows_panel is not None:
+            view.has_panel = appearance.shows_panel
+        view.is_compact = appearance.is_compact
+        view.is_motion_reduced = appearance.is_motion_reduced
         self.viewer.revision += 1
 
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        viewer = self.viewer
-        lesson = ""
-        if self.lesson.shown is not None:
-            lesson = "shown"
-        elif self.lesson.is_waiting:
-            lesson = "left"
-        pages = [part.ui for part in self.parts]
-        if self.dialogs.ui is not None and self.dialogs.is_open:
-            pages.append(self.dialogs.ui)
-        return WindowControls(
-            theme=viewer.view.theme,
-            is_compact=viewer.view.is_compact,
-            is_playing=viewer.session.playback.is_playing,
-            can_undo=self.top_bar.get_file().can_undo,
-            tool=viewer.tool.name,
-            lesson=lesson,
-            has_panel=viewer.view.has_panel,
-            is_typing=any(page.edit is not None for page in pages),
-            scroll_box=self._find_scroll_box(),
-        )
-
-    def _find_scroll_box(self) -> Box | None:
-        """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""
-        if self.dialogs.is_open or self.layer_bar.is_open:
-            return Box(0, 0, *self.screen.get_size())
-        if self.layout.has_panel:
-            return self.layout.panel
-        return None
+        return self._page_controls.read(self.screen.get_size(), self.layout)
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window, or leave the lesson in its place."""
         self.do("panel" if self.lesson.shown is None else "tour")
-
-    def reduce_motion(self, *, is_reduced: bool) -> None:
-        """Adopt the setting of the user's system for reduced motion."""
-        self.viewer.view.is_motion_reduced = is_reduced
 
     def update(self, seconds: float) -> None:
         """Advance everything by a time, s."""
@@ -372,7 +305,7 @@ class ViewerWindow(CommandWindow):
             self._cost_curves.answer_count,
             self._status.seek_progress,
             viewer.costs.state,
-            self._layout_key,
+            self._arrangement.key,
             any(part.ui.needs_redraw for part in self.parts),
             self.lesson.frame_key,
             self.layer_bar.frame_key,
@@ -394,37 +327,9 @@ class ViewerWindow(CommandWindow):
 
     def _arrange(self) -> None:
         """Lay out the window if its size, or the number or shape of panes has changed."""
-        view = self.viewer.view
-        session = self.viewer.session
-        size = self.screen.get_size()
-        panes = len(session.timeline.panes)
-        before = self._layout_key
-        low_x, low_y, high_x, high_y = session.displayed.environment.region.bounds
-        aspect = (high_x - low_x) / (high_y - low_y)
-        has_panel = view.has_panel or self._has_lesson_sheet
-        frame = _FrameSettings(size, self.scale, has_panel, view.is_compact, view.theme)
-        key = _LayoutKey(frame, panes, round(aspect, _ASPECT_DECIMALS))
-        if key == before:
-            return
-        self._layout_key = key
-        self.theme = get_theme(view.theme)
-        self.layout = build_layout(
-            size, self.scale, panes, aspect, panel=has_panel, is_compact=view.is_compact
-        )
-        self.canvas.arrange(self.layout, self.theme)
-        self.chart.arrange(self.layout, self.theme)
-        # The parts do not depend on the panes.
-        if before is None or frame != before.frame:
-            for part in self.parts:
-                part.arrange(self.layout, self.theme)
-
-    @property
-    def _has_lesson_sheet(self) -> bool:
-        """Whether a lesson is shown in a sheet, because the window is too small for a card over the map."""
-        if self.lesson.shown is None:
-            return False
-        is_compact = self.viewer.view.is_compact
-        return is_compact or uses_sheet(self.screen.get_size(), self.scale)
+        self._arrangement.update(self.screen.get_size(), self.scale)
+        self.layout = self._arrangement.layout
+        self.theme = self._arrangement.theme
 
     def draw(self) -> None:
         """Draw all parts of the window, show the frame, and add it to the video."""
@@ -461,15 +366,6 @@ class ViewerWindow(CommandWindow):
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
-
-    def quit(self) -> None:
-        """Close the window."""
-        self.closed = True
-
-    def save_run(self) -> str:
-        """Save the run up to the present in a new folder; return a message."""
-        files = self.viewer.files
-        return self.run_saver.save(self.viewer.session, files.folder, files.map_name)
 
     def open_file(self, path: Path) -> None:
         """Open a session or a map that was dropped on the window."""

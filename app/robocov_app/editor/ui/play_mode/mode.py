@@ -11,6 +11,7 @@ from robocov_app.editor.ui.play_mode.map_changes import build_play_change
 from robocov_app.editor.ui.play_mode.window import PlayWindow, open_play_window
 from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import prefers_reduced_motion
+from robocov_app.toolkit.window.page_view import PageAppearance
 
 
 class PlayMode:
@@ -57,17 +58,17 @@ class PlayMode:
             # A drag is cancelled, but an unfinished drawing is kept.
             editor.toolbox.selector.cancel(editor)
         window = open_play_window(editor, host.display, host.scale, waits_for_workers=self._waits_for_workers)
-        window.reduce_motion(is_reduced=self._is_motion_reduced)
+        window.viewer.view.is_motion_reduced = self._is_motion_reduced
         window.cursor = host.cursor
         window.model.hidden_folder = host.model.hidden_folder
         self.window = window
         host.replacement = window
 
-    def reduce_motion(self, *, is_reduced: bool) -> None:
-        """Adopt the setting of the user's system for reduced motion, also for later starts."""
-        self._is_motion_reduced = is_reduced
+    def set_appearance(self, appearance: PageAppearance) -> None:
+        """Adopt the appearance that suits the browser page; reduced motion also for later starts."""
+        self._is_motion_reduced = appearance.is_motion_reduced
         if self.window is not None:
-            self.window.reduce_motion(is_reduced=is_reduced)
+            self.window.set_appearance(appearance)
 
     def update(self, seconds: float) -> None:
         """Advance the viewer by a time, s; return to the editor once the user has left the viewer."""

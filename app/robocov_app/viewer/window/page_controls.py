@@ -1,0 +1,79 @@
+"""State of the viewer's window that the page of a phone needs, for its buttons and for scrolling."""
+
+from collections.abc import Sequence
+
+from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window.page_view import WindowControls
+from robocov_app.toolkit.window_part import WindowPart
+from robocov_app.viewer.canvas.layer_bar import LayerBar
+from robocov_app.viewer.lessons.guide import LessonGuide
+from robocov_app.viewer.presenter import Presenter
+
+
+class PageControls:
+    """Reads the state of the window that the page of a phone shows.
+
+    Parameters
+    ----------
+    viewer : Presenter
+        The viewer.
+    lesson : LessonGuide
+        The lesson, if there is one.
+    layer_bar : LayerBar
+        The legend.
+    dialogs : Dialogs
+        Shows the open dialog.
+    parts : sequence of WindowPart
+        Top bar, tool rail and panel.
+    """
+
+    def __init__(
+        self,
+        viewer: Presenter,
+        lesson: LessonGuide,
+        layer_bar: LayerBar,
+        dialogs: Dialogs,
+        parts: Sequence[WindowPart],
+    ) -> None:
+        self._viewer = viewer
+        self._lesson = lesson
+        self._layer_bar = layer_bar
+        self._dialogs = dialogs
+        self._parts = parts
+
+    def read(self, size: tuple[int, int], layout: Layout) -> WindowControls:
+        """Return the state of a window of the given size, px, and layout."""
+        viewer = self._viewer
+        destination, _ = viewer.session.timeline.destination
+        return WindowControls(
+            theme=viewer.view.theme,
+            is_compact=viewer.view.is_compact,
+            is_playing=viewer.session.playback.is_playing,
+            can_undo=destination.parent is not None,
+            tool=viewer.tool.name,
+            lesson=self._describe_lesson(),
+            has_panel=viewer.view.has_panel,
+            is_typing=self._is_typing(),
+            scroll_box=self._find_scroll_box(size, layout),
+        )
+
+    def _describe_lesson(self) -> str:
+        if self._lesson.shown is not None:
+            return "shown"
+        return "left" if self._lesson.is_waiting else ""
+
+    def _is_typing(self) -> bool:
+        """Return whether typed text goes to a text field of a part or of the open dialog."""
+        pages = [part.ui for part in self._parts]
+        if self._dialogs.ui is not None and self._dialogs.is_open:
+            pages.append(self._dialogs.ui)
+        return any(page.edit is not None for page in pages)
+
+    def _find_scroll_box(self, size: tuple[int, int], layout: Layout) -> Box | None:
+        """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""
+        if self._dialogs.is_open or self._layer_bar.is_open:
+            return Box(0, 0, *size)
+        if layout.has_panel:
+            return layout.panel
+        return None
