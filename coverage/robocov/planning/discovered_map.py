@@ -154,6 +154,22 @@ class DiscoveredMap:
         _mark_robots(state, self.raster.grid, positions, radius)
         return self._replace_state(state)
 
+    def replace_cells(self, is_replaced: BoolArray, other: DiscoveredMap) -> DiscoveredMap:
+        """Return the map with some cells of another map of the same raster.
+
+        Parameters
+        ----------
+        is_replaced : (rows, columns) bool array
+            Cells to take from the other map.
+        other : DiscoveredMap
+
+        Returns
+        -------
+        DiscoveredMap
+            This map itself if nothing changes.
+        """
+        return self._replace_state(np.where(is_replaced, other.state, self.state))
+
     def count_changed_walls(self, earlier: DiscoveredMap) -> int:
         """Count the cells where walls have disappeared, or appeared in open space, since an earlier map.
 

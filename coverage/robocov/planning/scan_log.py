@@ -20,6 +20,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation import Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
+from robocov.planning.scan_areas import ScanAreas
 
 REPORTED_ROUNDS = 64
 """Number of rounds that an `Inventory` reports one by one, after the first missing scan of a robot."""
@@ -174,8 +175,10 @@ class ScanLog:
     """The scans that a robot has, and the map that it builds from them. Immutable.
 
     The map is updated only when it is needed, by `update_map`, because many scans may arrive in between. Some
-    earlier maps are stored as checkpoints. When a scan of an earlier round arrives, the map is rebuilt from
-    the last checkpoint before that round.
+    earlier maps are stored as checkpoints. When scans of earlier rounds arrive, each later checkpoint is
+    repaired: the cells near these scans are taken from the checkpoint before it, and all scans near them are
+    added again. What happens to a cell does not depend on other cells; the map is therefore that of all
+    scans, bit for bit.
 
     Attributes
     ----------
@@ -185,6 +188,8 @@ class ScanLog:
         Whether each scan is in the log.
     checkpoints : tuple of Checkpoint
         In ascending order of their numbers of rounds. The first one has no rounds, and an unknown map.
+    pending_scans : tuple of NumberedScan
+        The scans that the checkpoints lack.
     known_map : DiscoveredMap
         The map after its last update.
     robot_radius : float or None, m
@@ -195,6 +200,7 @@ class ScanLog:
     rounds: tuple[ScanRound, ...]
     is_present: BoolArray
     checkpoints: tuple[Checkpoint, ...]
+    pending_scans: tuple[NumberedScan, ...]
     known_map: DiscoveredMap
     robot_radius: float | None
 
@@ -221,6 +227,7 @@ class ScanLog:
             rounds=(),
             is_present=np.zeros((0, robot_count), dtype=bool),
             checkpoints=(Checkpoint(0, unknown_map),),
+            pending_scans=(),
             known_map=unknown_map,
             robot_radius=robot_radius,
         )
@@ -276,13 +283,11 @@ class ScanLog:
             scans_of_round = list(rounds[scan.round_number])
             scans_of_round[scan.robot] = scan
             rounds[scan.round_number] = tuple(scans_of_round)
-        # Checkpoints with later rounds lack some of the new scans.
-        first_changed = min(scan.round_number for scan in new_scans)
         return replace(
             self,
             rounds=tuple(rounds),
             is_present=is_present,
-            checkpoints=tuple(each for each in self.checkpoints if each.round_count <= first_changed),
+            pending_scans=(*self.pending_scans, *new_scans),
         )
 
     def update_map(self) -> ScanLog:
@@ -293,23 +298,88 @@ class ScanLog:
         ScanLog
             It has the same map object as before if no cell has changed.
         """
-        start = self.checkpoints[-1]
-        if start.round_count == len(self.rounds):
+        if not self.pending_scans:
             return self
-        new_rounds = self.rounds[start.round_count :]
-        scans = [scan for round_scans in new_rounds for scan in round_scans if scan is not None]
-        known_map = start.known_map
-        if scans:
-            step_m = known_map.raster.region.diameter / _DISTANCE_STEPS
-            known_map = known_map.add_scans(
-                np.array([scan.position for scan in scans]),
-                np.array([scan.distances for scan in scans]) * step_m,
-                np.array([scan.is_hit for scan in scans]),
-                self.robot_radius,
-            )
+        checkpoints = self._repair_checkpoints()
+        last = checkpoints[-1]
+        new_scans = self._list_scans(last.round_count, len(self.rounds))
+        known_map = self._add_scans(last.known_map, new_scans)
         if np.array_equal(known_map.state, self.known_map.state):
             known_map = self.known_map
-        return self.share_map(known_map)
+        return replace(self, checkpoints=checkpoints, pending_scans=()).share_map(known_map)
+
+    def _list_scans(self, first_round: int, end_round: int) -> list[NumberedScan]:
+        """Return the scans from a first round until before an end, in the order of rounds and robots."""
+        rounds = self.rounds[first_round:end_round]
+        return [scan for round_scans in rounds for scan in round_scans if scan is not None]
+
+    def _repair_checkpoints(self) -> tuple[Checkpoint, ...]:
+        """Return the checkpoints with the pending scans."""
+        repaired = [self.checkpoints[0]]
+        for stale in self.checkpoints[1:]:
+            round_count = stale.round_count
+            late_scans = [scan for scan in self.pending_scans if scan.round_number < round_count]
+            if not late_scans:
+                repaired.append(stale)
+                continue
+            scans = self._list_scans(repaired[-1].round_count, round_count)
+            known_map = self._repair_map(stale.known_map, late_scans, repaired[-1].known_map, scans)
+            repaired.append(Checkpoint(round_count, known_map))
+        return tuple(repaired)
+
+    def _repair_map(
+        self,
+        stale_map: DiscoveredMap,
+        late_scans: list[NumberedScan],
+        earlier_map: DiscoveredMap,
+        scans: list[NumberedScan],
+    ) -> DiscoveredMap:
+        """Return an earlier map with the given scans, from a map of these scans without the late ones.
+
+        Parameters
+        ----------
+        stale_map : DiscoveredMap
+            Its cells are right where no late scan can change them.
+        late_scans : list of NumberedScan
+            Scans that are missing in the stale map, not only those of the given scans.
+        earlier_map : DiscoveredMap
+            The map before the given scans.
+        scans : list of NumberedScan
+
+        Returns
+        -------
+        DiscoveredMap
+        """
+        late_areas = self._find_areas(late_scans)
+        is_stale = late_areas.mark(stale_map.raster)
+        if scans:
+            is_near = self._find_areas(scans).overlap(late_areas)
+            scans = [scan for scan, near in zip(scans, is_near, strict=True) if near]
+        repeated_map = self._add_scans(earlier_map, scans)
+        return stale_map.replace_cells(is_stale, repeated_map)
+
+    def _find_areas(self, scans: list[NumberedScan]) -> ScanAreas:
+        """Return the areas outside which scans change nothing."""
+        max_distances = np.array([scan.distances for scan in scans]).max(axis=1)
+        ranges = np.maximum(max_distances * self._distance_step, self.robot_radius or 0.0)
+        positions = np.array([scan.position for scan in scans])
+        return ScanAreas.build(positions, ranges, self.known_map.raster)
+
+    def _add_scans(self, known_map: DiscoveredMap, scans: list[NumberedScan]) -> DiscoveredMap:
+        """Return a map with more scans, in the given order."""
+        if not scans:
+            return known_map
+        return known_map.add_scans(
+            np.array([scan.position for scan in scans]),
+            np.array([scan.distances for scan in scans]) * self._distance_step,
+            np.array([scan.is_hit for scan in scans]),
+            self.robot_radius,
+        )
+
+    @property
+    def _distance_step(self) -> float:
+        """Step of the distances in scans, m."""
+        return self.known_map.raster.region.diameter / _DISTANCE_STEPS
 
     def share_map(self, known_map: DiscoveredMap) -> ScanLog:
         """Return the log with a given map object, and with a checkpoint for it.

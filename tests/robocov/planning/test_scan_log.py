@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -26,13 +28,13 @@ ROBOT_COUNT = 3
 RAYS = 24
 
 
-def build_scans(seed: int, round_count: int) -> list[NumberedScan]:
+def build_scans(seed: int, round_count: int, max_distance: float = 3.0) -> list[NumberedScan]:
     """Return random scans of all robots, in the order of rounds and robots."""
     rng = np.random.default_rng(seed)
     numbered_scans = []
     for number in range(round_count):
         positions = rng.uniform((1.0, 1.0), (7.0, 3.0), size=(ROBOT_COUNT, 2))
-        distances = rng.uniform(0.1, 3.0, size=(ROBOT_COUNT, RAYS))
+        distances = rng.uniform(0.1, max_distance, size=(ROBOT_COUNT, RAYS))
         scans = Scans(distances, rng.random(distances.shape) < 0.5)
         numbered_scans += number_scans(scans, positions, REGION, round_number=number, time=0.5 * number)
     return numbered_scans
@@ -50,11 +52,16 @@ def drop_randomly(scans: list[NumberedScan], seed: int, fraction: float) -> list
 
 
 @settings(max_examples=20)
-@given(seed=st.integers(0, 2**32), group_size=st.integers(1, 9), radius=st.sampled_from([None, 0.1]))
+@given(
+    seed=st.integers(0, 2**32),
+    max_distance=st.sampled_from([0.4, 3.0]),
+    group_size=st.integers(1, 9),
+    radius=st.sampled_from([None, 0.1, 0.7]),
+)
 def test_the_map_does_not_depend_on_the_order_of_arrival(
-    seed: int, group_size: int, radius: float | None
+    seed: int, max_distance: float, group_size: int, radius: float | None
 ) -> None:
-    scans = build_scans(seed, round_count=10)
+    scans = build_scans(seed, 10, max_distance)
     expected = build_log(scans, radius).known_map
     # A loop over the scans is the definition.
     known_map = UNKNOWN_MAP
@@ -70,6 +77,24 @@ def test_the_map_does_not_depend_on_the_order_of_arrival(
     for first in range(0, len(arriving), group_size):
         log = log.add(arriving[first : first + group_size]).update_map()
     np.testing.assert_array_equal(log.known_map.state, expected.state)
+
+
+def test_only_scans_near_a_late_one_are_added_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    scans = build_scans(seed=0, round_count=10, max_distance=0.4)
+    late_scan = scans[0]
+    log = build_log([]).add(scans[1:16]).update_map().add(scans[16:]).update_map().add([late_scan])
+    added_positions: list[np.ndarray] = []
+    add_scans = DiscoveredMap.add_scans
+
+    def add_scans_and_list(known_map: DiscoveredMap, positions: np.ndarray, *rest: Any) -> DiscoveredMap:
+        added_positions.extend(positions)
+        return add_scans(known_map, positions, *rest)
+
+    monkeypatch.setattr(DiscoveredMap, "add_scans", add_scans_and_list)
+    assert log.update_map().known_map is not log.known_map
+    offsets = np.abs(np.array(added_positions) - late_scan.position)
+    assert 2 <= len(offsets) < 20
+    assert offsets.max() < 1.3
 
 
 def test_scans_are_stored_with_the_precision_of_their_size() -> None:
