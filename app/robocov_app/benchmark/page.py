@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
@@ -15,6 +14,12 @@ from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
+from robocov_app.benchmark.label_placement import (
+    MARK_HALF_SIZE_PX,
+    compute_half_sizes,
+    compute_nearest_points,
+    place_labels,
+)
 from robocov_app.benchmark.ratings import Rating, format_number
 from robocov_app.benchmark.results import shares_maps_by_messages
 from robocov_app.figures.files import plain_style
@@ -57,7 +62,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         lambda rating: rating.compute_rate("told_bytes"),
     ),
 }
-PLOT_SIZE_PX = (560, 350)
+PLOT_SIZE_PX = (560, 400)
 """Size of a plot, which must have space for many labels."""
 YARDSTICKS = ("rapf", "atlas", "oracle")
 """Controllers with which incomplete entries are compared, over the runs of each entry."""
@@ -65,14 +70,8 @@ _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
 _DPI = 72.0
 """Resolution of the plots, at which pixels equal points."""
-_CHARACTER_WIDTH_PX = 6.0
-"""Mean width of the characters of a label."""
-_LINE_HEIGHT_PX = 13.0
-_MARK_HALF_SIZE_PX = 6.0
-_LABEL_DISTANCE_PX = 8.0
-"""Horizontal distance of a label from its mark."""
-_LABEL_ROWS = (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8)
-"""Heights at which a label may be placed, in lines above its mark, the preferred ones first."""
+_MAX_DISTANCE_WITHOUT_LINE_PX = 10.0
+"""Maximum distance of a label from its mark at which no line needs to connect them."""
 _MIN_RATIO = 1.01
 """Minimum ratio of the largest value to the smallest for plotting a quantity."""
 _MIN_LOG_RATIO = 8.0
@@ -224,17 +223,13 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
     """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
     family_head, family_rows = ratings.build_family_rows(ranked)
-    rows = []
-    for rating in ranked:
-        cells = ratings.build_rating_cells(rating, entries.information[rating.label])
-        rows.append(tuple(cells[column] for column in ratings.HEAD))
     return {
         "name": name,
         "title": suite.format_heading(name),
         "summary": _summarize_track(name),
-        "table": PageTable("Ratings", ratings.HEAD, rows, text_columns=frozenset({1})),
+        "table": _build_rating_table("Ratings", ranked, entries),
         "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
-        "incomplete": _build_incomplete_table(track_ratings, entries),
+        "incomplete": _build_incomplete_tables(track_ratings, entries),
         "plots": _build_plots(name, ranked, entries),
     }
 
@@ -248,26 +243,32 @@ def _summarize_track(name: str) -> str:
     return f"{track.summary.capitalize()}; {team}. {runs}, the same for all ranked entries."
 
 
-def _build_incomplete_table(track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
-    """Build the table of entries that lack runs.
+def _build_incomplete_tables(track_ratings: Sequence[Rating], entries: _Entries) -> list[PageTable]:
+    """Build a table for each entry that lacks runs.
 
-    For comparison, each row also contains the median gaps of the yardsticks over the runs of the entry.
+    For comparison, it also contains the ratings of the yardsticks over the runs of the entry.
     """
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
-    rows = []
+    tables = []
     for rating in track_ratings:
         if rating.is_complete:
             continue
         keys = [ratings.get_run_key(row) for row in rating.rows]
-        column_ratings = [rating, *(yardstick.select_runs(keys) for yardstick in yardsticks)]
-        gaps = [100.0 * column_rating.compute_median("gap") for column_rating in column_ratings]
-        cells = [format_number(gap, ".1f") for gap in gaps]
-        runs = f"{rating.run_count} of {len(ratings.list_run_keys(rating.track))}"
-        rows.append((rating.label, entries.information[rating.label], runs, *cells))
-    yardstick_headings = [f"{yardstick.label}, %" for yardstick in yardsticks]
-    head = ("Controller", "Knows", "Runs", "Gap, %", *yardstick_headings)
-    caption = "Incomplete entries, not ranked: median gaps over their own runs"
-    return PageTable(caption, head, rows, text_columns=frozenset({1}))
+        compared = [yardstick.select_runs(keys) for yardstick in yardsticks]
+        caption = f"{rating.label}, incomplete and not ranked"
+        if compared:
+            caption += ", and others over the same runs"
+        tables.append(_build_rating_table(caption, [rating, *compared], entries))
+    return tables
+
+
+def _build_rating_table(caption: str, track_ratings: Sequence[Rating], entries: _Entries) -> PageTable:
+    """Build the table of ratings on a track."""
+    rows = []
+    for rating in track_ratings:
+        cells = ratings.build_rating_cells(rating, entries.information[rating.label])
+        rows.append(tuple(cells[column] for column in ratings.HEAD))
+    return PageTable(caption, ratings.HEAD, rows, text_columns=frozenset({1}))
 
 
 def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
@@ -353,15 +354,21 @@ def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: st
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_locator(NullLocator())
-    axes.margins(x=0.12, y=0.1)
+    axes.margins(x=0.12, y=0.12)
     style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
 
 
 def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
     """Write the label of each controller next to its mark."""
+    labels = [point.label for point in points]
+    axes.autoscale_view()  # The transformation of the data is only valid when the limits are known.
     marks = axes.transData.transform([(point.x, point.gap) for point in points])
-    label_centers = place_labels(marks, [point.label for point in points])
-    for point, mark, center in zip(points, marks, label_centers, strict=True):
+    centers = place_labels(marks, labels, axes.bbox.extents)
+    half_sizes = compute_half_sizes(labels)
+    for point, mark, center, half_size in zip(points, marks, centers, half_sizes, strict=True):
+        offset = compute_nearest_points(mark, center, half_size) - mark
+        if np.linalg.norm(offset) > _MAX_DISTANCE_WITHOUT_LINE_PX:
+            _draw_label_line(axes, point, offset)
         axes.annotate(
             point.label,
             (point.x, point.gap),
@@ -374,47 +381,22 @@ def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
         )
 
 
-def place_labels(marks: Array, labels: Sequence[str]) -> Array:
-    """Place labels next to marks such that, if possible, they hide no marks and no other labels.
-
-    Parameters
-    ----------
-    marks : (n, 2) array, px
-        Centers of the marks.
-    labels : sequence of str
-        Texts of the labels.
-
-    Returns
-    -------
-    (n, 2) array, px
-        Centers of the labels.
-    """
-    occupied = list(shapely.box(*(marks - _MARK_HALF_SIZE_PX).T, *(marks + _MARK_HALF_SIZE_PX).T))
-    frame = shapely.box(0.0, 0.0, *PLOT_SIZE_PX)
-    centers = []
-    for mark, label in zip(marks, labels, strict=True):
-        half_size = np.array([0.5 * _CHARACTER_WIDTH_PX * len(label), 0.5 * _LINE_HEIGHT_PX])
-        candidates = mark + _list_label_offsets(half_size[0])
-        boxes = shapely.box(*(candidates - half_size).T, *(candidates + half_size).T)
-        hidden_areas = shapely.area(shapely.intersection(boxes[:, None], occupied)).sum(axis=1)
-        outside_areas = shapely.area(shapely.difference(boxes, frame))
-        # A label that extends beyond the frame is cut off, which is worse than any overlap.
-        best = int(np.argmin(np.round(hidden_areas + 1e3 * outside_areas, 6)))
-        occupied.append(boxes[best])
-        centers.append(candidates[best])
-    return np.array(centers)
-
-
-def _list_label_offsets(half_width: float) -> Array:
-    """Return the possible offsets of a label from its mark, (k, 2) px, the preferred ones first."""
-    distance = half_width + _LABEL_DISTANCE_PX
-    offsets = []
-    for row in _LABEL_ROWS:
-        height = row * _LINE_HEIGHT_PX
-        offsets += [(distance, height), (-distance, height)]
-        if abs(row) > 1.0:
-            offsets.append((0.0, height))
-    return np.array(offsets)
+def _draw_label_line(axes: Axes, point: ParetoPoint, offset: Array) -> None:
+    """Draw the line that connects a mark with the end of its label at the given offset, px."""
+    axes.annotate(
+        "",
+        (point.x, point.gap),
+        (offset[0], offset[1]),
+        textcoords="offset points",
+        arrowprops={
+            "arrowstyle": "-",
+            "color": to_plot_color(LIGHT.faint),
+            "linewidth": 0.7,
+            "shrinkA": 0.0,
+            "shrinkB": MARK_HALF_SIZE_PX,
+        },
+        zorder=2,
+    )
 
 
 def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:

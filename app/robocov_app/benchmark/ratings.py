@@ -59,22 +59,25 @@ _SUMMARY_COLUMNS = (
     "µs/s",
 )
 NOTES = (
-    "Score: the mean over all runs of J_ref / J, halved if a robot touched a wall or another one, and halved "
-    "again if the team had not come to rest at the end; a failed run counts 0, and so does a run that covers "
-    "a different area from the reference. The score of an entry depends on no other entry. Only entries with "
-    "all runs of a track are ranked on it.",
-    "Gap: J / J_ref − 1 at the end, the median over runs, its 95 % interval from 12 maps on (bootstrap that "
-    "draws whole maps), mean and worst; J_ref is the best known placement, not a proven optimum, so gaps may "
-    "be too small; in brackets the median above lower bounds, where all are known. The bounds are certified "
-    "for J as it is computed, a sum over 128 x 128 sites, not for the integral that it approximates. "
+    "Score: the mean of J_ref / J over all runs. The value of a run is halved if a robot touched a wall or "
+    "another robot, and halved again if the team had not come to rest by the end. A failed run counts 0, "
+    "and so does a run that covers a different area from the reference. The score of an entry depends on no "
+    "other entry. Only entries with all runs of a track are ranked on it.",
+    "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95 % interval of the median "
+    "(bootstrap over maps, for at least 12 maps), the mean and the worst. J_ref is the best placement "
+    "known, not a proven optimum, so gaps may be too small. The number in brackets cannot be too small: it "
+    "is the median gap to proven lower bounds, given if all of them are known. They are certified for J as "
+    "it is computed, a sum over 128 x 128 sites, not for the integral that it approximates.",
     "To 5 %: the time from which J stays within 5 % of its final value. ∫J / J_ref: the integral of J over "
-    "the run by the reference. Path: mean path length of a robot.",
-    "Medians over runs, with exceptions: contacts are the runs in which a robot touched a wall or another "
-    "one; at rest is the fraction of runs that end with no robot moving 5 cm in any 4 s; rest is the "
-    "Kaplan-Meier median of the time when that starts; runs that do not come to rest are censored. B/s: "
-    "bytes that a robot sends per second, received or not: 20 for each position (number, position), and the "
-    "sizes of the messages of its controller, in which robots share maps and reports about other robots. "
-    "µs/s: processor time of the controller per robot and second, which depends on the machine.",
+    "the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so are "
+    "the other columns, with these exceptions. Contacts: the runs in which a robot touched a wall or "
+    "another robot. At rest: the fraction of runs at whose end no robot moves 5 cm or more within 4 s. "
+    "Rest: the Kaplan-Meier median of the time at which this begins; runs that do not come to rest are "
+    "censored.",
+    "B/s: bytes that a robot sends per second, received or not: 20 for each position (number, position), "
+    "and the sizes of the messages of its controller, in which robots share maps and reports about other "
+    "robots. µs/s: processor time of the controller per robot and second of simulation time; it depends on "
+    "the machine.",
 )
 
 
@@ -407,4 +410,13 @@ def build_summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list
     for track, ratings in build_ratings([result]).items():
         cells = build_rating_cells(ratings[0], information="")
         rows.append((track, *(cells[name] for name in _SUMMARY_COLUMNS)))
-    return ("Track", *_SUMMARY_COLUMNS), rows
+    return _drop_empty_columns(("Track", *_SUMMARY_COLUMNS), rows)
+
+
+def _drop_empty_columns(
+    head: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return a table without the columns that have no value in any row."""
+    columns = [k for k in range(len(head)) if any(row[k] != NO_VALUE for row in rows)]
+    short_head = tuple(head[k] for k in columns)
+    return short_head, [tuple(row[k] for k in columns) for row in rows]

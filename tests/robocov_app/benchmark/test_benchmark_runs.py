@@ -21,12 +21,14 @@ from called import COMMAND, answer, read_complaint
 from driven_browser import CHROMIUM, DRIVER, Browser
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from swept import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import load_controller_class
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
-from robocov_app.benchmark.page import ParetoPoint, build_page, find_pareto_front, place_labels
+from robocov_app.benchmark.label_placement import place_labels
+from robocov_app.benchmark.page import ParetoPoint, build_page, draw_pareto_figure, find_pareto_front
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import (
     ENTRIES,
@@ -145,11 +147,29 @@ LABELED_POINTS = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abc
 def test_labels_of_a_few_points_do_not_overlap(given_points: list[tuple[float, float, str]]) -> None:
     points = [ParetoPoint(choose_curve_styles(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
     labels = [point.label for point in points]
-    centers = place_labels(np.array([(x, y) for x, y, _ in given_points]), labels)
+    centers = place_labels(np.array([(x, y) for x, y, _ in given_points]), labels, (0.0, 0.0, 600.0, 360.0))
     half_sizes = np.array([(3.0 * len(label), 6.5) for label in labels])
     for k, j in combinations(range(len(points)), 2):
         gaps = np.abs(centers[k] - centers[j]) - half_sizes[k] - half_sizes[j]
         assert gaps.max() > -1e-6
+
+
+def test_labels_are_next_to_the_marks_of_a_figure() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    points = [
+        ParetoPoint(style, "Near", x=1200.0, gap=30.0, is_rival=True),
+        ParetoPoint(style, "Far", x=3800.0, gap=0.5, is_rival=True),
+    ]
+    figure = draw_pareto_figure(points, "bytes")
+    (axes,) = figure.axes
+    FigureCanvasAgg(figure).draw()
+    for point, text in zip(points, axes.texts, strict=True):
+        assert text.get_text() == point.label
+        mark = axes.transData.transform((point.x, point.gap))
+        box = text.get_window_extent()
+        distance = np.linalg.norm(np.clip(mark, box.min, box.max) - mark)
+        assert distance < 20.0
+        assert axes.bbox.contains(*box.min) and axes.bbox.contains(*box.max)
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -224,9 +244,11 @@ def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: 
     assert [row[0] for row in tables[1].ideal] == [row[0] for row in tables[0].ideal]
     assert "Few" not in [row[0] for row in tables[1].ideal]
     incomplete = tables[1].incomplete
-    assert [row[:3] for row in incomplete] == [("Few", "own", "3 of 142")]
+    few_row, *other_rows = incomplete
+    assert few_row[:2] == ("Few", "own") and few_row[3] == "3 of 142"
     # RAPF is shown next to it, over the same runs.
-    assert incomplete[0][3] in incomplete[0][4:]
+    rapf_row = next(row for row in other_rows if row[0] == "RAPF")
+    assert rapf_row[1:] == few_row[1:]
 
 
 @pytest.mark.parametrize("track", ["tuning", "plans-small"])
@@ -255,7 +277,7 @@ def build_tables(results: list[dict[str, Any]]) -> PageTables:
             cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)
             rows.append(tuple(html.unescape(re.sub(r"<svg.*?</svg>", "", cell)) for cell in cells))
         tables.setdefault(caption.partition(",")[0].partition(":")[0], rows)
-    return PageTables(tables["Scores"], tables["Ratings"], tables.get("Incomplete entries", []))
+    return PageTables(tables["Scores"], tables["Ratings"], tables.get("Few", []))
 
 
 def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:

@@ -1,0 +1,105 @@
+"""Placement of labels next to the marks of a plot."""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from robocov.arrays import Array
+
+Frame: TypeAlias = tuple[float, float, float, float]
+"""Left, bottom, right and top edge of the area in which labels may be placed, px."""
+CHARACTER_WIDTH_PX = 6.0
+"""Mean width of the characters of a label."""
+LINE_HEIGHT_PX = 13.0
+MARK_HALF_SIZE_PX = 6.0
+_LABEL_DISTANCES_PX = (8.0, 24.0, 48.0, 80.0)
+"""Possible horizontal distances of a label from the center of its mark."""
+_LABEL_ROWS = np.arange(-10.0, 10.25, 0.25)
+"""Heights at which a label may be placed, in lines above its mark."""
+_HEIGHT_COST = 0.1
+"""Cost of one pixel of height above or below the mark, which prefers labels right next to their marks."""
+_OVERLAP_COST = 10.0
+"""Cost of one square pixel of a label that is hidden, in pixels of distance from the mark."""
+_OUTSIDE_COST = 1000.0
+"""Cost of one square pixel of a label outside the frame, which would be cut off or cover the axes."""
+_MAX_ROUNDS = 6
+"""Maximum number of times that each label is moved."""
+
+
+def place_labels(marks: Array, labels: Sequence[str], frame: Frame) -> Array:
+    """Place labels close to their marks such that, if possible, they hide no marks and no other labels.
+
+    Parameters
+    ----------
+    marks : (n, 2) array, px
+        Centers of the marks.
+    labels : sequence of str
+        Texts of the labels.
+    frame : Frame
+        Area in which the labels must be.
+
+    Returns
+    -------
+    (n, 2) array, px
+        Centers of the labels.
+    """
+    half_sizes = compute_half_sizes(labels)
+    mark_boxes = np.hstack([marks - MARK_HALF_SIZE_PX, marks + MARK_HALF_SIZE_PX])
+    boxes = []
+    costs = []
+    for mark, half_size in zip(marks, half_sizes, strict=True):
+        centers = mark + _list_offsets(half_size)
+        candidates = np.hstack([centers - half_size, centers + half_size])
+        areas_inside = _compute_overlaps(candidates, np.array([frame]))[:, 0]
+        outside_areas = 4.0 * half_size.prod() - areas_inside
+        hidden_areas = _compute_overlaps(candidates, mark_boxes).sum(axis=1)
+        distances = np.linalg.norm(compute_nearest_points(mark, centers, half_size) - mark, axis=1)
+        distances += _HEIGHT_COST * np.abs(centers[:, 1] - mark[1])
+        boxes.append(candidates)
+        costs.append(distances + _OUTSIDE_COST * outside_areas + _OVERLAP_COST * hidden_areas)
+    order = np.argsort(-marks[:, 1], kind="stable")  # From top to bottom, so that few lines to labels cross.
+    placed: dict[int, Array] = {}
+    for _ in range(_MAX_ROUNDS):
+        previous = dict(placed)
+        for k in order:
+            others = [box for j, box in placed.items() if j != k]
+            overlaps = _compute_overlaps(boxes[k], np.reshape(others, (-1, 4))).sum(axis=1)
+            best = int(np.argmin(np.round(costs[k] + _OVERLAP_COST * overlaps, 6)))
+            placed[k] = boxes[k][best]
+        if all(k in previous and np.array_equal(placed[k], previous[k]) for k in order):
+            break
+    return np.array([0.5 * (placed[k][:2] + placed[k][2:]) for k in range(len(marks))])
+
+
+def compute_half_sizes(labels: Sequence[str]) -> Array:
+    """Return half the approximate width and height of each label, (n, 2) px."""
+    return np.array([(0.5 * CHARACTER_WIDTH_PX * len(label), 0.5 * LINE_HEIGHT_PX) for label in labels])
+
+
+def compute_nearest_points(mark: Array, centers: Array, half_size: Array) -> Array:
+    """Return the point of each label that is closest to a mark, with the shape of `centers`, px."""
+    return np.clip(mark, centers - half_size, centers + half_size)
+
+
+def _list_offsets(half_size: Array) -> Array:
+    """Return the possible offsets of the center of a label from its mark, (k, 2) px."""
+    offsets = []
+    for row in _LABEL_ROWS:
+        height = row * LINE_HEIGHT_PX
+        for distance in _LABEL_DISTANCES_PX:
+            offsets += [(half_size[0] + distance, height), (-half_size[0] - distance, height)]
+        if abs(row) > 1.0:
+            offsets.append((0.0, height))
+    return np.array(offsets)
+
+
+def _compute_overlaps(boxes: Array, others: Array) -> Array:
+    """Return the area that each of n boxes shares with each of m boxes, (n, m) px².
+
+    A box is a row with its left, bottom, right and top edge.
+    """
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    areas: Array = np.clip(high - low, 0.0, None).prod(axis=2)
+    return areas
