@@ -79,8 +79,10 @@ def command(options: Arguments) -> None:
     if not options.json:
         columns = [(title, RIGHT if title else BOLD) for title in _COLUMNS]
         print_table(columns, [_format_cells(row) for row in rows])
-    folders = ", ".join(row["folder"] for row in rows)
-    print_answer(options, {"runs": rows}, f"written to {METRICS_FILE} in {folders}")
+    files = [str(Path(row["folder"]) / METRICS_FILE) for row in rows]
+    if options.plot is not None:
+        files.append(str(options.plot))
+    print_answer(options, {"runs": rows}, f"saved in {', '.join(files)}")
 
 
 def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:

@@ -113,7 +113,7 @@ def _write_report(
         counts.append(_count_runs(result, _name_folder(folder, scratch), shown))
         lines.append(_describe_result(result, _name_folder(result.folder, scratch)))
     answer = {"path": str(target), "bytes": len(content), "results": counts}
-    print_answer(options, answer, *lines, f"written to {target} ({len(content) / 1e6:.2f} MB)")
+    print_answer(options, answer, *lines, f"saved in {target} ({len(content) / 1e6:.2f} MB)")
 
 
 def _read_runs(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:
@@ -189,7 +189,9 @@ def _count_runs(result: ReportedResult, folder: str, shown: int) -> dict[str, An
 
 def _describe_result(result: ReportedResult, folder: str) -> str:
     """Return the numbers of runs in a section of the page as text."""
-    texts = [f"{folder}: {result.kind} of {format_count(len(result.completed_runs), 'run')}"]
+    kind = result.kind
+    count = format_count(len(result.completed_runs), "run")
+    texts = [f"{folder}: {kind}" if kind == "run" else f"{folder}: {kind} of {count}"]
     if result.failed_runs:
         texts.append(f"{len(result.failed_runs)} failed")
     if result.damaged_runs:

@@ -116,7 +116,8 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     ----------
     curve : TimeCurve
     unit : str
-        Meters have three decimals; large values in other units have four significant digits.
+        Meters have three decimals, percentages have one; large values in other units have four significant
+        digits.
 
     Returns
     -------
@@ -130,6 +131,8 @@ def _format_end_value(value: float, unit: str) -> str:
     """Return the last value of a curve as text, without its unit; see `format_end_label`."""
     if abs(value) >= _MIN_EXPONENT_VALUE:
         return f"{value:.4g}"
+    if unit == "%":
+        return f"{value:.1f}"
     if unit == "m" or abs(value) < _MIN_SHORT_VALUE:
         return f"{value:.3f}"
     if abs(value) < _MIN_THOUSANDS_VALUE:
@@ -144,6 +147,7 @@ def add_curve_axes(
     *,
     box: PageBox | None = None,
     unit: str = "m",
+    label_width: float | None = None,
 ) -> Axes:
     """Add axes for curves to a page, with space for the labels at their ends.
 
@@ -157,6 +161,8 @@ def add_curve_axes(
         Area of the page for the axes and all their labels; by default the whole page.
     unit : str
         Unit of the values at the ends, as for `draw_curves`.
+    label_width : float, optional
+        Width of the space for the labels, px; by default that of the widest label.
 
     Returns
     -------
@@ -169,11 +175,17 @@ def add_curve_axes(
     left = margins.left * scale
     top = margins.top * scale
     bottom = margins.bottom * scale
-    label_width = max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
+    if label_width is None:
+        label_width = measure_end_labels(page, curves, unit)
     right = min(margins.right * scale + label_width, margins.max_right_fraction * box.width)
     width = box.width - left - right
     height = box.height - top - bottom
     return page.add_axes(PageBox(box.left + left, box.top + top, width, height))
+
+
+def measure_end_labels(page: FigurePage, curves: Sequence[TimeCurve], unit: str = "m") -> float:
+    """Return the width of the widest label at the end of a curve, px."""
+    return max(page.measure_text(format_end_label(curve, unit), bold=True) for curve in curves)
 
 
 def draw_curves(

@@ -16,7 +16,13 @@ from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
 from robocov_app.figures import arena
-from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
+from robocov_app.figures.curves import (
+    CurveMargins,
+    TimeCurve,
+    add_curve_axes,
+    draw_curves,
+    measure_end_labels,
+)
 from robocov_app.figures.extent import enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
@@ -625,17 +631,17 @@ def to_free_area_percent(get_area: Callable[[RunMetrics], Array]) -> Callable[[R
 
 METRIC_PANELS = (
     MetricPanel(
-        "sensed, in line of sight (% of the free area)",
+        "sensed area (% of the free area)",
         "%",
         to_free_area_percent(lambda metrics: metrics.sensed_area),
     ),
     MetricPanel(
-        "in line of sight (% of the free area)",
+        "visible area (% of the free area)",
         "%",
         to_free_area_percent(lambda metrics: metrics.visible_area),
     ),
     MetricPanel("work |F v| (J)", "J", lambda metrics: metrics.work),
-    MetricPanel("path length of a robot (m)", "m", lambda metrics: metrics.path_length),
+    MetricPanel("path length per robot (m)", "m", lambda metrics: metrics.path_length),
 )
 
 
@@ -657,17 +663,28 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     theme = get_theme(theme)
     page = FigurePage(_METRICS_SIZE_PX, theme)
     page.write_title(title, 26)
-    for number, panel in enumerate(METRIC_PANELS):
-        curves = [
-            TimeCurve(run.label, run.controller, run.metrics.time, panel.get_values(run.metrics))
-            for run in runs
-        ]
-        axes = _create_metric_axes(page, number, curves, panel.unit)
+    curves_of_panels = [_build_metric_curves(runs, panel) for panel in METRIC_PANELS]
+    # All panels have space for the widest label, so that their time axes have the same length.
+    label_width = max(
+        measure_end_labels(page, curves, panel.unit)
+        for curves, panel in zip(curves_of_panels, METRIC_PANELS, strict=True)
+    )
+    for number, (curves, panel) in enumerate(zip(curves_of_panels, METRIC_PANELS, strict=True)):
+        axes = _create_metric_axes(page, number, curves, label_width)
         draw_curves(axes, curves, theme, label=panel.label, unit=panel.unit, weight=0.8)
     return page.figure
 
 
-def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[TimeCurve], unit: str) -> Axes:
+def _build_metric_curves(runs: Sequence[MeasuredRun], panel: MetricPanel) -> list[TimeCurve]:
+    """Build the curves of a panel, one for each run."""
+    return [
+        TimeCurve(run.label, run.controller, run.metrics.time, panel.get_values(run.metrics)) for run in runs
+    ]
+
+
+def _create_metric_axes(
+    page: FigurePage, number: int, curves: Sequence[TimeCurve], label_width: float
+) -> Axes:
     """Create the axes of a panel in a grid of 2 x 2, with space for the labels of its curves."""
     page_width, page_height = page.size
     top = _METRIC_TITLE_HEIGHT * page.scale
@@ -675,4 +692,4 @@ def _create_metric_axes(page: FigurePage, number: int, curves: Sequence[TimeCurv
     height = (page_height - top) / 2
     row, column = divmod(number, 2)
     box = PageBox(column * width, top + row * height, width, height)
-    return add_curve_axes(page, curves, _METRIC_MARGINS, box=box, unit=unit)
+    return add_curve_axes(page, curves, _METRIC_MARGINS, box=box, label_width=label_width)

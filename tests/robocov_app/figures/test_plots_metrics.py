@@ -26,3 +26,9 @@ def test_every_panel_has_a_curve_of_each_run(theme: str) -> None:
             assert any(np.array_equal(line, of(run.metrics)) for line in drawn)
     # shares are of the free area
     assert METRIC_PANELS[0][2](runs[0].metrics)[-1] == pytest.approx(5.0 * runs[0].metrics.sensed_area[-1])
+
+
+def test_time_axes_have_the_same_length() -> None:
+    figure = plot_metrics([measure_run("rapf", 1)], "light", "One run")
+    widths = {round(axes.get_position().width, 9) for axes in figure.axes}
+    assert len(widths) == 1

@@ -29,7 +29,7 @@ def run(tmp_path: Path) -> Path:
 def test_a_page_is_in_the_folder_of_the_run(run, capsys) -> None:
     assert main(["report", str(run)]) == 0
     said = capsys.readouterr()
-    assert said.out.splitlines()[0] == f"{run}: run of 1 run"
+    assert said.out.splitlines()[0] == f"{run}: run"
     assert is_report(run / "report.html")
     before = (run / "report.html").read_bytes()
     assert main(["report", str(run)]) == 0  # an earlier one is replaced without a word

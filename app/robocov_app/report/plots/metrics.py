@@ -72,14 +72,14 @@ _CONNECTIVITY = _Metric(
 )
 _METRICS = (
     _Metric(
-        title="Sensed",
-        label="in range and in sight (% of the free area)",
+        title="Sensed area",
+        label="sensed area (% of the free area)",
         unit="%",
         get_values=to_free_area_percent(lambda metrics: metrics.sensed_area),
     ),
     _Metric(
-        title="Seen",
-        label="in line of sight (% of the free area)",
+        title="Visible area",
+        label="visible area (% of the free area)",
         unit="%",
         get_values=to_free_area_percent(lambda metrics: metrics.visible_area),
     ),
