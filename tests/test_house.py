@@ -15,6 +15,8 @@ import grimp
 import pytest
 
 ROOT = Path(__file__).parents[1]
+MAX_METHODS = 25
+"""Maximum number of methods of a class; one with more has parts that are objects of their own."""
 
 
 def assert_passes(*command: str, cwd: Path = ROOT) -> None:
@@ -45,6 +47,18 @@ def test_no_two_modules_need_each_other_not_even_for_types() -> None:
     TopologicalSorter(
         {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
     ).prepare()
+
+
+def test_no_class_has_too_many_methods() -> None:
+    too_large = []
+    for path in (*ROOT.glob("coverage/robocov/**/*.py"), *ROOT.glob("app/robocov_app/**/*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(node, ast.ClassDef):
+                continue
+            method_count = sum(isinstance(member, ast.FunctionDef) for member in node.body)
+            if method_count > MAX_METHODS:
+                too_large.append(f"{path.relative_to(ROOT)}: {node.name}: {method_count} methods")
+    assert not too_large
 
 
 @pytest.mark.parametrize("root", ["coverage", "app"])

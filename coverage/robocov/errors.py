@@ -117,12 +117,12 @@ class Issue(NamedTuple):
         text = f"{format_path(path)}: {message}" if path else message
         return cls(path, text, at_key)
 
-    def format_message(self, where: str) -> str:
+    def format_message(self, source_name: str) -> str:
         """Format the issue as compilers do, ``mine.json:14:9: ...``, so that terminals link to the line.
 
         Parameters
         ----------
-        where : str
+        source_name : str
             Name of the document.
 
         Returns
@@ -130,8 +130,8 @@ class Issue(NamedTuple):
         str
         """
         if self.line is None:
-            return f"{where}: {self.text}"
-        return f"{where}:{self.line}:{self.column}: {self.text}"
+            return f"{source_name}: {self.text}"
+        return f"{source_name}:{self.line}:{self.column}: {self.text}"
 
 
 class MapError(InputError):
@@ -143,7 +143,7 @@ class MapError(InputError):
         At most `MAX_LISTED`, in the order of the document.
     unlisted : int
         Number of further issues.
-    where : str
+    source_name : str
         Name of the document.
     line, column : int or None
         Place of the first issue.
@@ -170,17 +170,17 @@ class MapError(InputError):
     MAX_LISTED = 20  # Finding the line of an issue takes as long as reading the file.
     issues: tuple[Issue, ...] = ()
     unlisted: int = 0
-    where: str = ""
+    source_name: str = ""
     line: int | None = None
     column: int | None = None
 
     @classmethod
-    def from_issues(cls, where: str, issues: Sequence[Issue], unlisted: int = 0) -> MapError:
+    def from_issues(cls, source_name: str, issues: Sequence[Issue], unlisted: int = 0) -> MapError:
         """Build the error for the issues of a document.
 
         Parameters
         ----------
-        where : str
+        source_name : str
             Name of the document.
         issues : sequence of Issue
             At least one.
@@ -192,14 +192,14 @@ class MapError(InputError):
         MapError
         """
         first = issues[0]
-        message = first.format_message(where)
+        message = first.format_message(source_name)
         total_count = len(issues) + unlisted
         if total_count > 1:
             message += f" (and {total_count - 1} more)"
         error = cls(message)
         error.issues = tuple(issues[: cls.MAX_LISTED])
         error.unlisted = total_count - len(error.issues)
-        error.where = where
+        error.source_name = source_name
         error.line = first.line
         error.column = first.column
         return error

@@ -147,28 +147,28 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
         a method ``decide`` or ``force``.
     """
     file, _, class_name = name.rpartition(":")
-    where = f"controller {quote(name)}"
+    source_name = f"controller {quote(name)}"
     if not class_name or not file.endswith(".py"):
-        raise ParameterError(f"{where}: expected a file and a class, as in mine.py:MyController")
+        raise ParameterError(f"{source_name}: expected a file and a class, as in mine.py:MyController")
     if source is None and not Path(file).is_file():
-        raise ParameterError(f"{where}: file not found: {file}")
+        raise ParameterError(f"{source_name}: file not found: {file}")
     try:
         module = _load_module(file, source)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        raise explain_fault(f"{where}: {file} cannot be run", error) from error
+        raise explain_fault(f"{source_name}: {file} cannot be run", error) from error
     kind = vars(module).get(class_name)
     if kind is None:
         names = _list_own_classes(module)
         raise ParameterError(f"controller {file}: {describe_unknown_name('class', class_name, names)}")
     if not isinstance(kind, type) or not (hasattr(kind, "decide") or hasattr(kind, "force")):
         raise ParameterError(
-            f"{where}: {class_name}: expected a class with a method decide(seen, memory) or force(own)"
+            f"{source_name}: {class_name}: expected a class with a method decide(seen, memory) or force(own)"
         )
     if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
         raise ParameterError(
-            f"{where}: {class_name}: expected a frozen dataclass. "
+            f"{source_name}: {class_name}: expected a frozen dataclass. "
             "Write @dataclass(frozen=True) above the class."
         )
     return kind

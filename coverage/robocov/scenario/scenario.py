@@ -443,7 +443,7 @@ class Scenario:
     def from_json(
         cls,
         document: Mapping[str, Any],
-        where: str = "scenario",
+        source_name: str = "scenario",
         *,
         folder: Path | None = None,
         controllers: Collection[str] = (),
@@ -455,7 +455,7 @@ class Scenario:
         document : mapping
             JSON object in the format of `to_json`. Only ``format``, ``version`` and ``map`` are required. The
             map may also be the name of a bundled map or the path of a file.
-        where : str
+        source_name : str
             Name of the document in messages.
         folder : Path or None
             Folder to which the path of the map is relative; by default the current folder.
@@ -471,17 +471,17 @@ class Scenario:
         InputError
             If the document cannot be used. The message names the key.
         """
-        check_header(document, where, FORMAT, FORMAT_VERSION)
-        content = validate_document(document, where, ScenarioDocument)
+        check_header(document, source_name, FORMAT, FORMAT_VERSION)
+        content = validate_document(document, source_name, ScenarioDocument)
         name = content.controller.name
         if name not in CONTROLLERS and name not in controllers:
             raise InputError(
-                f"{where}: controller.name: expected a built-in controller, got {quote(name)}; "
+                f"{source_name}: controller.name: expected a built-in controller, got {quote(name)}; "
                 "a file does not run code unless the user also names the controller"
             )
         try:
             scenario = cls(
-                _load_environment(content.map, where, folder),
+                _load_environment(content.map, source_name, folder),
                 name,
                 content.controller.gains,
                 team=_read_team(content.team),
@@ -495,7 +495,7 @@ class Scenario:
                 conditions=_read_conditions(content.conditions),
             )
         except ParameterError as error:
-            raise InputError(f"{where}: {error}") from error
+            raise InputError(f"{source_name}: {error}") from error
         return scenario
 
     def save(self, path: Path | str) -> None:
@@ -619,14 +619,14 @@ def _describe_controller(
     }
 
 
-def _load_environment(content: str | dict[str, Any], where: str, folder: Path | None) -> Environment:
+def _load_environment(content: str | dict[str, Any], source_name: str, folder: Path | None) -> Environment:
     """Return the map of a document, which contains the map itself, its name, or the path of its file."""
     if not isinstance(content, str):
-        return from_json(content, f"{where}: map", folder)
+        return from_json(content, f"{source_name}: map", folder)
     try:
         path = find_map_file(content)
     except MapError as error:
-        raise MapError(f"{where}: map: {error}") from error
+        raise MapError(f"{source_name}: map: {error}") from error
     if folder is not None and not path.is_absolute():
         path = folder / path
     return load_map(path)

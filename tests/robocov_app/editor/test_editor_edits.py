@@ -321,18 +321,18 @@ def test_widths_and_radii_are_set(sketch):
 
 
 @pytest.mark.parametrize(
-    ("where", "order"),
+    ("end", "order"),
     [("top", [1, 2, 3, 0]), ("bottom", [0, 1, 2, 3])],
 )
-def test_obstacles_are_restacked(where, order):
+def test_obstacles_are_restacked(end, order):
     sketch, _ = Sketch().with_obstacles([BOX, PILLAR, WALL, PILLAR])
-    assert [item.key for item in properties.restack(sketch, Selection.of(0), where).sketch.obstacles] == order
+    assert [item.key for item in properties.restack(sketch, Selection.of(0), end).sketch.obstacles] == order
 
 
 def test_restacked_obstacles_keep_their_order():
     sketch, _ = Sketch().with_obstacles([BOX, PILLAR, WALL, PILLAR])
-    for where, order in [("bottom", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
-        change = properties.restack(sketch, Selection.of(1, 2), where)
+    for end, order in [("bottom", [1, 2, 0, 3]), ("top", [0, 3, 1, 2])]:
+        change = properties.restack(sketch, Selection.of(1, 2), end)
         assert [item.key for item in change.sketch.obstacles] == order
     there = properties.restack(sketch, Selection.of(2, 3), "top")
     assert there.sketch == sketch

@@ -78,8 +78,8 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         driver.window.canvas.zoom(8.0, (100.0, 100.0))
         driver.click(*driver.get_widget("option", f"problem:{len(problems) - 1}").rect.center)
         assert driver.editor.problem is problems[-1]
-        where = problems[-1].geometry.representative_point()
-        assert driver.window.canvas.contains(driver.find_pixel((where.x, where.y)))
+        point = problems[-1].geometry.representative_point()
+        assert driver.window.canvas.contains(driver.find_pixel((point.x, point.y)))
 
 
 def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
 
 
 @pytest.mark.parametrize(
-    ("point", "kinds", "where", "words"),
+    ("point", "kinds", "snapped_point", "words"),
     [
         ((1.05, 0.96), ("vertex", "edge", "grid"), (1.0, 1.0), "vertex"),
         ((2.51, 1.03), ("midpoint", "edge", "grid"), (2.5, 1.0), "midpoint of an edge"),
@@ -107,9 +107,9 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
         ((11.0, 3.04), ("aligned",), (11.0, 3.0), "in line"),
     ],
 )
-def test_nearby_targets_are_snapped_to(targets, point, kinds, where, words):
+def test_nearby_targets_are_snapped_to(targets, point, kinds, snapped_point, words):
     snap = snap_point(point, targets, build_settings(*kinds))
-    assert snap.point == pytest.approx(where, abs=1e-9)
+    assert snap.point == pytest.approx(snapped_point, abs=1e-9)
     assert snap.guides[0].label == words
 
 

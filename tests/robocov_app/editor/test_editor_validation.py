@@ -64,7 +64,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
 
 
 @pytest.mark.parametrize(
-    ("sketch", "message", "where", "of"),
+    ("sketch", "message", "position", "owner"),
     [
         (Sketch("n"), "there is no boundary: draw one around the free space", None, BOUNDARY),
         (build_hall(name=""), "the map has no name", None, None),
@@ -208,16 +208,16 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
     ],
 )
-def test_problems_are_reported_at_their_position(sketch, message, where, of):
+def test_problems_are_reported_at_their_position(sketch, message, position, owner):
     (found, *_) = [
         problem for problem in list_problems(sketch) if problem.is_error and problem.message == message
     ] or [pytest.fail(str([problem.message for problem in list_problems(sketch)]))]
-    assert found.owner == of
+    assert found.owner == owner
     assert not is_valid(sketch)
-    if where is None:
+    if position is None:
         assert found.geometry is None
     else:
-        assert found.geometry.distance(shapely.Point(where)) < 1e-9
+        assert found.geometry.distance(shapely.Point(position)) < 1e-9
 
 
 def test_a_broken_object_does_not_hide_other_problems():

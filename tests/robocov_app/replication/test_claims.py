@@ -57,16 +57,16 @@ def build_instances(maps: int, seeds: int = 2) -> tuple[ProblemInstance, ...]:
 
 def build_outcomes(maps: int = MANY, measure: str = "final", **levels: float | list[float]) -> Outcomes:
     """Build outcomes in which the cost of each contender is its level times the size of the map."""
-    where = build_instances(maps)
+    instances = build_instances(maps)
     rng = np.random.default_rng(5)
-    size = np.array([1.0 + int(s.map.split()[1]) for s in where])
+    size = np.array([1.0 + int(s.map.split()[1]) for s in instances])
     values = {}
     for law, level in levels.items():
         by_start = np.broadcast_to(np.asarray(level, dtype=float), 3)
-        of_start = np.array([by_start[STARTS.index(s.start)] for s in where])
-        noise = 1.0 + 0.001 * rng.standard_normal(len(where))
+        of_start = np.array([by_start[STARTS.index(s.start)] for s in instances])
+        noise = 1.0 + 0.001 * rng.standard_normal(len(instances))
         values[law.replace("_", "-"), measure] = of_start * noise * size
-    return Outcomes(where, values)
+    return Outcomes(instances, values)
 
 
 class TestVerdicts:
@@ -290,15 +290,15 @@ class TestStuckAndGap:
         ],
     )
     def test_lloyd_is_unusable_if_it_touches_walls_and_is_blocked(self, clearance, blocked, gap, verdict):
-        where = build_instances(MANY, 4)
+        instances = build_instances(MANY, 4)
         values = {
-            ("lloyd", "clearance"): np.full(len(where), clearance),
-            ("lloyd", "blocked"): np.full(len(where), blocked),
-            ("lloyd", "gap"): np.full(len(where), gap),
-            ("rapf-shared", "clearance"): np.full(len(where), 0.2),
-            ("rapf-shared", "blocked"): np.full(len(where), 0.25),
+            ("lloyd", "clearance"): np.full(len(instances), clearance),
+            ("lloyd", "blocked"): np.full(len(instances), blocked),
+            ("lloyd", "gap"): np.full(len(instances), gap),
+            ("rapf-shared", "clearance"): np.full(len(instances), 0.2),
+            ("rapf-shared", "blocked"): np.full(len(instances), 0.25),
         }
-        claim = judge_lloyd_unusable(Outcomes(where, values))
+        claim = judge_lloyd_unusable(Outcomes(instances, values))
         assert claim.verdict == verdict
         assert "RAPF, shared gains: walls touched in 0 %, 25 % of the robots blocked." in claim.explanation
 
@@ -313,11 +313,11 @@ class TestStuckAndGap:
         ],
     )
     def test_gap(self, controller, gains, gap, verdict):
-        where = build_instances(MANY)
+        instances = build_instances(MANY)
         rng = np.random.default_rng(0)
         key = f"{controller}-{gains}" if gains else controller
-        values = {(key, "gap"): gap + 0.01 * rng.standard_normal(len(where))}
-        claim = judge_gap(Outcomes(where, values), controller, gains)
+        values = {(key, "gap"): gap + 0.01 * rng.standard_normal(len(instances))}
+        claim = judge_gap(Outcomes(instances, values), controller, gains)
         assert (claim.verdict, claim.key) == (verdict, f"gap-{key}")
 
     def test_claims_at_limited_ranges_have_keys_and_texts_of_their_own(self):
@@ -332,12 +332,12 @@ class TestStuckAndGap:
 
 def build_gain_outcomes(spread: float, maps: int = MANY, is_map_dependent: bool = False) -> GainOutcomes:
     """Build outcomes of nine sets of gains; the fifth is the best everywhere, or another one on each map."""
-    where = build_instances(maps, 1)
+    instances = build_instances(maps, 1)
     gains = tuple({"k_rep": a, "rho_0": b, "k_att": b} for a in (0.1, 1.0, 10.0) for b in (1.0, 3.0, 30.0))
     rng = np.random.default_rng(2)
-    best = [int(s.map.split()[1]) % 9 if is_map_dependent else 4 for s in where]
+    best = [int(s.map.split()[1]) % 9 if is_map_dependent else 4 for s in instances]
     worse = np.abs(np.arange(9)[:, None] - np.array(best)[None]) / 8.0
-    return GainOutcomes(where, gains, 1.0 + spread * worse + 1e-4 * rng.random((9, len(where))))
+    return GainOutcomes(instances, gains, 1.0 + spread * worse + 1e-4 * rng.random((9, len(instances))))
 
 
 class TestGains:
@@ -345,13 +345,13 @@ class TestGains:
         ("worst_ratio", "verdict"), [(0.9, "holds"), (1.0, "undecided"), (1.1, "does not hold")]
     )
     def test_every_set_of_the_grid_counts(self, worst_ratio, verdict):
-        where = build_instances(MANY, 1)
+        instances = build_instances(MANY, 1)
         potentials = [{"k_rep": k_rep, "rho_0": 2.0} for k_rep in (0.1, 1.0)]
         rapf_gains = tuple(potential | {"k_att": k_att} for k_att in (1.0, 3.0) for potential in potentials)
-        noise = 1.0 + 0.01 * np.random.default_rng(3).standard_normal((4, len(where)))
+        noise = 1.0 + 0.01 * np.random.default_rng(3).standard_normal((4, len(instances)))
         ratios = np.array([0.5, 0.6, worst_ratio, 0.7])[:, None] * noise
-        rpf = GainOutcomes(where, tuple(potentials), np.full((2, len(where)), 2.0))
-        claim = judge_gains_every(GainOutcomes(where, rapf_gains, 2.0 * ratios), rpf)
+        rpf = GainOutcomes(instances, tuple(potentials), np.full((2, len(instances)), 2.0))
+        claim = judge_gains_every(GainOutcomes(instances, rapf_gains, 2.0 * ratios), rpf)
         assert claim.verdict == verdict
         assert claim.criteria[0].interval.estimate == pytest.approx(worst_ratio, rel=0.01)
         assert "(k_rep 0.1, rho_0 2, k_att 3)" in claim.explanation
@@ -387,9 +387,9 @@ class TestGains:
 
     def test_regret_does_not_favor_gains_chosen_by_chance(self):
         """Where gains make no difference, knowing the map is worth nothing: the mean regret is zero."""
-        where = build_instances(40, 1)
-        noise = 1.0 + 0.05 * np.random.default_rng(4).standard_normal((9, len(where)))
-        found, _ = compute_regrets(GainOutcomes(where, tuple({"k": float(k)} for k in range(9)), noise))
+        instances = build_instances(40, 1)
+        noise = 1.0 + 0.05 * np.random.default_rng(4).standard_normal((9, len(instances)))
+        found, _ = compute_regrets(GainOutcomes(instances, tuple({"k": float(k)} for k in range(9)), noise))
         assert abs(found.mean()) < 3 * found.std() / np.sqrt(len(found))
 
     def test_instances_with_a_failed_run_do_not_count(self):

@@ -177,9 +177,9 @@ def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None 
     else:
         issues = sorted(outcome.issues, key=lambda issue: (issue.line or 0, issue.column or 0))
         for issue in issues:
-            yield issue.format_message(outcome.where)
+            yield issue.format_message(outcome.source_name)
         if outcome.unlisted:
-            yield f"{outcome.where}: and {outcome.unlisted} more issues"
+            yield f"{outcome.source_name}: and {outcome.unlisted} more issues"
 
 
 def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:

@@ -42,14 +42,14 @@ _EXTENT_WITHOUT_BOUNDARY: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 1
 _Value = TypeVar("_Value")
 
 
-def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> Sketch:
+def parse_sketch(text: str | bytes, source_name: str, folder: Path | None = None) -> Sketch:
     """Read a sketch from the text of a file.
 
     Parameters
     ----------
     text : str or bytes
         JSON text.
-    where : str
+    source_name : str
         Name of the file in messages.
     folder : Path, optional
         Folder of the pictures to which the map refers.
@@ -63,21 +63,21 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
     MapError
         If the text cannot be represented as a sketch. The message contains line and column.
     """
-    document = parse_json(text, where)
+    document = parse_json(text, source_name)
     try:
-        return build_sketch(document, where, folder)
+        return build_sketch(document, source_name, folder)
     except MapError as error:
-        raise locate_issues(error, text, where) from None
+        raise locate_issues(error, text, source_name) from None
 
 
-def build_sketch(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
+def build_sketch(document: Any, source_name: str = "map", folder: Path | None = None) -> Sketch:
     """Build a sketch from a parsed document, which may break the rules of maps.
 
     Parameters
     ----------
     document : object
         Parsed JSON.
-    where : str
+    source_name : str
         Name of the document in messages.
     folder : Path, optional
         Folder of the pictures to which the map refers.
@@ -91,10 +91,10 @@ def build_sketch(document: Any, where: str = "map", folder: Path | None = None) 
     MapError
         If the document cannot be represented as a sketch.
     """
-    where = to_one_line(where)
-    require_json(document, where)
-    check_header(document, where, FORMAT, VERSION)
-    reader = _Reader(where)
+    source_name = to_one_line(source_name)
+    require_json(document, source_name)
+    check_header(document, source_name, FORMAT, VERSION)
+    reader = _Reader(source_name)
     members = reader.read_object(document, (), _MAP_KEYS)
     shapes = _read_obstacles(reader, members.get("obstacles", []))
     extra = reader.require_type(dict, members.get("extra", {}), ("extra",), "an object")
@@ -108,7 +108,7 @@ def build_sketch(document: Any, where: str = "map", folder: Path | None = None) 
     density = None
     if members.get("density") is not None:
         extent = boundary or _EXTENT_WITHOUT_BOUNDARY
-        density = parse_density(members["density"], extent, where, folder)
+        density = parse_density(members["density"], extent, source_name, folder)
     return Sketch(
         name=reader.read_text(members.get("name", ""), ("name",)),
         description=reader.read_text(members.get("description", ""), ("description",)),
@@ -142,12 +142,12 @@ class _Reader:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         Name of the document in messages.
     """
 
-    def __init__(self, where: str) -> None:
-        self._where = where
+    def __init__(self, source_name: str) -> None:
+        self._where = source_name
         # How to read the fields of obstacles, starts and paths, by their names.
         self._readers: dict[str, Callable[[Any, JsonPath], Any]] = {
             "center": self.read_point,

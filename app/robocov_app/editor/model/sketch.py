@@ -147,9 +147,9 @@ class Sketch:
             **{name: getattr(environment, name) for name in _COMMON_FIELDS},
         )
 
-    def build_environment(self, where: str = "map") -> env.Environment:
-        """Build the map for simulation; raise MapError, with `where` as file name, if it breaks a rule."""
-        return from_json(to_document(self), where)
+    def build_environment(self, source_name: str = "map") -> env.Environment:
+        """Build the map for simulation; raise a MapError that names `source_name` if it breaks a rule."""
+        return from_json(to_document(self), source_name)
 
     def build_unchecked_environment(self) -> env.Environment:
         """Build the map without checking the rules; using a map that breaks them may raise any error."""

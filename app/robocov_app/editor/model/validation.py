@@ -112,11 +112,11 @@ def _check_positions(
     points = shapely.points(to_array(start.positions))
     for number in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
         covering = sketch.tree.query(points[number], predicate="intersects")
-        where = "outside the boundary"
+        location = "outside the boundary"
         if len(covering):
             topmost = sketch.obstacles[int(covering.max())]
-            where = f"inside {format_numbered_name(sketch, topmost.key)}"
-        message = f"{_describe_position(sketch, name, number)} is {where}"
+            location = f"inside {format_numbered_name(sketch, topmost.key)}"
+        message = f"{_describe_position(sketch, name, number)} is {location}"
         yield Problem(message, points[number], owner=name, kind="spot")
 
 

@@ -24,19 +24,19 @@ class JsonFile:
 
     Attributes
     ----------
-    where : str
+    source_name : str
         Name of the file for messages.
     document : object
         The parsed content.
     """
 
     def __init__(self, path: Path, text: bytes | None = None) -> None:
-        self.where = to_one_line(path)
+        self.source_name = to_one_line(path)
         self._content = read_content(path, MAX_TEXT_BYTES) if text is None else text
         # Each point is a list of two or three numbers, so brackets and commas bound the number of points.
         # Counting them takes milliseconds, parsing a huge file takes minutes.
-        require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
-        self.document: Any = parse_json(self._content, self.where)
+        require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.source_name)
+        self.document: Any = parse_json(self._content, self.source_name)
 
     def build_error(self, place: JsonPath, value: object, expected: str) -> MapError:
         """Build the error for an invalid value, with its line and column.
@@ -51,7 +51,7 @@ class JsonFile:
             Description of the values that are accepted.
         """
         issue = Issue.at_path(place, f"expected {expected}, got {quote_json(value)}")
-        return locate_issues(MapError.from_issues(self.where, [issue]), self._content, self.where)
+        return locate_issues(MapError.from_issues(self.source_name, [issue]), self._content, self.source_name)
 
     def parse_points(
         self, value: Any, place: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int

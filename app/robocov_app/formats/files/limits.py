@@ -17,34 +17,36 @@ MAX_DEPTH = 32
 """Deepest nesting of collections, groups, blocks and lists."""
 
 
-def require_cells(width: int, height: int, where: str) -> None:
-    """Raise MapError if a raster has no cell or more than `MAX_CELLS`; `where` names the file."""
+def require_cells(width: int, height: int, source_name: str) -> None:
+    """Raise MapError if a raster has no cell or more than `MAX_CELLS`; `source_name` names the file."""
     if width < 1 or height < 1:
-        raise MapError(f"{where}: expected at least 1 x 1 cells, got {width} x {height}")
+        raise MapError(f"{source_name}: expected at least 1 x 1 cells, got {width} x {height}")
     if width * height > MAX_CELLS:
         millions = MAX_CELLS // 1_000_000
-        raise MapError(f"{where}: expected at most {millions} million cells, got {width} x {height}")
+        raise MapError(f"{source_name}: expected at most {millions} million cells, got {width} x {height}")
 
 
-def require_vertices(count: int, where: str) -> None:
+def require_vertices(count: int, source_name: str) -> None:
     """Raise MapError if there are more than `MAX_VERTICES` vertices."""
     if count > MAX_VERTICES:
-        raise MapError(f"{where}: expected at most {MAX_VERTICES} vertices, got about {count}")
+        raise MapError(f"{source_name}: expected at most {MAX_VERTICES} vertices, got about {count}")
 
 
-def require_shapes(count: int, where: str) -> None:
+def require_shapes(count: int, source_name: str) -> None:
     """Raise MapError if there are more than `MAX_SHAPES` shapes."""
     if count > MAX_SHAPES:
-        raise MapError(f"{where}: expected at most {MAX_SHAPES} shapes, got {count:.6g}")
+        raise MapError(f"{source_name}: expected at most {MAX_SHAPES} shapes, got {count:.6g}")
 
 
-def require_length(value: float, where: str, minimum: float = 1e-6, maximum: float = MAX_SIZE_M) -> None:
+def require_length(
+    value: float, source_name: str, minimum: float = 1e-6, maximum: float = MAX_SIZE_M
+) -> None:
     """Raise MapError if a length, in m, is out of range."""
     if not minimum <= value <= maximum:
         expected = f"expected a number from {minimum:.10g} to {maximum:.10g} (m)"
-        raise MapError(f"{where}: {expected}, got {quote(value)}")
+        raise MapError(f"{source_name}: {expected}, got {quote(value)}")
 
 
-def require_coordinate(value: float, where: str) -> None:
+def require_coordinate(value: float, source_name: str) -> None:
     """Raise MapError if a coordinate, in m, is out of range."""
-    require_length(value, where, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+    require_length(value, source_name, -MAX_COORDINATE_M, MAX_COORDINATE_M)

@@ -22,7 +22,7 @@ MAX_YAML_DEPTH = 12
 """Deepest nesting of lists and mappings, including nesting through aliases."""
 
 
-def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
+def parse_yaml(text: bytes, source_name: str) -> dict[str, Value]:
     """Parse a YAML text whose top level is a mapping.
 
     Anchors, aliases and the merge key ``<<`` work as in YAML 1.1.
@@ -31,7 +31,7 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
     ----------
     text : bytes
         Content of the file, in UTF-8.
-    where : str
+    source_name : str
         Name of the file for messages.
 
     Raises
@@ -41,18 +41,20 @@ def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
         than `MAX_YAML_VALUES` values once its aliases are expanded.
     """
     if len(text) > MAX_YAML_BYTES:
-        raise MapError(f"{where}: expected at most {MAX_YAML_BYTES // 1024} kB of YAML, got more")
+        raise MapError(f"{source_name}: expected at most {MAX_YAML_BYTES // 1024} kB of YAML, got more")
     try:
         decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise MapError(f"{where}: byte {error.start}: not UTF-8") from None
+        raise MapError(f"{source_name}: byte {error.start}: not UTF-8") from None
     try:
-        return _YamlReader(decoded, where).read()
+        return _YamlReader(decoded, source_name).read()
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark is not None else ""
-        raise MapError(f"{where}: {line}not YAML: {to_one_line(error.problem or error.context)}") from None
+        raise MapError(
+            f"{source_name}: {line}not YAML: {to_one_line(error.problem or error.context)}"
+        ) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        raise MapError(f"{where}: not YAML: {to_one_line(error)[:200]}") from None
+        raise MapError(f"{source_name}: not YAML: {to_one_line(error)[:200]}") from None
 
 
 class _SizedValue(NamedTuple):
@@ -66,8 +68,8 @@ class _SizedValue(NamedTuple):
 class _YamlReader:
     """Builds values from parser events one at a time, so that limits apply before a large file is parsed."""
 
-    def __init__(self, text: str, where: str) -> None:
-        self.where = where
+    def __init__(self, text: str, source_name: str) -> None:
+        self.source_name = source_name
         self.events = yaml.parse(text, Loader=yaml.BaseLoader)
         self.anchors: dict[str, _SizedValue] = {}
         self.count = 0
@@ -89,7 +91,7 @@ class _YamlReader:
 
     def _locate(self, event: yaml.Event) -> str:
         line = event.start_mark.line + 1 if event.start_mark else 0
-        return f"{self.where}: line {line}"
+        return f"{self.source_name}: line {line}"
 
     def _build(self, event: Any, depth: int) -> _SizedValue:
         """Build the value that starts with an event; `depth` is the nesting depth of a list or mapping."""

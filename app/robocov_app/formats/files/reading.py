@@ -31,19 +31,19 @@ def read_head(path: Path, maximum: int = HEAD_BYTES) -> bytes:
     MapError
         If there is no regular file at `path`, or it cannot be read.
     """
-    where = to_one_line(path)
+    source_name = to_one_line(path)
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
-            raise MapError(f"{where}: expected a file, got a folder")
+            raise MapError(f"{source_name}: expected a file, got a folder")
         if not stat.S_ISREG(mode):  # opening a pipe would wait for ever
-            raise MapError(f"{where}: expected a file, got a pipe or a device")
+            raise MapError(f"{source_name}: expected a file, got a pipe or a device")
         with path.open("rb") as file:
             return file.read(maximum)
     except FileNotFoundError:
-        raise MapError(f"{where}: no such file") from None
+        raise MapError(f"{source_name}: no such file") from None
     except (OSError, ValueError) as error:
-        raise MapError(f"{where}: cannot be read: {describe_error(error)}") from None
+        raise MapError(f"{source_name}: cannot be read: {describe_error(error)}") from None
 
 
 def require_regular_file(path: Path) -> None:
@@ -88,9 +88,9 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     MapError
         If the file is too large, has too many vertices, or is not text.
     """
-    where = to_one_line(path)
+    source_name = to_one_line(path)
     content = read_content(path, MAX_TEXT_BYTES)
-    require_vertices(content.count(separator), where)
+    require_vertices(content.count(separator), source_name)
     encoding = "utf-8"
     for mark, marked_encoding in _BYTE_ORDER_MARKS:
         if content.startswith(mark):
@@ -98,9 +98,9 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
             encoding = marked_encoding
             break
     try:
-        return content.decode(encoding), where
+        return content.decode(encoding), source_name
     except UnicodeDecodeError as error:
-        raise MapError(f"{where}: byte {error.start}: not {encoding.upper()}, expected text") from None
+        raise MapError(f"{source_name}: byte {error.start}: not {encoding.upper()}, expected text") from None
 
 
 def get_map_name(path: Path) -> str:

@@ -38,7 +38,7 @@ class Element:
     tag : str
         Name without its namespace.
     attributes : dict of str to str
-    where : str
+    source_name : str
         Name of the file for messages.
     line : int
     children : list of Element
@@ -48,7 +48,7 @@ class Element:
 
     tag: str
     attributes: dict[str, str]
-    where: str
+    source_name: str
     line: int
     children: list[Element] = field(default_factory=list)
     text_pieces: list[str] = field(default_factory=list)
@@ -101,7 +101,7 @@ class Element:
         """Raise a MapError with the file, the line and the name of the element."""
         name = self.attributes.get("id")
         label = f"<{self.tag}>" if name is None else f"<{self.tag}> {quote(name)}"
-        raise MapError(f"{self.where}:{self.line}: {label}: {problem}")
+        raise MapError(f"{self.source_name}:{self.line}: {label}: {problem}")
 
 
 def _describe_count(count: int | None) -> str:
@@ -129,34 +129,34 @@ def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] =
         If the file is not XML, has another root or is too large, or if its entities refer to other files, to
         other entities or to too much text.
     """
-    where = to_one_line(path)
+    source_name = to_one_line(path)
     content = read_content(path, MAX_TEXT_BYTES)
     if content.startswith(b"\x1f\x8b"):  # gzip
         actual = "a gzip-compressed file. Unpack it with gunzip."
-        raise MapError(f"{where}: expected plain {kind}, got {actual}")
+        raise MapError(f"{source_name}: expected plain {kind}, got {actual}")
     if content.count(b"=") > MAX_ATTRIBUTES:
-        raise MapError(f"{where}: expected at most {MAX_ATTRIBUTES} attributes, got more")
-    reader = _Reader(where, content, kind, text_tags)
+        raise MapError(f"{source_name}: expected at most {MAX_ATTRIBUTES} attributes, got more")
+    reader = _Reader(source_name, content, kind, text_tags)
     try:
         reader.parser.Parse(content, True)
     except expat.ExpatError as error:
         reason = to_one_line(expat.ErrorString(error.code))[:60]
-        raise MapError(f"{where}:{error.lineno}: not XML: {reason}") from None
+        raise MapError(f"{source_name}:{error.lineno}: not XML: {reason}") from None
     except (ValueError, LookupError) as error:
-        raise MapError(f"{where}: not XML: {to_one_line(error)[:60]}") from None
+        raise MapError(f"{source_name}: not XML: {to_one_line(error)[:60]}") from None
     first = reader.first
     if first is None or first.tag != root:
         actual = "other XML" if first is None else f"<{first.tag}>"
-        raise MapError(f"{where}: expected <{root}>, got {actual}")
+        raise MapError(f"{source_name}: expected <{root}>, got {actual}")
     return first
 
 
 class _Reader:
     """Handlers for expat that build the tree of elements."""
 
-    def __init__(self, where: str, content: bytes, kind: str, text_tags: Collection[str]) -> None:
+    def __init__(self, source_name: str, content: bytes, kind: str, text_tags: Collection[str]) -> None:
         """Prepare a parser for `content`, which must be passed to `parser.Parse`."""
-        self.where = where
+        self.source_name = source_name
         self.kind = kind
         self.text_tags = text_tags
         self.reference_count = content.count(b"&")
@@ -179,9 +179,9 @@ class _Reader:
         self.element_count += 1
         line = self.parser.CurrentLineNumber
         if self.element_count > MAX_ELEMENTS:
-            raise MapError(f"{self.where}:{line}: expected at most {MAX_ELEMENTS} elements, got more")
+            raise MapError(f"{self.source_name}:{line}: expected at most {MAX_ELEMENTS} elements, got more")
         if len(self.open) >= MAX_NESTING:
-            raise MapError(f"{self.where}:{line}: elements are nested deeper than {MAX_NESTING}")
+            raise MapError(f"{self.source_name}:{line}: elements are nested deeper than {MAX_NESTING}")
         # Expat puts a blank between the namespace and the name.
         namespace, _, tag = name.rpartition(" ")
         plain_attributes = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
@@ -192,7 +192,7 @@ class _Reader:
         if namespace not in ("", _SVG_NAMESPACE) or is_in_foreign_element:
             self.open.append(None)
             return
-        element = Element(tag, plain_attributes, self.where, line)
+        element = Element(tag, plain_attributes, self.source_name, line)
         if parent is None:
             self.first = element
         else:
@@ -235,4 +235,4 @@ class _Reader:
 
     def _raise_error(self, problem: str) -> NoReturn:
         line = self.parser.CurrentLineNumber
-        raise MapError(f"{self.where}:{line}: expected plain {self.kind}, got {problem}")
+        raise MapError(f"{self.source_name}:{line}: expected plain {self.kind}, got {problem}")

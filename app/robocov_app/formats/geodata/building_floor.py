@@ -55,7 +55,7 @@ class FloorElement:
     geometry: SourceGeometry
 
 
-def choose_floor(floors: dict[float, float], requested: str | None, where: str) -> float:
+def choose_floor(floors: dict[float, float], requested: str | None, source_name: str) -> float:
     """Return the number of the floor to be read.
 
     Parameters
@@ -64,7 +64,7 @@ def choose_floor(floors: dict[float, float], requested: str | None, where: str) 
         Total area of the spaces on each floor, keyed by its number.
     requested : str or None
         Number that the user gave. With None, it is the floor nearest to the ground floor, 0.
-    where : str
+    source_name : str
         Name of the file for messages.
 
     Raises
@@ -81,7 +81,7 @@ def choose_floor(floors: dict[float, float], requested: str | None, where: str) 
         number = float("nan")
     if number not in floors:
         known = list_floors(floors)
-        raise ParameterError(f"{where}: level: expected one of {known}, got {quote(requested)}")
+        raise ParameterError(f"{source_name}: level: expected one of {known}, got {quote(requested)}")
     return number
 
 
@@ -132,13 +132,13 @@ def build_floor(shapes: Shapes, elements: Sequence[FloorElement], name: str, des
     openings = [element.geometry for element in elements if element.role == "opening"]
     spaces = _collect_spaces(elements, shapes)
     if not spaces.areas:
-        raise MapError(f"{shapes.where}: expected spaces with an area on this level, got none")
+        raise MapError(f"{shapes.source_name}: expected spaces with an area on this level, got none")
     if not openings and spaces.walled:
         rooms = "a room is" if spaces.walled == 1 else f"{spaces.walled} rooms are"
         shapes.notes.append(f"no door or opening on this level: {rooms} open to adjacent spaces")
         spaces.outlines = []
     edges = [ring for area in spaces.areas for ring in _get_rings(area)]
-    CrossingCounter(shapes.where).add([*edges, *spaces.outlines])
+    CrossingCounter(shapes.source_name).add([*edges, *spaces.outlines])
     gaps = [_compute_opening_area(opening) for opening in openings]
     snap = shapes.options.snap
     if snap is None:
@@ -183,7 +183,7 @@ def _get_rings(area: MultiPolygon) -> list[BaseGeometry]:
 def _compute_area(geometry: SourceGeometry, shapes: Shapes) -> MultiPolygon:
     shapes.count_vertices(sum(map(len, geometry.rings)))
     rings = [np.round(ring, 6) for ring in geometry.rings]
-    return find_enclosed_area(rings, geometry.rule, CrossingCounter(shapes.where)).area
+    return find_enclosed_area(rings, geometry.rule, CrossingCounter(shapes.source_name)).area
 
 
 def _has_length(line: Array) -> bool:

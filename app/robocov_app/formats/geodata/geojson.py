@@ -71,7 +71,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     if sequence is not None:
         content = sequence
     file = JsonFile(path, content)
-    shapes = Shapes(file.where, options)
+    shapes = Shapes(file.source_name, options)
     collector = GeometryCollector(file, shapes)
     collector.collect(is_sequence=sequence is not None)
     document = file.document if isinstance(file.document, dict) else {}

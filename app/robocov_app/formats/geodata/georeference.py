@@ -66,14 +66,14 @@ def convert_to_meters(
     """
     if not geometries:
         return geometries
-    where = shapes.where
+    source_name = shapes.source_name
     scale = shapes.options.scale
     units = shapes.options.units
-    require_shapes(sum(geometry.kind != "point" for geometry in geometries), where)
+    require_shapes(sum(geometry.kind != "point" for geometry in geometries), source_name)
     if units == "degrees":
         return _project(geometries, DEGREES, shapes, origin)
     if units is None and crs is not None:
-        return _project(geometries, _parse_reference_system(crs, where), shapes, origin)
+        return _project(geometries, _parse_reference_system(crs, source_name), shapes, origin)
     if units is None and may_be_degrees and _are_degrees(geometries):
         return _project(geometries, DEGREES, shapes, origin)
     if scale not in (None, 1.0):
@@ -124,7 +124,7 @@ def _unwrap_longitudes(points: Array, center: float) -> Array:
     return np.column_stack([longitudes, points[:, 1]])
 
 
-def _parse_reference_system(crs: str, where: str) -> str:
+def _parse_reference_system(crs: str, source_name: str) -> str:
     """Return the name of a reference system as AUTHORITY:CODE.
 
     Full definitions are refused, because they may name files.
@@ -132,7 +132,7 @@ def _parse_reference_system(crs: str, where: str) -> str:
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
         expected = f"expected a code such as EPSG:25832 ({_WAY_OUT})"
-        raise MapError(f"{where}: {expected}, got reference system {quote(crs)}")
+        raise MapError(f"{source_name}: {expected}, got reference system {quote(crs)}")
     return f"{match[1].upper()}:{match[2].upper()}"
 
 
@@ -140,17 +140,19 @@ def _project(
     geometries: Sequence[SourceGeometry], system: str, shapes: Shapes, origin: Point | None
 ) -> list[SourceGeometry]:
     """Project geometries to meters east and north of an origin (azimuthal equidistant projection)."""
-    pyproj = _import_pyproj(system, shapes.where)
+    pyproj = _import_pyproj(system, shapes.source_name)
     points = _join_points(geometries)
     if system not in _SYSTEMS_IN_DEGREES:
-        points = _transform_to_degrees(pyproj, points, system, shapes.where)
+        points = _transform_to_degrees(pyproj, points, system, shapes.source_name)
     is_on_globe = (np.abs(points) <= _MAX_DEGREES).all(axis=1)  # points that cannot be projected are inf
     if not is_on_globe.all():
         x, y = _join_points(geometries)[int(np.argmin(is_on_globe))].tolist()
         expected = f"coordinates of {system}"
         if system in _SYSTEMS_IN_DEGREES:
             expected = "longitude and latitude in degrees"
-        raise MapError(f"{shapes.where}: expected {expected}, got a point at [{x:g}, {y:g}] ({_WAY_OUT})")
+        raise MapError(
+            f"{shapes.source_name}: expected {expected}, got a point at [{x:g}, {y:g}] ({_WAY_OUT})"
+        )
     points = _unwrap_longitudes(points, points[0, 0])
     if origin is None:
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -164,21 +166,21 @@ def _project(
     return _replace_points(geometries, points)
 
 
-def _import_pyproj(system: str, where: str) -> Any:
+def _import_pyproj(system: str, source_name: str) -> Any:
     try:
         return import_optional("pyproj", "geo")
     except RobocovError as error:
         label = "degrees" if system == DEGREES else system
-        raise MapError(f"{where}: coordinates in {label}: {error} ({_WAY_OUT})") from None
+        raise MapError(f"{source_name}: coordinates in {label}: {error} ({_WAY_OUT})") from None
 
 
-def _transform_to_degrees(pyproj: Any, points: Array, system: str, where: str) -> Array:
+def _transform_to_degrees(pyproj: Any, points: Array, system: str, source_name: str) -> Array:
     """Convert points of a reference system to longitude and latitude; inf if that is impossible."""
     try:
         source = pyproj.CRS.from_authority(*system.split(":"))
         transformer = pyproj.Transformer.from_crs(source, DEGREES, always_xy=True)
     except pyproj.exceptions.ProjError:
-        raise MapError(f"{where}: reference system {system} is unknown ({_WAY_OUT})") from None
+        raise MapError(f"{source_name}: reference system {system} is unknown ({_WAY_OUT})") from None
     return np.column_stack(transformer.transform(*points.T))
 
 

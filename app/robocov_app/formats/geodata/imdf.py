@@ -67,13 +67,15 @@ class _Archive:
     def __init__(self, path: Path) -> None:
         """Read the files of a zip or folder; raise MapError if files are missing or too large."""
         self.path = path
-        self.where = to_one_line(path)
+        self.source_name = to_one_line(path)
         texts = _read_folder(path) if path.is_dir() else _read_zip(path)
         for name in _REQUIRED_FILES:
             if name not in texts:
-                raise MapError(f"{self.where}: expected {name}.geojson in it, as IMDF has, got none")
+                raise MapError(f"{self.source_name}: expected {name}.geojson in it, as IMDF has, got none")
         if sum(text.count(b"{") for text in texts.values()) > MAX_OBJECTS:
-            raise MapError(f"{self.where}: expected at most {MAX_OBJECTS} objects in its files, got more")
+            raise MapError(
+                f"{self.source_name}: expected at most {MAX_OBJECTS} objects in its files, got more"
+            )
         self.files = {name: JsonFile(path / f"{name}.geojson", text) for name, text in texts.items()}
 
     def list_features(self, name: str) -> list[dict[str, Any]]:
@@ -112,7 +114,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         If the option ``level`` names a level that does not exist.
     """
     archive = _Archive(path)
-    shapes = Shapes(archive.where, options)
+    shapes = Shapes(archive.source_name, options)
     levels = _parse_levels(archive)
     floor = _choose_floor(archive, levels, options.level, shapes)
     level_ids = {level_id for level_id, level in levels.items() if level.ordinal == floor}
@@ -183,21 +185,21 @@ def _read_folder(path: Path) -> dict[str, bytes]:
 
 def _read_zip(path: Path) -> dict[str, bytes]:
     """Return the content of the IMDF files in a zip archive, keyed by their names without suffix."""
-    where = to_one_line(path)
+    source_name = to_one_line(path)
     data = files.read_content(path, files.MAX_TEXT_BYTES)
     if data.count(_ZIP_ENTRY_MAGIC) > MAX_ARCHIVE_FILES:
-        raise MapError(f"{where}: expected an archive of at most {MAX_ARCHIVE_FILES} files, got more")
+        raise MapError(f"{source_name}: expected an archive of at most {MAX_ARCHIVE_FILES} files, got more")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return _unpack(archive, where)
+            return _unpack(archive, source_name)
     except MapError:
         raise
     except Exception as error:  # zipfile and its decompressors raise many kinds
         reason = to_one_line(error)[:80]
-        raise MapError(f"{where}: expected a whole zip archive, got a broken one: {reason}") from None
+        raise MapError(f"{source_name}: expected a whole zip archive, got a broken one: {reason}") from None
 
 
-def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
+def _unpack(archive: zipfile.ZipFile, source_name: str) -> dict[str, bytes]:
     """Return the content of the IMDF files in an open archive; raise MapError if they are too large."""
     texts: dict[str, bytes] = {}
     remaining_bytes = files.MAX_TEXT_BYTES
@@ -208,14 +210,14 @@ def _unpack(archive: zipfile.ZipFile, where: str) -> dict[str, bytes]:
         if not is_read or "__MACOSX" in entry_path.parts:
             continue
         if name in texts:
-            raise MapError(f"{where}: expected one venue, got two files {entry_path.name}")
+            raise MapError(f"{source_name}: expected one venue, got two files {entry_path.name}")
         # The size stated in the archive is not trusted. One byte more shows that the limit is exceeded.
         with archive.open(entry) as file:
             texts[name] = file.read(remaining_bytes + 1)
         remaining_bytes -= len(texts[name])
         if remaining_bytes < 0:
             limit = f"{files.MAX_TEXT_BYTES / 1e6:g} MB"
-            raise MapError(f"{where}: expected at most {limit} when unpacked, got more")
+            raise MapError(f"{source_name}: expected at most {limit} when unpacked, got more")
     return texts
 
 
@@ -250,21 +252,21 @@ def _choose_floor(
     # Only floors with units. `choose_floor` does not use their areas, here 1.
     floors = {level.ordinal: 1.0 for level_id, level in levels.items() if level_id in used_ids}
     if not floors:
-        raise MapError(f"{archive.where}: expected units on its levels, got none")
+        raise MapError(f"{archive.source_name}: expected units on its levels, got none")
     number = requested
     if requested is not None:
         with_name = [level for level in levels.values() if _has_name(level, requested)]
         if with_name:
             number = f"{with_name[0].ordinal:g}"
     try:
-        floor = choose_floor(floors, number, archive.where)
+        floor = choose_floor(floors, number, archive.source_name)
     except ParameterError:
         names = sorted({name for level in levels.values() for name in level.names[1:2]})
         if not names:
             raise
         known = f"{list_floors(floors)} or a name ({', '.join(names[:10])})"
         problem = f"expected {known}, got {quote(number)}"
-        raise ParameterError(f"{archive.where}: level: {problem}") from None
+        raise ParameterError(f"{archive.source_name}: level: {problem}") from None
     if len(floors) > 1:
         on_floor = [level for level in levels.values() if level.ordinal == floor]
         labels = sorted({quote(level.names[1]) for level in on_floor if level.names[1:]})

@@ -42,12 +42,12 @@ class CrossingCounter:
 
     Attributes
     ----------
-    where : str
+    source_name : str
         The file, for messages.
     count : float
     """
 
-    where: str = "rings"
+    source_name: str = "rings"
     count: float = 0.0
 
     def add(self, lines: Iterable[BaseGeometry]) -> None:
@@ -66,7 +66,9 @@ class CrossingCounter:
             self.count += self._estimate(edges)
         if self.count > MAX_CROSSINGS:
             actual = f"about {self.count:.1g}"
-            raise MapError(f"{self.where}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}")
+            raise MapError(
+                f"{self.source_name}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}"
+            )
 
     def _estimate(self, edges: Array) -> float:
         """Estimate the number of crossings from a random sample of edges."""

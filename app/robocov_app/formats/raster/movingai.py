@@ -69,15 +69,15 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the header is incomplete, a row has the wrong length, or a letter is unknown.
     """
-    where = to_one_line(path)
+    source_name = to_one_line(path)
     content = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(_BYTE_ORDER_MARK)
-    header = _parse_header(content, where)
-    characters = _parse_rows(header, where)
+    header = _parse_header(content, source_name)
+    characters = _parse_rows(header, source_name)
     cells = _build_character_table(options)[characters]
     is_unknown = cells == _UNKNOWN_CHARACTER
     if is_unknown.any():
         row, column = np.argwhere(is_unknown)[0].tolist()
-        place = f"{where}: line {header.body_line + row}, column {column + 1}"
+        place = f"{source_name}: line {header.body_line + row}, column {column + 1}"
         raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(characters[row, column]))}")
     cell = get_or_default(options.cell, DEFAULT_CELL_M)
     notes: tuple[str, ...] = ()
@@ -86,7 +86,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return build_grid_map(
         cells,
         GridFrame(cell),
-        where,
+        source_name,
         name=path.stem,
         description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
         notes=notes,
@@ -106,7 +106,7 @@ def _build_character_table(options: ReadOptions) -> NDArray[np.uint8]:
     return table
 
 
-def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
+def _parse_rows(header: _Header, source_name: str) -> NDArray[np.uint8]:
     """Return the characters of a grid, (rows, columns), the top row first."""
     rows = header.rows
     columns = header.columns
@@ -119,14 +119,14 @@ def _parse_rows(header: _Header, where: str) -> NDArray[np.uint8]:
             is_end = k >= len(lines) or (width == 0 and k == len(lines) - 1)
             actual = "end of file" if is_end else f"{width} characters"
             line = header.body_line + k
-            raise MapError(f"{where}: line {line}: expected {columns} characters, got {actual}")
+            raise MapError(f"{source_name}: line {line}: expected {columns} characters, got {actual}")
     if len(lines) > rows and lines[rows].strip():
-        raise MapError(f"{where}: line {header.body_line + rows}: expected {rows} rows, got more")
+        raise MapError(f"{source_name}: line {header.body_line + rows}: expected {rows} rows, got more")
     joined = b"".join(line.rstrip(_BLANKS) for line in lines[:rows])
     return np.frombuffer(joined, np.uint8).reshape(rows, columns)
 
 
-def _parse_header(content: bytes, where: str) -> _Header:
+def _parse_header(content: bytes, source_name: str) -> _Header:
     """Parse the header, which ends with the line ``map``."""
     sizes: dict[str, int] = {}
     at = 0
@@ -140,17 +140,17 @@ def _parse_header(content: bytes, where: str) -> _Header:
             line = content[at:limit]
             at = len(content)
         words = line.decode("ascii", "replace").split()
-        place = f"{where}: line {number}"
+        place = f"{source_name}: line {number}"
         if not words:
             continue
         if len(words) == 1 and words[0].lower() == "map":
             for key in ("height", "width"):
                 if key not in sizes:
                     raise MapError(f"{place}: expected {key} first")
-            files.require_cells(sizes["width"], sizes["height"], where)
+            files.require_cells(sizes["width"], sizes["height"], source_name)
             return _Header(sizes["width"], sizes["height"], content[at:], number + 1)
         _parse_header_line(words, sizes, place)
-    raise MapError(f"{where}: expected a line map after type, height and width, got none")
+    raise MapError(f"{source_name}: expected a line map after type, height and width, got none")
 
 
 def _parse_header_line(words: list[str], sizes: dict[str, int], place: str) -> None:

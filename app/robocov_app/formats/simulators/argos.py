@@ -49,7 +49,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     arena = root.find_child("arena")
     if arena is None:
         root.raise_error("no <arena>")
-    shapes = Shapes(root.where, options)
+    shapes = Shapes(root.source_name, options)
     size = _parse_lengths(arena, "size")[:2]
     corner = arena.parse_numbers("center", count=3, default="0,0,0")[:2] - size / 2
     world = MultiPolygon([shapely.box(*corner, *(corner + size))])

@@ -89,16 +89,16 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     areas: list[UniformArea] = []
     while features.has_more:
         if len(gaussians) + len(areas) >= MAX_FEATURES:
-            raise MapError(f"{features.where}: expected at most {MAX_FEATURES} features, got more")
+            raise MapError(f"{features.source_name}: expected at most {MAX_FEATURES} features, got more")
         feature = features.read_feature()
         if isinstance(feature, Gaussian):
             gaussians.append(feature)
         else:
             areas.append(feature)
     side = WORLD_CELLS * get_or_default(options.cell, DEFAULT_CELL_M)
-    weights = _compute_weights(gaussians, areas, side, features.where)
+    weights = _compute_weights(gaussians, areas, side, features.source_name)
     if not weights.max() > 0.0:
-        raise MapError(f"{features.where}: expected a feature with a weight inside the world, got none")
+        raise MapError(f"{features.source_name}: expected a feature with a weight inside the world, got none")
     robots = _read_positions(path.with_suffix(POSITIONS_SUFFIX))
     world = shapely.box(0.0, 0.0, side, side)
     return ForeignMap(
@@ -121,7 +121,7 @@ class _FeatureReader:
     """Reads the features of a file word by word."""
 
     def __init__(self, path: Path) -> None:
-        text, self.where = read_text(path, b"\n")
+        text, self.source_name = read_text(path, b"\n")
         self._words = text.split()
         self._next = 0
 
@@ -142,7 +142,7 @@ class _FeatureReader:
             return self._check_gaussian(Gaussian(x, y, sigma_x, sigma_y, correlation, mass))
         if kind == "Uniform":
             return self._read_area()
-        raise MapError(f"{self.where}: expected CircularBND, BND or Uniform, got {quote(kind)}")
+        raise MapError(f"{self.source_name}: expected CircularBND, BND or Uniform, got {quote(kind)}")
 
     def _read_numbers(self, count: int, kind: str) -> list[float]:
         """Return the next numbers, which belong to a feature of the given kind."""
@@ -150,19 +150,22 @@ class _FeatureReader:
         self._next += count
         numbers = [parse_number(word) for word in words]
         if len(numbers) < count or not np.isfinite(numbers).all():
-            raise MapError(f"{self.where}: {kind}: expected {count} numbers, got {quote(' '.join(words))}")
+            raise MapError(
+                f"{self.source_name}: {kind}: expected {count} numbers, got {quote(' '.join(words))}"
+            )
         return numbers
 
     def _check_gaussian(self, gaussian: Gaussian) -> Gaussian:
         """Return a Gaussian after a check of its numbers."""
         x, y, sigma_x, sigma_y, correlation, mass = gaussian
         for value in (x, y):
-            require_coordinate(value, self.where)
+            require_coordinate(value, self.source_name)
         is_valid = min(sigma_x, sigma_y) > 0.0 and abs(correlation) <= _MAX_CORRELATION and mass >= 0.0
         if not is_valid:
             raise MapError(
-                f"{self.where}: Gaussian at {x:g}, {y:g}: expected sigmas above 0, a correlation between -1 "
-                f"and 1, and a mass of at least 0, got {sigma_x:g}, {sigma_y:g}, {correlation:g} and {mass:g}"
+                f"{self.source_name}: Gaussian at {x:g}, {y:g}: "
+                "expected sigmas above 0, a correlation between -1 and 1, and a mass of at least 0, "
+                f"got {sigma_x:g}, {sigma_y:g}, {correlation:g} and {mass:g}"
             )
         return gaussian
 
@@ -171,16 +174,19 @@ class _FeatureReader:
         count, weight = self._read_numbers(2, "Uniform")
         if count != int(count) or count < _MIN_CORNERS or weight < 0.0:
             raise MapError(
-                f"{self.where}: Uniform: expected a number of at least {_MIN_CORNERS} corners and a weight "
-                f"of at least 0, got {count:g} and {weight:g}"
+                f"{self.source_name}: Uniform: "
+                f"expected a number of at least {_MIN_CORNERS} corners and a weight of at least 0, "
+                f"got {count:g} and {weight:g}"
             )
         coordinates = self._read_numbers(2 * int(count), "Uniform")
         for value in coordinates:
-            require_coordinate(value, self.where)
+            require_coordinate(value, self.source_name)
         return UniformArea(Polygon(np.reshape(coordinates, (-1, 2))), weight)
 
 
-def _compute_weights(gaussians: list[Gaussian], areas: list[UniformArea], side: float, where: str) -> Array:
+def _compute_weights(
+    gaussians: list[Gaussian], areas: list[UniformArea], side: float, source_name: str
+) -> Array:
     """Compute the weights of the pixels, relative to the largest.
 
     Returns
@@ -194,12 +200,12 @@ def _compute_weights(gaussians: list[Gaussian], areas: list[UniformArea], side: 
         weights += _compute_gaussian_masses(gaussian, edges)
     # In CoverageControl, the weight of a cell is the mass of the Gaussians in it, plus that of a polygon.
     weights *= (RASTER_SIZE / WORLD_CELLS) ** 2
-    weights += _compute_area_weights(areas, edges, where)
+    weights += _compute_area_weights(areas, edges, source_name)
     highest = weights.max()
     return np.round(weights / highest, _WEIGHT_DIGITS) if highest > 0.0 else weights
 
 
-def _compute_area_weights(areas: list[UniformArea], edges: Array, where: str) -> Array:
+def _compute_area_weights(areas: list[UniformArea], edges: Array, source_name: str) -> Array:
     """Compute the highest weight of the polygons at each pixel, (RASTER_SIZE, RASTER_SIZE)."""
     centers = 0.5 * (edges[:-1] + edges[1:])
     weights = np.zeros((len(centers), len(centers)))
@@ -211,7 +217,9 @@ def _compute_area_weights(areas: list[UniformArea], edges: Array, where: str) ->
         x, y = np.meshgrid(centers[columns], centers[rows])
         pixel_count += x.size
         if pixel_count > _MAX_POLYGON_PIXELS:
-            raise MapError(f"{where}: expected smaller or fewer polygons, got more than the import can draw")
+            raise MapError(
+                f"{source_name}: expected smaller or fewer polygons, got more than the import can draw"
+            )
         shapely.prepare(polygon)
         inner_weights = np.where(shapely.intersects_xy(polygon, x, y), weight, 0.0)
         weights[rows, columns] = np.maximum(weights[rows, columns], inner_weights)
@@ -238,13 +246,13 @@ def _read_positions(path: Path) -> tuple[tuple[float, float], ...]:
     """Return the positions in a file, m; none if there is no such file."""
     if not path.exists():
         return ()
-    text, where = read_text(path, b"\n")
+    text, source_name = read_text(path, b"\n")
     numbers = [parse_number(word) for word in text.split()]
     if len(numbers) % 2 or not np.isfinite(numbers).all():
         raise MapError(
-            f"{where}: expected an x and a y for each robot, got {format_count(len(numbers), 'word')}"
+            f"{source_name}: expected an x and a y for each robot, got {format_count(len(numbers), 'word')}"
         )
-    require_shapes(len(numbers) // 2, where)
+    require_shapes(len(numbers) // 2, source_name)
     for value in numbers:
-        require_coordinate(value, where)
+        require_coordinate(value, source_name)
     return tuple(zip(numbers[::2], numbers[1::2], strict=True))

@@ -40,15 +40,15 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
     document = file.document
     if not isinstance(document, dict) or "verts" not in document:
-        raise MapError(f'{file.where}: not a HouseExpo plan, expected an object with "verts"')
+        raise MapError(f'{file.source_name}: not a HouseExpo plan, expected an object with "verts"')
     vertices = _parse_vertices(file, document["verts"])
     is_new = (vertices != np.roll(vertices, 1, axis=0)).any(axis=1)
     ring = vertices[is_new]
     if len(ring) < 3:
-        raise MapError(f"{file.where}: verts: expected at least 3 different points, got {len(ring)}")
-    enclosed = find_enclosed_area([ring], crossings=CrossingCounter(file.where))
+        raise MapError(f"{file.source_name}: verts: expected at least 3 different points, got {len(ring)}")
+    enclosed = find_enclosed_area([ring], crossings=CrossingCounter(file.source_name))
     if enclosed.area.is_empty:
-        raise MapError(f"{file.where}: verts: expected an outline with an area, got 0 m²")
+        raise MapError(f"{file.source_name}: verts: expected an outline with an area, got 0 m²")
     free, dropped = _remove_small_holes(enclosed.area)
     return ForeignMap(
         name=f"HouseExpo {_get_name(document, path)}",

@@ -41,7 +41,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     parser = _RingParser(JsonFile(path), options)
     polygons = parser.parse_polygons()
     shapes = parser.shapes
-    require_shapes(len(polygons), shapes.where)
+    require_shapes(len(polygons), shapes.source_name)
     scale = get_or_default(options.scale, 1.0)
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], place=f"polygon {number}")
@@ -55,7 +55,7 @@ class _RingParser:
 
     def __init__(self, file: JsonFile, options: ReadOptions) -> None:
         self.file = file
-        self.shapes = Shapes(file.where, options)
+        self.shapes = Shapes(file.source_name, options)
 
     def parse_polygons(self) -> list[list[Array]]:
         """Return the polygons in the file, in its units. The nesting of the lists tells the structure."""

@@ -218,11 +218,11 @@ def read_study(path: Path | str) -> Study:
         the actual value.
     """
     path = Path(path)
-    where = to_one_line(path)
-    return build_study(parse_toml(read_bytes(path), where), path.parent, where)
+    source_name = to_one_line(path)
+    return build_study(parse_toml(read_bytes(path), source_name), path.parent, source_name)
 
 
-def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
+def build_study(document: dict[str, Any], folder: Path, source_name: str) -> Study:
     """Build a study from the content of a file.
 
     Parameters
@@ -231,7 +231,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
         Content of the file, as `parse_toml` returns it.
     folder : Path
         Folder to which relative paths refer.
-    where : str
+    source_name : str
         Name of the file in messages.
 
     Returns
@@ -246,7 +246,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     reader = _SchemaReader()
     values = reader.read(document, _STUDY, ())
     if reader.issues:
-        message = f"{where}: {reader.issues[0]}"
+        message = f"{source_name}: {reader.issues[0]}"
         other_count = len(reader.issues) - 1
         if other_count:
             message += f" (and {other_count} more)"
@@ -254,7 +254,7 @@ def build_study(document: dict[str, Any], folder: Path, where: str) -> Study:
     try:
         return Study(**_convert_to_arguments(values, folder), folder=folder)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        raise InputError(f"{source_name}: {error}") from error
 
 
 def _convert_to_arguments(values: dict[str, Any], folder: Path) -> dict[str, Any]:

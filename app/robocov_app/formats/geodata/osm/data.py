@@ -68,7 +68,7 @@ class OsmData:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         Name of the file for messages.
 
     Attributes
@@ -80,8 +80,8 @@ class OsmData:
         Lines for the report.
     """
 
-    def __init__(self, where: str) -> None:
-        self.where = where
+    def __init__(self, source_name: str) -> None:
+        self.source_name = source_name
         self.bounds: list[tuple[float, float, float, float]] = []
         self.nodes: dict[int, OsmElement] = {}
         self.ways: dict[int, OsmElement] = {}
@@ -157,7 +157,7 @@ class OsmData:
         ways = self.get_ways(element)
         self._vertices_used += sum(len(way.members) for way in ways if way is not None)
         if self._vertices_used > _MAX_READINGS * files.MAX_VERTICES:
-            files.require_vertices(self._vertices_used, self.where)
+            files.require_vertices(self._vertices_used, self.source_name)
         lines = []
         for way in ways:
             members = [] if way is None else way.members

@@ -48,14 +48,14 @@ def read_osm(path: Path) -> OsmData:
 class _XmlReader:
     """Handlers for expat that fill `data`."""
 
-    def __init__(self, where: str, content: bytes) -> None:
+    def __init__(self, source_name: str, content: bytes) -> None:
         """Parse `content`; raise MapError if it is damaged or too large."""
-        self.where = where
-        self.data = OsmData(where)
+        self.source_name = source_name
+        self.data = OsmData(source_name)
         # Counting takes milliseconds, parsing a huge file takes seconds.
-        files.require_vertices(content.count(b"<node"), where)
-        files.require_vertices(content.count(b"<nd"), where)
-        files.require_vertices(content.count(b"<tag") // 2, where)
+        files.require_vertices(content.count(b"<node"), source_name)
+        files.require_vertices(content.count(b"<nd"), source_name)
+        files.require_vertices(content.count(b"<tag") // 2, source_name)
         self.element: OsmElement | None = None
         self.depth = 0
         self.parser = expat.ParserCreate()
@@ -66,7 +66,7 @@ class _XmlReader:
             self.parser.Parse(content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
             line = self.parser.ErrorLineNumber
-            raise MapError(f"{where}:{line}: not XML: {to_one_line(error)[:80]}") from None
+            raise MapError(f"{source_name}:{line}: not XML: {to_one_line(error)[:80]}") from None
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
         """Add the content of an XML element; raise MapError if an attribute is missing or invalid."""
@@ -114,13 +114,13 @@ class _XmlReader:
             self.element = None
 
     def _raise_error(self, problem: str) -> NoReturn:
-        raise MapError(f"{self.where}:{self.parser.CurrentLineNumber}: {problem}")
+        raise MapError(f"{self.source_name}:{self.parser.CurrentLineNumber}: {problem}")
 
 
 def _read_json(path: Path) -> OsmData:
     """Read the data in a JSON file; a remark of Overpass, such as a timeout, becomes a note."""
     file = JsonFile(path)
-    data = OsmData(file.where)
+    data = OsmData(file.source_name)
     document = file.document
     elements = files.get_member(document, "elements")
     if not isinstance(elements, list):

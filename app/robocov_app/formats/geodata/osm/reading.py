@@ -41,15 +41,15 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         If the option ``level`` names a floor that the extract does not have.
     """
     data = read_osm(path)
-    shapes = Shapes(data.where, options)
+    shapes = Shapes(data.source_name, options)
     shapes.notes += data.notes
     floors = measure_floors(data)
     if options.level is not None and not floors:
         actual = quote(options.level)
-        raise ParameterError(f"{data.where}: level: expected none, got {actual}: no indoor spaces")
+        raise ParameterError(f"{data.source_name}: level: expected none, got {actual}: no indoor spaces")
     name = files.get_map_name(path)
     if floors and (options.level is not None or is_indoor(data, floors)):
-        floor = choose_floor(floors, options.level, data.where)
+        floor = choose_floor(floors, options.level, data.source_name)
         if len(floors) > 1:
             shapes.notes.append(f"level {floor:g} of {list_floors(floors)} (--level)")
         return build_floor(shapes, list_floor_elements(data, floor, shapes), name, _DESCRIPTION)

@@ -66,7 +66,7 @@ class GridFrame:
 def build_grid_map(
     cells: Cells,
     frame: GridFrame,
-    where: str,
+    source_name: str,
     *,
     name: str,
     description: str,
@@ -82,7 +82,7 @@ def build_grid_map(
     ----------
     cells : (rows, columns) array
     frame : GridFrame
-    where : str
+    source_name : str
         The file, for messages.
     name, description : str
     unknown : "obstacle", "free" or "cut"
@@ -99,18 +99,18 @@ def build_grid_map(
     MapError
         If no cell is free, the outline has too many vertices, or a coordinate is out of range.
     """
-    _require_coordinates(cells, frame, where)
+    _require_coordinates(cells, frame, source_name)
     # From here on the bottom row is first, in the direction of the y axis.
     known = cells[::-1] != UNKNOWN
-    free = _find_free_cells(cells[::-1], unknown, unknown_name, where)
+    free = _find_free_cells(cells[::-1], unknown, unknown_name, source_name)
     boundary = None
     dropped: tuple[str, ...] = ()
     if unknown == "cut" and not known.all():
         island = _find_main_island(known, free)
         dropped = _describe_lost_cells(free & ~island, frame.cell)
         free &= island
-        boundary = _build_rim(island, frame, where)
-    outline = outline_cells(free, frame.place, where)
+        boundary = _build_rim(island, frame, source_name)
+    outline = outline_cells(free, frame.place, source_name)
     return ForeignMap(
         name=name,
         description=description,
@@ -125,7 +125,9 @@ def build_grid_map(
     )
 
 
-def _find_free_cells(cells: Cells, unknown_meaning: Meaning, unknown_name: str, where: str) -> BoolArray:
+def _find_free_cells(
+    cells: Cells, unknown_meaning: Meaning, unknown_name: str, source_name: str
+) -> BoolArray:
     """Return the mask of the free cells.
 
     Raises
@@ -142,15 +144,15 @@ def _find_free_cells(cells: Cells, unknown_meaning: Meaning, unknown_name: str, 
     hint = ""
     if is_unknown.any():
         hint = f" (--unknown free treats {unknown_name} cells as free)"
-    raise MapError(f"{where}: no cell is free{hint}")
+    raise MapError(f"{source_name}: no cell is free{hint}")
 
 
-def _require_coordinates(cells: Cells, frame: GridFrame, where: str) -> None:
+def _require_coordinates(cells: Cells, frame: GridFrame, source_name: str) -> None:
     """Raise MapError if a corner of the grid is too far away for a map."""
     rows, columns = cells.shape
     corners = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)
     for value in frame.place(corners).ravel().tolist():
-        require_coordinate(value, f"{where}: a corner of the grid")
+        require_coordinate(value, f"{source_name}: a corner of the grid")
 
 
 def _describe_cells(cells: Cells, cell: float, unknown_meaning: Meaning, unknown_name: str) -> str:
@@ -192,8 +194,8 @@ def _describe_lost_cells(lost: BoolArray, cell: float) -> tuple[str, ...]:
     return (f"{format_area(count * cell * cell, 3)} of free space on other islands of known cells",)
 
 
-def _build_rim(known: BoolArray, frame: GridFrame, where: str) -> Polygon:
+def _build_rim(known: BoolArray, frame: GridFrame, source_name: str) -> Polygon:
     """Return the outline of the known cells and the rim around them, m, without holes."""
     wide = ndimage.binary_dilation(np.pad(known, RIM), structure=_WITH_CORNERS, iterations=RIM)
-    outline = outline_cells(wide, lambda points: frame.place(points - RIM), where)
+    outline = outline_cells(wide, lambda points: frame.place(points - RIM), source_name)
     return Polygon(outline.geoms[0].exterior)

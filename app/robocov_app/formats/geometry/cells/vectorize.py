@@ -24,7 +24,7 @@ _STRIP = 512
 """Number of rows processed at once, to limit the memory."""
 
 
-def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
+def outline_free_cells(free: BoolArray, cell: Point, origin: Point, source_name: str) -> MultiPolygon:
     """Return free cells as polygons.
 
     Parameters
@@ -35,7 +35,7 @@ def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) 
         Width and height of a cell.
     origin : (float, float), m
         Lower left corner of the grid.
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -48,11 +48,11 @@ def outline_free_cells(free: BoolArray, cell: Point, origin: Point, where: str) 
         If no cell is free.
     """
     if not free.any():
-        raise MapError(f"{where}: no cell is free")
-    return outline_cells(free[::-1], lambda points: points * cell + origin, where)
+        raise MapError(f"{source_name}: no cell is free")
+    return outline_cells(free[::-1], lambda points: points * cell + origin, source_name)
 
 
-def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str) -> MultiPolygon:
+def outline_cells(cells: BoolArray, place: Callable[[Array], Array], source_name: str) -> MultiPolygon:
     """Return the outline of cells on a map.
 
     Parameters
@@ -61,7 +61,7 @@ def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str)
         The bottom row first. At least one cell must be true.
     place : callable
         Converts positions in the grid, (n, 2) in cells from its lower left corner, to positions in m.
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -72,7 +72,7 @@ def outline_cells(cells: BoolArray, place: Callable[[Array], Array], where: str)
     row = np.flatnonzero(cells.any(axis=1))
     column = np.flatnonzero(cells.any(axis=0))
     corner = np.array([column[0], row[0]], float)
-    outline = trace_outline(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
+    outline = trace_outline(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], source_name)
     placed: MultiPolygon = shapely.transform(outline, lambda points: place(points + corner))
     return placed
 
@@ -83,14 +83,14 @@ def count_polygon_vertices(area: MultiPolygon) -> int:
     return int(shapely.get_num_coordinates(area)) - ring_count
 
 
-def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
+def trace_outline(free: BoolArray, source_name: str) -> MultiPolygon:
     """Return the union of free cells, one polygon for each of their connected parts.
 
     Parameters
     ----------
     free : (rows, columns) array of bool
         Cell ``free[row, column]`` is the unit square with its lower left corner at (column, row).
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -103,7 +103,7 @@ def trace_outline(free: BoolArray, where: str) -> MultiPolygon:
     MapError
         If there are more than `files.MAX_VERTICES` vertices.
     """
-    corners = _find_corners(free, where)
+    corners = _find_corners(free, source_name)
     if not len(corners.row):
         return MultiPolygon()
     order, starts = _connect_rings(_pair_vertically(corners), corners.is_north_east_free)
@@ -182,7 +182,7 @@ def _place_necks(
     return points, is_distinct
 
 
-def _find_corners(free: BoolArray, where: str) -> _Corners:
+def _find_corners(free: BoolArray, source_name: str) -> _Corners:
     """Find the corners of the outline of free cells; raise MapError if there are too many."""
     strips = []
     count = 0
@@ -198,7 +198,7 @@ def _find_corners(free: BoolArray, where: str) -> _Corners:
         is_corner = south_west ^ south_east ^ north_west ^ north_east | is_double
         # Two corners at the same point have a neck of two vertices each.
         count += int(np.count_nonzero(is_corner)) + 3 * int(np.count_nonzero(is_double))
-        require_vertices(count, where)
+        require_vertices(count, source_name)
         row, column = is_corner.nonzero()
         is_west = south_west ^ north_west
         is_north = north_west ^ north_east

@@ -61,7 +61,7 @@ class Conversion:
     ----------
     foreign : ForeignMap
     shaping : Shaping
-    where : str
+    source_name : str
         The file, for messages.
     repaired, dropped, changed, notes : list of str
         Lines of the import report.
@@ -69,7 +69,7 @@ class Conversion:
 
     foreign: ForeignMap
     shaping: Shaping
-    where: str
+    source_name: str
     repaired: list[str] = field(init=False)
     dropped: list[str] = field(init=False)
     changed: list[str] = field(init=False)
@@ -124,4 +124,4 @@ class Conversion:
         """Raise MapError if there are more than `maximum` obstacles or vertices."""
         if count > maximum:
             hint = "--specks AREA drops small obstacles, --simplify METERS draws walls with fewer vertices"
-            raise MapError(f"{self.where}: expected at most {maximum} {noun}, got {count}: {hint}")
+            raise MapError(f"{self.source_name}: expected at most {maximum} {noun}, got {count}: {hint}")

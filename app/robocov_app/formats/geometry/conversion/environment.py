@@ -37,14 +37,16 @@ _MAX_DESCRIPTION_CHARACTERS = 10_000
 _MIN_REPORTED_MOVE_M = 1e-3
 
 
-def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
+def build_environment(
+    foreign: ForeignMap, shaping: Shaping, source_name: str
+) -> tuple[Environment, ImportReport]:
     """Convert a foreign map to an environment, and report the changes.
 
     Parameters
     ----------
     foreign : ForeignMap
     shaping : Shaping
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -58,7 +60,7 @@ def build_environment(foreign: ForeignMap, shaping: Shaping, where: str) -> tupl
     MapError
         If the map has no room for a robot, or if it is too large.
     """
-    conversion = Conversion(foreign, shaping, where)
+    conversion = Conversion(foreign, shaping, source_name)
     boundary_parts = build_valid_boundary(conversion)
     original = build_valid_free_space(conversion, boundary_parts)
     cleaned = _remove_hairs(original, conversion)
@@ -104,7 +106,7 @@ def _build_report(
         conversion.notes.append(describe_vertex_count(vertex_count))
     width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
     return ImportReport(
-        source=conversion.where,
+        source=conversion.source_name,
         format=foreign.format,
         vertices_read=foreign.vertices_read,
         vertices_kept=vertex_count,
@@ -189,7 +191,9 @@ def _simplify(unsimplified: MultiPolygon, original: MultiPolygon, conversion: Co
         simple = simplify_free_space(plan, allowed, foreign.cell, conversion.radius)
         free = round_polygons(simple.free, conversion.digits)
         if free.is_empty:
-            raise MapError(f"{conversion.where}: only {original.area:.3g} m² are free: is the scale right?")
+            raise MapError(
+                f"{conversion.source_name}: only {original.area:.3g} m² are free: is the scale right?"
+            )
         if measure_deviation(unsimplified, free).distance <= tolerance + conversion.grid:
             break
     conversion.changed += simple.changed
@@ -237,4 +241,4 @@ def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversio
         description=foreign.description[:_MAX_DESCRIPTION_CHARACTERS],
     )
     # Written and read again, so that the rules of map files hold and every imported map can be saved.
-    return from_json(to_json(environment), conversion.where)
+    return from_json(to_json(environment), conversion.source_name)

@@ -76,7 +76,9 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
         min_area = max(conversion.min_obstacle_area, min(MAX_CRUMB_M2, area[0]))
         stays = area >= min_area
     elif conversion.shaping.inside is not None:
-        stays = np.arange(len(parts)) == _find_part_at(conversion.shaping.inside, parts, conversion.where)
+        stays = np.arange(len(parts)) == _find_part_at(
+            conversion.shaping.inside, parts, conversion.source_name
+        )
     else:
         index = _find_enclosed_part(parts, conversion)
         is_enclosed = index is not None
@@ -87,7 +89,7 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
     if not kept:
         largest = f"no part of the free space is larger than {area[0]:.3g} m²"
         min_size = f"{conversion.min_obstacle_area:g} m²"
-        raise MapError(f"{conversion.where}: {largest}, expected one of at least {min_size}")
+        raise MapError(f"{conversion.source_name}: {largest}, expected one of at least {min_size}")
     offered_positions = _report_dropped_parts(parts, stays, conversion)
     if len(kept) > 1:
         conversion.notes.append(
@@ -135,7 +137,7 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
     return result
 
 
-def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], where: str) -> int:
+def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], source_name: str) -> int:
     """Return the index of the part that contains a position; raise MapError if none does."""
     distance = shapely.distance(parts, shapely.Point(position))
     nearest = int(np.argmin(distance))
@@ -143,7 +145,7 @@ def _find_part_at(position: tuple[float, float], parts: NDArray[np.object_], whe
         x, y = position
         free_x, free_y = _choose_position_in(parts[nearest])
         raise MapError(
-            f"{where}: inside: {x:.10g} {y:.10g} is solid, expected a free position; "
+            f"{source_name}: inside: {x:.10g} {y:.10g} is solid, expected a free position; "
             f"{free_x:.10g} {free_y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
         )
     return nearest

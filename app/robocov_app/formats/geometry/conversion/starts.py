@@ -129,7 +129,8 @@ def require_room(parts: list[Polygon], conversion: Conversion) -> None:
     max_radius = widest / (1 + MIN_START_GAP_RADII)
     reason = f"no position has enough clearance for a robot of radius {radius:g} m"
     raise MapError(
-        f"{conversion.where}: {reason} (the widest is for one of {max_radius:.3g} m): is the scale right?"
+        f"{conversion.source_name}: {reason} (the widest is for one of {max_radius:.3g} m): "
+        "is the scale right?"
     )
 
 

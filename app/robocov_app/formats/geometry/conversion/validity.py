@@ -48,10 +48,10 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
     MapError
         If a coordinate is not finite, or if nothing is free.
     """
-    where = conversion.where
+    source_name = conversion.source_name
     free = conversion.foreign.free
     if not np.isfinite(shapely.get_coordinates(free)).all():
-        raise MapError(f"{where}: expected finite coordinates")
+        raise MapError(f"{source_name}: expected finite coordinates")
     inside: BaseGeometry = shapely.transform(free, _round_to_zero)
     if not inside.is_valid:
         problem = "outlines crossed or touched themselves or each other"
@@ -65,7 +65,7 @@ def build_valid_free_space(conversion: Conversion, boundary: MultiPolygon | None
             conversion.dropped.append(f"{format_area(lost, 3)} of free space outside the boundary")
     valid = to_multipolygon(inside)
     if valid.is_empty:
-        raise MapError(f"{where}: there is no free space")
+        raise MapError(f"{source_name}: there is no free space")
     return valid
 
 

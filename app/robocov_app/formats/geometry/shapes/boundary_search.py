@@ -121,7 +121,7 @@ def _find_named_boundary(drawing: Drawing) -> Boundary | None:
         return Boundary(area, f"the shape called {quote(name)}", outlines, lines, is_named=True)
     if given_name is not None:
         reason = "encloses no area, expected a closed outline"
-        raise MapError(f"{drawing.where}: boundary {quote(given_name)}: {reason}")
+        raise MapError(f"{drawing.source_name}: boundary {quote(given_name)}: {reason}")
     return None
 
 

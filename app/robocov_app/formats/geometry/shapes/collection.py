@@ -46,7 +46,7 @@ class Shapes:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         The file, for messages.
     options : ReadOptions
 
@@ -67,13 +67,13 @@ class Shapes:
         See `ForeignMap`.
     """
 
-    def __init__(self, where: str, options: ReadOptions) -> None:
-        self.where = where
+    def __init__(self, source_name: str, options: ReadOptions) -> None:
+        self.source_name = source_name
         self.options = options
         self.outlines: list[ClosedOutline] = []
         self.lines: list[WallLine] = []
         self.pillars: list[CircleObstacle] = []
-        self.labels = LabelFilter(where, options)
+        self.labels = LabelFilter(source_name, options)
         self.omissions = Omissions()
         self.repairs = Repairs()
         self.vertices = 0
@@ -82,7 +82,7 @@ class Shapes:
         self.notes: list[str] = []
         self.cell: float | None = None
         self.page: Polygon | None = None
-        self._crossings = CrossingCounter(where)
+        self._crossings = CrossingCounter(source_name)
 
     def accept(self, labels: Iterable[str]) -> bool:
         """Return whether to read a shape with these labels; if not, count it as left out."""
@@ -195,7 +195,7 @@ class Shapes:
         """Add a wall; raise MapError if a coordinate or the width is out of range."""
         (points,) = self._check_rings([line.points], place)
         width = max(line.width, 0.0)
-        width_place = ": ".join(filter(None, (self.where, place, "width")))
+        width_place = ": ".join(filter(None, (self.source_name, place, "width")))
         files.require_length(width, width_place, 0.0)
         if width < MIN_SIZE_M:
             self.repairs.counts["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
@@ -265,7 +265,7 @@ class Shapes:
     def count_vertices(self, number: int) -> None:
         """Count vertices; raise MapError if the file has too many."""
         self.vertices += number
-        files.require_vertices(self.vertices, self.where)
+        files.require_vertices(self.vertices, self.source_name)
 
     def _check_rings(self, rings: Sequence[Array], place: str) -> list[Array]:
         """Count and round the points of rings; raise MapError if a coordinate is out of range."""
@@ -274,9 +274,9 @@ class Shapes:
             is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
             if not is_valid.all():
                 x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
-                location = self.where
+                location = self.source_name
                 if place:
-                    location = f"{self.where}: {place}"
+                    location = f"{self.source_name}: {place}"
                 expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
                 raise MapError(f"{location}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
@@ -316,7 +316,7 @@ class Shapes:
             omissions = "; ".join(self.omissions.describe())
             if omissions:
                 reason = f"{reason} ({omissions} left out)"
-            raise MapError(f"{self.where}: {reason}, expected a drawing")
+            raise MapError(f"{self.source_name}: {reason}, expected a drawing")
         result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
         if result.outside:
             self.count_omission("shape", "outside of the boundary", result.outside)
@@ -345,7 +345,7 @@ class Shapes:
     def _build_drawing(self, world: MultiPolygon | None) -> Drawing:
         """Collect the shapes as input of an interpretation; for `world`, see `build_foreign_map`."""
         return Drawing(
-            where=self.where,
+            source_name=self.source_name,
             outlines=self.outlines,
             lines=self.lines,
             pillars=self.pillars,

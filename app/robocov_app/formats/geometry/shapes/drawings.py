@@ -54,7 +54,7 @@ class Drawing:
 
     Attributes
     ----------
-    where : str
+    source_name : str
         The file, for messages.
     outlines : sequence of ClosedOutline
     lines : sequence of WallLine
@@ -67,7 +67,7 @@ class Drawing:
         The sheet of the drawing, a rectangle, if the format defines it.
     """
 
-    where: str
+    source_name: str
     outlines: Sequence[ClosedOutline]
     lines: Sequence[WallLine]
     pillars: Sequence[CircleObstacle]

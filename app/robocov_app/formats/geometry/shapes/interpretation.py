@@ -120,12 +120,14 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     )
 
 
-def require_size(bounds: Iterable[float], where: str, maximum: float = MAX_SIZE_M) -> None:
+def require_size(bounds: Iterable[float], source_name: str, maximum: float = MAX_SIZE_M) -> None:
     """Raise MapError if bounds (left, bottom, right, top), m, are larger than a map may be."""
     x, y, right, top = bounds
     if max(right - x, top - y) > maximum:
         expected = f"expected at most {MAX_SIZE_M / 1000:g} km"
-        raise MapError(f"{where}: {expected}, got {right - x:.6g} x {top - y:.6g} m: is the scale right?")
+        raise MapError(
+            f"{source_name}: {expected}, got {right - x:.6g} x {top - y:.6g} m: is the scale right?"
+        )
 
 
 def _require_measurable(drawing: Drawing) -> None:
@@ -134,9 +136,9 @@ def _require_measurable(drawing: Drawing) -> None:
     if drawing.world is not None:
         everything.append(drawing.world)
     # The shapes may extend beyond the size of a map, because only one of several parts need become the map.
-    require_size(shapely.total_bounds(everything), drawing.where, _MAX_EXTENT_M)
+    require_size(shapely.total_bounds(everything), drawing.source_name, _MAX_EXTENT_M)
     rings = shapely.get_rings(shapely.get_parts(drawing.areas))
-    CrossingCounter(drawing.where).add([*rings, *drawing.paths])
+    CrossingCounter(drawing.source_name).add([*rings, *drawing.paths])
 
 
 def _are_solid(drawing: Drawing, boundary: Boundary | None, *, solid: bool) -> bool:
@@ -166,8 +168,8 @@ def _build_region(
             region = boundary.area
     if region.is_empty:
         reason = "no closed outline, expected one that encloses free space"
-        raise MapError(f"{drawing.where}: {reason}")
-    require_size(region.geoms[0].bounds, drawing.where)
+        raise MapError(f"{drawing.source_name}: {reason}")
+    require_size(region.geoms[0].bounds, drawing.source_name)
     return region
 
 

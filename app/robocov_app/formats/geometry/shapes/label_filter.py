@@ -19,12 +19,12 @@ class LabelFilter:
         Labels of the shapes to leave out, in lower case.
     """
 
-    def __init__(self, where: str, options: ReadOptions) -> None:
+    def __init__(self, source_name: str, options: ReadOptions) -> None:
         self.only: set[str] | None = None
         if options.only is not None:
             self.only = set(map(str.casefold, options.only))
         self.skip = set(map(str.casefold, options.skip or ()))
-        self._where = where
+        self._where = source_name
         self._options = options
         self._known: dict[str, str] = {}
 

@@ -19,13 +19,13 @@ def is_picture(head: bytes) -> bool:
     return any(start.match(head) for start in (_NETPBM, *MAGIC_NUMBERS.values()))
 
 
-def read_picture(path: Path, where: str, key: ColorKey = _NO_KEY) -> Brightness:
+def read_picture(path: Path, source_name: str, key: ColorKey = _NO_KEY) -> Brightness:
     """Read and decode a picture file.
 
     Parameters
     ----------
     path : Path
-    where : str
+    source_name : str
         Name of the file for messages.
     key : ColorKey
         Declared colors, whose roles are found in the picture.
@@ -37,9 +37,9 @@ def read_picture(path: Path, where: str, key: ColorKey = _NO_KEY) -> Brightness:
     """
     data = files.read_content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
-        return decode_netpbm(data, where, key)
+        return decode_netpbm(data, source_name, key)
     for name, start in MAGIC_NUMBERS.items():
         if start.match(data):
-            return decode_with_pillow(data, name, where, key)
+            return decode_with_pillow(data, name, source_name, key)
     expected = "a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"
-    raise MapError(f"{where}: expected {expected}, got a file that begins with {quote(data[:8])}")
+    raise MapError(f"{source_name}: expected {expected}, got a file that begins with {quote(data[:8])}")

@@ -29,13 +29,13 @@ _MAX_NUMBER_DIGITS = 9
 _MAX_LEVEL = 65535
 
 
-def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
+def decode_netpbm(data: bytes, source_name: str, key: ColorKey) -> Brightness:
     """Decode a PGM or PPM, whose levels may be binary ("raw") or text ("plain").
 
     Parameters
     ----------
     data : bytes
-    where : str
+    source_name : str
         Name of the file for messages.
     key : ColorKey
         Declared colors, whose roles are found in the picture.
@@ -45,16 +45,16 @@ def decode_netpbm(data: bytes, where: str, key: ColorKey) -> Brightness:
     MapError
         If the picture is damaged or too large.
     """
-    header = _parse_header(data, where)
+    header = _parse_header(data, source_name)
     maximum = header.maximum
     if data[1:2] in b"56":  # P5 and P6 are binary, P2 and P3 are text
-        levels: Any = _decode_raw(data, header, where)
+        levels: Any = _decode_raw(data, header, source_name)
     else:
-        levels = _parse_plain(data[header.end :], header.level_count, where)
+        levels = _parse_plain(data[header.end :], header.level_count, source_name)
     highest = int(levels.max())
     if highest > maximum:
         expected = f"expected pixels of at most {maximum} (the maximum in the header)"
-        raise MapError(f"{where}: {expected}, got {highest}")
+        raise MapError(f"{source_name}: {expected}, got {highest}")
     pixels = levels.reshape(header.height, header.width, header.channels)
     roles = None
     if key:
@@ -99,7 +99,7 @@ class _Header(NamedTuple):
         return self.width * self.height * self.channels
 
 
-def _parse_header(data: bytes, where: str) -> _Header:
+def _parse_header(data: bytes, source_name: str) -> _Header:
     """Parse the header: type (P2, P3, P5 or P6), width, height and maximum level."""
     numbers = []
     position = 2  # after the type
@@ -112,20 +112,20 @@ def _parse_header(data: bytes, where: str) -> _Header:
             digits = _DIGITS.match(data, start)
         if digits is None or len(digits[0]) > _MAX_NUMBER_DIGITS:
             actual = quote(data[start:][:12])
-            raise MapError(f"{where}: {name}: expected a whole number, got {actual}")
+            raise MapError(f"{source_name}: {name}: expected a whole number, got {actual}")
         numbers.append(int(digits[0]))
         position = digits.end()
     width, height, maximum = numbers
-    files.require_cells(width, height, where)
+    files.require_cells(width, height, source_name)
     if not 1 <= maximum <= _MAX_LEVEL:
-        raise MapError(f"{where}: maximum: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
+        raise MapError(f"{source_name}: maximum: expected a number from 1 to {_MAX_LEVEL}, got {maximum}")
     channels = 1
     if data[1:2] in b"36":  # P3 and P6 are in color
         channels = 3
     return _Header(width, height, channels, maximum, position)
 
 
-def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
+def _decode_raw(data: bytes, header: _Header, source_name: str) -> Any:
     """Return the levels of a binary picture, of one or two bytes each; bytes after them are ignored."""
     raw: np.dtype[Any] = np.dtype(np.uint8)
     if header.maximum > 255:
@@ -138,15 +138,15 @@ def _decode_raw(data: bytes, header: _Header, where: str) -> Any:
         start = header.end + 2
     if len(data) - start < size:
         complete = max(0, len(data) - start) // raw.itemsize // header.channels
-        raise MapError(f"{where}: expected {count // header.channels} pixels, got {complete}")
+        raise MapError(f"{source_name}: expected {count // header.channels} pixels, got {complete}")
     return np.frombuffer(data, raw, count, start).astype(raw.newbyteorder("="), copy=False)
 
 
-def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
+def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16]:
     """Parse `count` levels that are written as text, piece by piece to limit the memory."""
     shortest = 2 * count - 1  # one digit for each level, with blanks between them
     if len(text) < shortest:
-        raise MapError(f"{where}: expected {count} pixels, got only {len(text)} bytes")
+        raise MapError(f"{source_name}: expected {count} pixels, got only {len(text)} bytes")
     if b"#" in text:
         text = re.sub(rb"#[^\r\n]*", b" ", text)
     values = np.empty(count, np.uint16)
@@ -162,16 +162,16 @@ def _parse_plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
         numbers = files.parse_integers(piece, " ")
         position = next_piece
         if numbers is None:
-            raise MapError(f"{where}: expected {count} whole numbers as pixels, got other text")
+            raise MapError(f"{source_name}: expected {count} whole numbers as pixels, got other text")
         numbers = numbers[: count - done]
         invalid = numbers[(numbers < 0) | (numbers > _MAX_LEVEL)]
         if len(invalid):
             worst = max(invalid)
             if min(invalid) < 0:
                 worst = min(invalid)
-            raise MapError(f"{where}: expected pixels from 0 to {_MAX_LEVEL}, got {worst}")
+            raise MapError(f"{source_name}: expected pixels from 0 to {_MAX_LEVEL}, got {worst}")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
     if done < count:
-        raise MapError(f"{where}: expected {count} pixels, got {done}")
+        raise MapError(f"{source_name}: expected {count} pixels, got {done}")
     return values

@@ -35,7 +35,7 @@ _MAX_16_BIT_LEVEL = 65535
 _MODES_WITH_ALPHA = ("LA", "PA", "RGBA", "La", "RGBa")
 
 
-def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Brightness:
+def decode_with_pillow(data: bytes, name: str, source_name: str, key: ColorKey) -> Brightness:
     """Decode a picture of one of the formats in `MAGIC_NUMBERS`.
 
     Parameters
@@ -43,7 +43,7 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
     data : bytes
     name : str
         Name of the format in Pillow.
-    where : str
+    source_name : str
         Name of the file for messages.
     key : ColorKey
         Declared colors, whose roles are found in the picture.
@@ -59,7 +59,7 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the limit of this application is lower
             with PIL.Image.open(io.BytesIO(data), formats=(name,)) as image:
-                files.require_cells(*image.size, where)
+                files.require_cells(*image.size, source_name)
                 if name == "JPEG" and image.width * image.height > _MAX_JPEG_PIXELS_PER_BYTE * len(data):
                     raise ValueError("cut off")
                 return _convert(image, key)
@@ -67,13 +67,13 @@ def decode_with_pillow(data: bytes, name: str, where: str, key: ColorKey) -> Bri
         raise
     except _UnclearSamplesError as error:
         way_out = "Save it with 8 bits, as gdal_translate -ot Byte -scale does"
-        raise MapError(f"{where}: a TIFF whose brightness is unclear: {error}. {way_out}.") from None
+        raise MapError(f"{source_name}: a TIFF whose brightness is unclear: {error}. {way_out}.") from None
     except PIL.Image.DecompressionBombError:
         millions = files.MAX_CELLS // 1_000_000
-        raise MapError(f"{where}: expected at most {millions} million pixels, got more") from None
+        raise MapError(f"{source_name}: expected at most {millions} million pixels, got more") from None
     except Exception as error:  # Pillow raises exceptions of any type for damaged chunks
         reason = to_one_line(error).partition(" <")[0][:100]
-        raise MapError(f"{where}: expected a complete {name}, got a broken one: {reason}") from None
+        raise MapError(f"{source_name}: expected a complete {name}, got a broken one: {reason}") from None
 
 
 class _UnclearSamplesError(ValueError):

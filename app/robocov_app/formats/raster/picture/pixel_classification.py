@@ -131,13 +131,13 @@ def is_on_transparent_ground(cells: Cells) -> bool:
     return bool(counts[FREE] < _MAX_LIGHT_RATIO * counts[BLOCKED] and counts[UNKNOWN] > counts[BLOCKED] > 0)
 
 
-def drop_strokes(cells: Cells, options: ReadOptions, cell: float, where: str) -> tuple[str, ...]:
+def drop_strokes(cells: Cells, options: ReadOptions, cell: float, source_name: str) -> tuple[str, ...]:
     """Make strokes thinner than the option ``min_stroke`` free in `cells`; return lines of the report."""
     width = options.compute_stroke_width(cell)
     pixels = math.ceil(width / cell - 1e-9)
     if pixels > MAX_STROKE_PIXELS:
         problem = f"expected at most {MAX_STROKE_PIXELS} pixels, got {pixels}"
-        raise MapError(f"{where}: min_stroke: {problem}")
+        raise MapError(f"{source_name}: min_stroke: {problem}")
     solid = cells == BLOCKED
     thin = solid & ~remove_thin_strokes(solid, pixels)
     count = int(np.count_nonzero(thin))
@@ -159,7 +159,7 @@ def _is_line_drawing(cells: Cells) -> bool:
     return not remove_thin_strokes(free, width).any()
 
 
-def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: str) -> None:
+def require_free_cells(cells: Cells, unknown: str, picture: Brightness, source_name: str) -> None:
     """Raise MapError if no cell is free, with the likely cause; `unknown` says what unknown cells become."""
     counts = np.bincount(cells.ravel(), minlength=3)
     if counts[FREE] or (unknown == "free" and counts[UNKNOWN]):
@@ -173,7 +173,7 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, where: s
         lightest = picture.level.max() / picture.max_level
         cause = f"its brightness is from {darkest:.2g} to {lightest:.2g}"
         advice = "--threshold, --invert or --free-color choose otherwise"
-    raise MapError(f"{where}: no cell is free: {cause} ({advice})")
+    raise MapError(f"{source_name}: no cell is free: {cause} ({advice})")
 
 
 def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str]:

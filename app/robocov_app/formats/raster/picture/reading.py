@@ -51,13 +51,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the picture is damaged, its scale is unknown, or no cell is free.
     """
-    where = to_one_line(path)
-    picture = read_picture(path, where, options.build_color_key(PICTURE_TOLERANCE))
+    source_name = to_one_line(path)
+    picture = read_picture(path, source_name, options.build_color_key(PICTURE_TOLERANCE))
     cell, origin = _parse_georeference(picture)
     if options.cell is not None:
         cell = options.cell
     if cell is None:
-        raise MapError(f"{where}: an image has no scale, {_describe_missing_scale(path)}")
+        raise MapError(f"{source_name}: an image has no scale, {_describe_missing_scale(path)}")
     cells, notes = classify_pixels(picture, options)
     unknown = options.unknown or "obstacle"
     if options.unknown is None and is_on_transparent_ground(cells):
@@ -65,13 +65,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         notes.append("only dark paint on a transparent ground, so transparent pixels are free")
     dropped: tuple[str, ...] = ()
     if options.min_stroke is not None:
-        dropped = drop_strokes(cells, options, cell, where)
-    require_free_cells(cells, unknown, picture, where)
+        dropped = drop_strokes(cells, options, cell, source_name)
+    require_free_cells(cells, unknown, picture, source_name)
     notes += describe_doubts(cells, unknown, picture)
     foreign = build_grid_map(
         cells,
         GridFrame(cell, origin),
-        where,
+        source_name,
         name=picture.texts.get(TITLE_CHUNK, "").strip() or path.stem,
         description=f"An image of {cell:g} m a pixel, imported.",
         unknown=unknown,

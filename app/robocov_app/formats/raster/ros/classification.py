@@ -23,7 +23,7 @@ _DEFAULT_OCCUPANCY = 0.5
 """Occupancy, from 0 to 1, at which a cell becomes an obstacle in the modes scale and raw."""
 
 
-def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, where: str) -> Cells:
+def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, source_name: str) -> Cells:
     """Classify the pixels of a picture as cells, according to the mode of its map.
 
     Parameters
@@ -31,7 +31,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
     picture : Brightness
     metadata : Metadata
     options : ReadOptions
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -55,7 +55,7 @@ def classify(picture: Brightness, metadata: Metadata, options: ReadOptions, wher
             threshold=threshold,
         )
     if options.threshold is not None:
-        raise ParameterError(f"--threshold: not applicable: {where} is of mode trinary")
+        raise ParameterError(f"--threshold: not applicable: {source_name} is of mode trinary")
     return classify_trinary(picture, negate=metadata.negate, free=metadata.free, occupied=metadata.occupied)
 
 

@@ -57,13 +57,13 @@ class Metadata:
     unknown_keys: tuple[str, ...]
 
 
-def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
+def parse_metadata(document: dict[str, files.Value], source_name: str) -> Metadata:
     """Parse and check the YAML of a map.
 
     Parameters
     ----------
     document : dict
-    where : str
+    source_name : str
         The file, for messages.
 
     Raises
@@ -71,11 +71,11 @@ def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
     MapError
         If a value is missing or invalid.
     """
-    parser = _MetadataParser(document, where)
+    parser = _MetadataParser(document, source_name)
     mode = parser.parse_mode()
     resolution = parser.parse_number("resolution")
     files.require_length(
-        resolution, f"{where}: resolution", minimum=_MIN_RESOLUTION_M, maximum=_MAX_RESOLUTION_M
+        resolution, f"{source_name}: resolution", minimum=_MIN_RESOLUTION_M, maximum=_MAX_RESOLUTION_M
     )
     x, y, yaw = parser.parse_origin()
     negate = parser.parse_negate()
@@ -97,9 +97,9 @@ def parse_metadata(document: dict[str, files.Value], where: str) -> Metadata:
 class _MetadataParser:
     """Parses the values in the YAML of a map."""
 
-    def __init__(self, document: dict[str, files.Value], where: str) -> None:
+    def __init__(self, document: dict[str, files.Value], source_name: str) -> None:
         self._document = document
-        self._where = where
+        self._where = source_name
 
     def get_text(self, key: str, default: str | None = None) -> str:
         """Return the text of a key; raise MapError if the key is missing and has no default."""
@@ -124,16 +124,16 @@ class _MetadataParser:
 
     def parse_origin(self) -> tuple[float, float, float]:
         """Return the pose of the lower left corner: x and y in m, and the yaw in rad."""
-        where = f"{self._where}: origin"
+        source_name = f"{self._where}: origin"
         origin = self._document.get("origin", ["0", "0", "0"])
         if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
-            raise MapError(f"{where}: expected [x, y, yaw], got {quote(origin)}")
+            raise MapError(f"{source_name}: expected [x, y, yaw], got {quote(origin)}")
         texts = [*origin, "0"]  # the yaw may be missing
-        x = _parse_number(texts[0], f"{where}[0]")
-        y = _parse_number(texts[1], f"{where}[1]")
-        yaw = _parse_number(texts[2], f"{where}[2]")
-        files.require_coordinate(x, f"{where}[0]")
-        files.require_coordinate(y, f"{where}[1]")
+        x = _parse_number(texts[0], f"{source_name}[0]")
+        y = _parse_number(texts[1], f"{source_name}[1]")
+        yaw = _parse_number(texts[2], f"{source_name}[2]")
+        files.require_coordinate(x, f"{source_name}[0]")
+        files.require_coordinate(y, f"{source_name}[1]")
         return x, y, yaw
 
     def parse_negate(self) -> bool:
@@ -153,9 +153,9 @@ class _MetadataParser:
         return occupied, free
 
 
-def _parse_number(text: files.Value, where: str) -> float:
+def _parse_number(text: files.Value, source_name: str) -> float:
     """Convert text to a finite number; raise MapError for invalid input."""
     value = files.parse_number(text) if isinstance(text, str) else math.nan
     if not math.isfinite(value):
-        raise MapError(f"{where}: expected a number, got {quote(text)}")
+        raise MapError(f"{source_name}: expected a number, got {quote(text)}")
     return value

@@ -43,23 +43,23 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     ParameterError
         If the option ``threshold`` is given for a map of mode trinary.
     """
-    where = to_one_line(path)
-    document = files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where)
-    metadata = parse_metadata(document, where)
+    source_name = to_one_line(path)
+    document = files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), source_name)
+    metadata = parse_metadata(document, source_name)
     repaired: list[str] = []
     image = files.find_named_file(
         path,
         metadata.image,
         "image",
-        place=f"{where}: image",
+        place=f"{source_name}: image",
         notes=repaired,
         allow_anywhere=options.anywhere,
     )
     picture = read_picture(image, to_one_line(image))
-    cells = classify(picture, metadata, options, where)
+    cells = classify(picture, metadata, options, source_name)
     transparency = _describe_transparency(picture, metadata.mode)
     if transparency and options.unknown != "free" and not (cells == FREE).any():
-        raise MapError(f"{where}: no cell is free: {transparency}")
+        raise MapError(f"{source_name}: no cell is free: {transparency}")
     if metadata.mode != "raw":
         repaired += _describe_missing_thresholds(metadata)
     yaw = math.remainder(metadata.yaw, 2 * math.pi)
@@ -72,7 +72,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return build_grid_map(
         cells,
         GridFrame(metadata.resolution, metadata.origin, yaw),
-        where,
+        source_name,
         name=path.stem,
         description=f"A ROS map of {metadata.resolution:g} m a cell, imported.",
         unknown=options.unknown or "obstacle",

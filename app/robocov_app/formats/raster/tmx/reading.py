@@ -53,14 +53,14 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         If both ``cell`` and ``scale`` are given.
     """
     root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
-    shapes = Shapes(root.where, options)
+    shapes = Shapes(root.source_name, options)
     orientation = root.attributes.get("orientation", "orthogonal")
     if orientation != "orthogonal":
         name = to_one_line(orientation)[:_MAX_QUOTED_CHARACTERS]
         root.raise_error(f"expected an orthogonal map, got {name}")
     tile = np.array([parse_integer(root, "tilewidth", 1), parse_integer(root, "tileheight", 1)], float)
     pixel = _choose_pixel_size(tile, options, shapes.notes)
-    files.require_length(pixel * float(tile.max()), f"{root.where}: the side of a tile")
+    files.require_length(pixel * float(tile.max()), f"{root.source_name}: the side of a tile")
     tiles = read_solid_tiles(root, path, shapes)
     layers = list_layers(root, shapes)
     tile_layers = read_tile_layers(root, [layer for layer in layers if layer.has_tiles])
@@ -74,9 +74,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes.labels.require_known_names()
     has_solid_cells = bool(is_solid.any())
     if not (has_solid_cells or shapes.outlines or shapes.lines or shapes.pillars):
-        _raise_nothing_solid_error(layers, root.where)
+        _raise_nothing_solid_error(layers, root.source_name)
     width, height = (pixel * tile).tolist()
-    world = outline_free_cells(~is_solid, (width, height), (0.0, 0.0), root.where)
+    world = outline_free_cells(~is_solid, (width, height), (0.0, 0.0), root.source_name)
     shapes.count_vertices(count_polygon_vertices(world))
     if has_solid_cells:
         shapes.cell = max(width, height)
@@ -96,8 +96,8 @@ def _choose_pixel_size(tile: Array, options: ReadOptions, notes: list[str]) -> f
     return cell / float(tile[0])
 
 
-def _raise_nothing_solid_error(layers: list[Layer], where: str) -> NoReturn:
+def _raise_nothing_solid_error(layers: list[Layer], source_name: str) -> NoReturn:
     names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
     problem = "nothing is solid by properties, collision objects or names of layers"
     expected = f"expected --only LAYER with one of walls: {names or 'there is none'}"
-    raise MapError(f"{where}: {problem}, {expected}")
+    raise MapError(f"{source_name}: {problem}, {expected}")

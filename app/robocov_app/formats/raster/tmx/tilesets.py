@@ -64,8 +64,8 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
             element_count += sum(1 for _ in tileset.iterate())
         if element_count > MAX_ELEMENTS:
             raise MapError(
-                f"{element.where}:{element.line}: expected at most {MAX_ELEMENTS} elements in all tilesets, "
-                "got more"
+                f"{element.source_name}:{element.line}: "
+                f"expected at most {MAX_ELEMENTS} elements in all tilesets, got more"
             )
         _add_solid_tiles(tileset, first_id, tiles)
     return tiles
@@ -73,7 +73,7 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
 
 def _read_file(element: Element, path: Path, shapes: Shapes, budget: files.IncludeBudget) -> Element:
     """Return the tileset in the file that an element names."""
-    place = f"{element.where}:{element.line}"
+    place = f"{element.source_name}:{element.line}"
     file = files.find_named_file(
         path,
         element.attributes["source"],

@@ -53,9 +53,11 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the file is damaged, too large, or contains no map.
     """
-    where = to_one_line(path)
-    shapes = Shapes(where, options)
-    root = Node(files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
+    source_name = to_one_line(path)
+    shapes = Shapes(source_name, options)
+    root = Node(
+        files.parse_yaml(files.read_content(path, files.MAX_YAML_BYTES), source_name), f"{source_name}: "
+    )
     world = root["world"]
     width = world["width"].parse_length(_DEFAULT_SIDE_M)
     height = world["height"].parse_length(_DEFAULT_SIDE_M)
@@ -89,7 +91,7 @@ def _read_free_space(world: Node, path: Path, shapes: Shapes, corner: Array, siz
     rows, columns = is_free.shape
     width, height = (size / [columns, rows]).tolist()
     x, y = corner.tolist()
-    free = outline_free_cells(is_free, (width, height), (x, y), shapes.where)
+    free = outline_free_cells(is_free, (width, height), (x, y), shapes.source_name)
     shapes.cell = max(width, height)
     shapes.count_vertices(count_polygon_vertices(free))
     return free

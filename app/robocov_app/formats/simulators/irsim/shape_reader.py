@@ -42,7 +42,7 @@ class ShapeReader:
         """
         # Compounds may turn a few objects into many shapes, so shapes are counted before they are built.
         self._count += 1
-        files.require_shapes(self._count, self._shapes.where)
+        files.require_shapes(self._count, self._shapes.source_name)
         name = shape["name"].get_text("circle").lower()
         # IR-SIM places the origin of a body with a wheelbase on the rear axle.
         shift = np.array([shape["wheelbase"].parse_number(0.0) / 2, 0.0])

@@ -57,14 +57,14 @@ class BitmapReader:
             self._bitmaps[file] = self._read(file, to_one_line(file))
         return self._bitmaps[file]
 
-    def _read(self, file: Path, where: str) -> Bitmap:
+    def _read(self, file: Path, source_name: str) -> Bitmap:
         """Decode a picture, and crop it to the bounding box of its dark pixels."""
-        picture = read_picture(file, where)
+        picture = read_picture(file, source_name)
         self._pixel_count += picture.level.size
         if self._pixel_count > files.MAX_CELLS:
             millions = files.MAX_CELLS // 1_000_000
             expected = f"expected at most {millions} million pixels in all bitmaps"
-            raise MapError(f"{where}: {expected}, got more")
+            raise MapError(f"{source_name}: {expected}, got more")
         is_dark = picture.level <= _MAX_DARK_LEVEL * picture.max_level
         transparency = describe_transparency(picture)
         if transparency:
@@ -74,12 +74,14 @@ class BitmapReader:
             if is_dark.any():
                 shade = "dark"
             cause = f": {transparency}" if transparency else ""
-            raise MapError(f"{where}: expected an image with dark walls, got only {shade} pixels{cause}")
+            raise MapError(
+                f"{source_name}: expected an image with dark walls, got only {shade} pixels{cause}"
+            )
         row = np.flatnonzero(is_dark.any(axis=1))
         column = np.flatnonzero(is_dark.any(axis=0))
         is_free = ~is_dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
         rows, columns = is_free.shape
         free = MultiPolygon()
         if is_free.any():
-            free = outline_free_cells(is_free, (1 / columns, 1 / rows), (-0.5, -0.5), where)
+            free = outline_free_cells(is_free, (1 / columns, 1 / rows), (-0.5, -0.5), source_name)
         return Bitmap(free, columns, rows)

@@ -86,14 +86,14 @@ class World(NamedTuple):
     macros: dict[str, Entity]
 
 
-def parse_world(tokens: deque[Token], where: str) -> World:
+def parse_world(tokens: deque[Token], source_name: str) -> World:
     """Parse the tokens of a world.
 
     Parameters
     ----------
     tokens : deque of Token
         The tokens; they are removed from the deque.
-    where : str
+    source_name : str
         The file, for messages.
 
     Raises
@@ -102,7 +102,7 @@ def parse_world(tokens: deque[Token], where: str) -> World:
         At the first syntax error.
     """
     parser = _EntityParser(tokens)
-    root = Entity("world", where)
+    root = Entity("world", source_name)
     parser.parse_content(root, 0)
     return World(root, parser.macros)
 

@@ -49,7 +49,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     find_file = partial(
         files.find_named_file, path, notes=shapes.notes, allow_anywhere=shapes.options.anywhere
     )
-    world = parse_world(read_tokens(path, find_file), shapes.where)
+    world = parse_world(read_tokens(path, find_file), shapes.source_name)
     placer = ModelPlacer(world, shapes, find_file)
     placer.place_all()
     floorplans = sorted(placer.floorplans, key=lambda floorplan: -floorplan.box.area)

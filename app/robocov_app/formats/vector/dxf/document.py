@@ -29,13 +29,13 @@ def sniff(path: Path, head: bytes) -> bool:
     return head.startswith(BINARY) or TEXT.match(head) is not None
 
 
-def load_document(path: Path, where: str) -> Any:
+def load_document(path: Path, source_name: str) -> Any:
     """Load a drawing, and repair it if it is damaged.
 
     Parameters
     ----------
     path : Path
-    where : str
+    source_name : str
         The file, for messages.
 
     Returns
@@ -47,12 +47,12 @@ def load_document(path: Path, where: str) -> Any:
     MapError
         If the file cannot be read, is too large, or ezdxf is not installed.
     """
-    _require_limits(files.read_content(path, files.MAX_TEXT_BYTES), where)
+    _require_limits(files.read_content(path, files.MAX_TEXT_BYTES), source_name)
     try:
         ezdxf = import_optional("ezdxf", "dxf")
         recover = import_optional("ezdxf.recover", "dxf")
     except RobocovError as error:
-        raise MapError(f"{where}: {error}") from None
+        raise MapError(f"{source_name}: {error}") from None
     # ezdxf logs its repairs; without a handler, they would appear among the messages of a command.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 
@@ -66,26 +66,26 @@ def load_document(path: Path, where: str) -> Any:
         try:
             return read(path)
         except OSError as error:
-            raise MapError(f"{where}: cannot be read: {error.strerror or error}") from None
+            raise MapError(f"{source_name}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # ezdxf raises exceptions of any type for a damaged file
             reason = to_one_line(error) or type(error).__name__
     reason = reason[:_MAX_REASON_CHARACTERS]
-    raise MapError(f"{where}: expected a readable DXF, got a damaged one: {reason}")
+    raise MapError(f"{source_name}: expected a readable DXF, got a damaged one: {reason}")
 
 
-def _require_limits(content: bytes, where: str) -> None:
+def _require_limits(content: bytes, source_name: str) -> None:
     """Raise MapError if a file is not a DXF, or would take too long to parse."""
     if not content.startswith(BINARY):
         if not TEXT.match(content):
             raise MapError(
-                f"{where}: expected a DXF with sections, got a file that begins with {content[:20]!r}"
+                f"{source_name}: expected a DXF with sections, got a file that begins with {content[:20]!r}"
             )
         if _count_matches(_ENTITY, content, MAX_ENTITIES) > MAX_ENTITIES:
-            raise MapError(f"{where}: expected at most {MAX_ENTITIES} entities, got more")
-        files.require_vertices(_count_matches(_POINT, content, files.MAX_VERTICES), where)
+            raise MapError(f"{source_name}: expected at most {MAX_ENTITIES} entities, got more")
+        files.require_vertices(_count_matches(_POINT, content, files.MAX_VERTICES), source_name)
     lines = content.count(b"\n")
     if lines > MAX_LINES:
-        raise MapError(f"{where}: expected at most {MAX_LINES} lines, got {lines}")
+        raise MapError(f"{source_name}: expected at most {MAX_LINES} lines, got {lines}")
 
 
 def _count_matches(pattern: re.Pattern[bytes], content: bytes, limit: int) -> int:

@@ -12,13 +12,13 @@ _MAX_PRINTED_COUNT = 10**300
 """Largest number that is printed: nested blocks may expand to more entities than a float can represent."""
 
 
-def require_few_entities(document: Any, where: str) -> None:
+def require_few_entities(document: Any, source_name: str) -> None:
     """Check the number of entities to draw before drawing them: a few kB of blocks may expand to billions.
 
     Parameters
     ----------
     document : ezdxf.document.Drawing
-    where : str
+    source_name : str
         The file, for messages.
 
     Raises
@@ -26,18 +26,18 @@ def require_few_entities(document: Any, where: str) -> None:
     MapError
         If there are more than `MAX_DRAWN_ENTITIES`, or a block is inserted into itself.
     """
-    count = _EntityCounter(document, where).count(document.modelspace())
+    count = _EntityCounter(document, source_name).count(document.modelspace())
     if count > MAX_DRAWN_ENTITIES:
         expected = f"expected at most {MAX_DRAWN_ENTITIES} entities to draw, including those in blocks"
-        raise MapError(f"{where}: {expected}, got {min(count, _MAX_PRINTED_COUNT):.3g}")
+        raise MapError(f"{source_name}: {expected}, got {min(count, _MAX_PRINTED_COUNT):.3g}")
 
 
 class _EntityCounter:
     """Counts entities, including those of inserted blocks. Each block is counted only once."""
 
-    def __init__(self, document: Any, where: str) -> None:
+    def __init__(self, document: Any, source_name: str) -> None:
         self._document = document
-        self._where = where
+        self._where = source_name
         self._counts: dict[str, int] = {}
         self._open_blocks: list[str] = []
 

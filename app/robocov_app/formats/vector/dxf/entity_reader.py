@@ -88,7 +88,7 @@ class EntityReader:
         MapError
             If there are too many entities, or if a coordinate is out of range.
         """
-        require_few_entities(self._document, self._shapes.where)
+        require_few_entities(self._document, self._shapes.source_name)
         self._add_entities(self._document.modelspace(), "0", ())
         if self._has_curves:
             self._shapes.notes.append(f"curves flattened to within {1000 * CURVE_TOLERANCE_M:g} mm")
@@ -107,8 +107,8 @@ class EntityReader:
         for entity in entities:
             self._drawn_count += 1
             if self._drawn_count > MAX_DRAWN_ENTITIES:
-                where = self._shapes.where
-                raise MapError(f"{where}: expected at most {MAX_DRAWN_ENTITIES} entities, got more")
+                source_name = self._shapes.source_name
+                raise MapError(f"{source_name}: expected at most {MAX_DRAWN_ENTITIES} entities, got more")
             try:
                 entity_layer = str(entity.dxf.get("layer", "0"))
                 if entity_layer == "0" and blocks:
@@ -267,7 +267,7 @@ class EntityReader:
     def _require_near(self, points: Array) -> None:
         """Raise MapError if points of a curve are out of range, because flattening it might never end."""
         if not (np.abs(points) * self._scale <= MAX_COORDINATE_M).all():
-            raise MapError(f"{self._shapes.where}: a curve beyond {MAX_COORDINATE_M:.0f} m")
+            raise MapError(f"{self._shapes.source_name}: a curve beyond {MAX_COORDINATE_M:.0f} m")
 
 
 def _describe_place(entity: Any) -> str:

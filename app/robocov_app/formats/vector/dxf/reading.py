@@ -36,18 +36,18 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the file is damaged, too large, or contains no map.
     """
-    where = to_one_line(path)
-    document = load_document(path, where)
-    scale, unit = _choose_scale(document, options.scale, where)
-    shapes = Shapes(where, options)
+    source_name = to_one_line(path)
+    document = load_document(path, source_name)
+    scale, unit = _choose_scale(document, options.scale, source_name)
+    shapes = Shapes(source_name, options)
     shapes.notes.append(unit)
     EntityReader(document, shapes, scale).add_all()
     shapes.join_lines()
-    files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
+    files.require_shapes(len(shapes.lines) + len(shapes.outlines), source_name)
     return shapes.build_foreign_map(files.get_map_name(path), "Imported from DXF.", solid=True)
 
 
-def _choose_scale(document: Any, scale: float | None, where: str) -> tuple[float, str]:
+def _choose_scale(document: Any, scale: float | None, source_name: str) -> tuple[float, str]:
     """Return the size of a unit in meters, and a note about it; raise MapError if it is unknown."""
     if scale is not None:
         return scale, f"a unit is {scale:g} m"
@@ -56,4 +56,4 @@ def _choose_scale(document: Any, scale: float | None, where: str) -> tuple[float
         name, size = UNITS[code]
         return size, f"in {name}"
     hint = "--scale METERS gives it, as in --scale 0.001 for millimeters"
-    raise MapError(f"{where}: $INSUNITS: expected a unit, got {code}: {hint}")
+    raise MapError(f"{source_name}: $INSUNITS: expected a unit, got {code}: {hint}")

@@ -51,7 +51,7 @@ _MAX_DESCRIPTION_CHARACTERS = 1000
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     """Read an SVG drawing; raise MapError if it is damaged, too large or too small, or contains no map."""
     root = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
-    shapes = Shapes(root.where, options)
+    shapes = Shapes(root.source_name, options)
     drawing = _DrawingReader(root, shapes)
     try:
         matrix, width, height = _compute_page(root.attributes, options.scale)
@@ -83,7 +83,7 @@ def _require_size(shapes: Shapes) -> None:
     if max(right - x, top - y) < _MIN_SIZE_M:
         hint = "--scale METERS gives the size of a unit, as in --scale 0.01"
         got = f"{right - x:.3g} x {top - y:.3g} m at its own scale"
-        raise MapError(f"{shapes.where}: expected at least {_MIN_SIZE_M:g} m, got {got}: {hint}")
+        raise MapError(f"{shapes.source_name}: expected at least {_MIN_SIZE_M:g} m, got {got}: {hint}")
 
 
 def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
@@ -126,7 +126,7 @@ class _DrawingReader:
         """Collect the style sheets of the drawing, and its elements by id."""
         self.root = root
         self.shapes = shapes
-        self.sheet = StyleSheet(root.where)
+        self.sheet = StyleSheet(root.source_name)
         self.clipped_count = 0
         self._elements_by_id: dict[str, Element] = {}
         for element in root.iterate():
@@ -163,8 +163,8 @@ class _DrawingReader:
         counts = _ElementCounter(self).count(self.root, 0)
         if counts[0] > MAX_ELEMENTS:
             expected = f"expected at most {MAX_ELEMENTS} elements to draw, including uses"
-            raise MapError(f"{self.root.where}: {expected}, got {counts[0]:.3g}")
-        require_shapes(counts[1], self.root.where)
+            raise MapError(f"{self.root.source_name}: {expected}, got {counts[0]:.3g}")
+        require_shapes(counts[1], self.root.source_name)
 
     def find_target(self, element: Element) -> Element | None:
         """Return the element that a ``use`` element refers to, or None if it is not in this file."""

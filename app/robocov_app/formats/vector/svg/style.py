@@ -70,7 +70,7 @@ class StyleSheet:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         The file, for messages.
 
     Attributes
@@ -79,9 +79,9 @@ class StyleSheet:
         Number of rules that are not supported, such as @supports.
     """
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, source_name: str) -> None:
         self.unsupported_count = 0
-        self._where = where
+        self._where = source_name
         self._rules_by_name: dict[str, list[_StyleRule]] = {}
         self._rule_count = 0
         self._characters = 0

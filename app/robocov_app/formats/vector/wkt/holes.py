@@ -45,10 +45,10 @@ def exclude_holes(geometries: list[SourceGeometry], shapes: Shapes) -> list[Sour
         holes += [Polygon(ring) for ring in polygon.interiors]
     if len(polygons) < 2 or not holes:
         return geometries
-    CrossingCounter(shapes.where).add(list(shapely.get_rings(polygons)))
+    CrossingCounter(shapes.source_name).add(list(shapely.get_rings(polygons)))
     indices = list(valid)
     remainders: dict[int, MultiPolygon] = {}
-    for k, overlapping_holes in _group_overlapping_holes(holes, polygons, shapes.where).items():
+    for k, overlapping_holes in _group_overlapping_holes(holes, polygons, shapes.source_name).items():
         remainder = shapely.difference(polygons[k], unite(overlapping_holes))
         remainders[indices[k]] = to_multipolygon(remainder)
     if not remainders:
@@ -71,17 +71,17 @@ def _build_valid_polygons(geometries: list[SourceGeometry]) -> dict[int, Polygon
 
 
 def _group_overlapping_holes(
-    holes: list[Polygon], polygons: list[Polygon], where: str
+    holes: list[Polygon], polygons: list[Polygon], source_name: str
 ) -> dict[int, list[Polygon]]:
     """Return the holes that overlap each polygon, keyed by the polygon's index."""
     groups: dict[int, list[Polygon]] = {}
-    for hole, k in _find_overlaps(holes, polygons, where):
+    for hole, k in _find_overlaps(holes, polygons, source_name):
         groups.setdefault(k, []).append(hole)
     return groups
 
 
 def _find_overlaps(
-    holes: list[Polygon], polygons: list[Polygon], where: str
+    holes: list[Polygon], polygons: list[Polygon], source_name: str
 ) -> Iterator[tuple[Polygon, int]]:
     """Yield the pairs of a hole and the index of a polygon that overlaps it but is not inside it."""
     tree = shapely.STRtree(polygons)
@@ -92,7 +92,7 @@ def _find_overlaps(
         pair_count += len(hole_index)
         if pair_count > MAX_OVERLAPS:
             limit = f"at most {MAX_OVERLAPS} overlaps of holes and polygons"
-            raise MapError(f"{where}: expected {limit}, got more")
+            raise MapError(f"{source_name}: expected {limit}, got more")
         paired_holes = batch[hole_index]
         paired_polygons = tree.geometries[polygon_index]
         have_common_area = shapely.relate_pattern(paired_holes, paired_polygons, "T********")

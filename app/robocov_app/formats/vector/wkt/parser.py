@@ -78,7 +78,7 @@ class WktParser:
     Parameters
     ----------
     text : str
-    where : str
+    source_name : str
         The file, for messages.
     shapes : Shapes
         Counts geometries that are left out or repaired.
@@ -89,11 +89,11 @@ class WktParser:
         Number of the reference system that the geometries name.
     """
 
-    def __init__(self, text: str, where: str, shapes: Shapes) -> None:
+    def __init__(self, text: str, source_name: str, shapes: Shapes) -> None:
         # Comments become spaces of the same length, so that positions in messages are right.
         text = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
         self.srid: int | None = None
-        self._scanner = Scanner(text, where)
+        self._scanner = Scanner(text, source_name)
         self._shapes = shapes
         self._geometries: list[SourceGeometry] = []
         self._parsers: dict[str, Callable[[_Geometry], None]] = {

@@ -27,9 +27,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     MapError
         If the file is damaged, too large, or contains no map.
     """
-    text, where = read_text(path, b",")
-    shapes = Shapes(where, options)
-    parser = WktParser(text, where, shapes)
+    text, source_name = read_text(path, b",")
+    shapes = Shapes(source_name, options)
+    parser = WktParser(text, source_name, shapes)
     geometries = parser.parse()
     system = f"EPSG:{parser.srid}" if parser.srid else None
     geometries = convert_to_meters(geometries, shapes, system)

@@ -18,7 +18,7 @@ class Scanner:
     Parameters
     ----------
     text : str
-    where : str
+    source_name : str
         The file, for messages.
 
     Attributes
@@ -28,10 +28,10 @@ class Scanner:
         Index of the next character.
     """
 
-    def __init__(self, text: str, where: str) -> None:
+    def __init__(self, text: str, source_name: str) -> None:
         self.text = text
         self.position = 0
-        self._where = where
+        self._where = source_name
 
     def skip_space(self) -> None:
         """Move past white space."""

@@ -40,7 +40,7 @@ def _load_density(model: Any, context: Any) -> Density | None:
     if model is None:
         return None
     boundary = context.get_environment(0).boundary
-    return parse_density(model.model_dump(exclude_none=True, warnings=False), boundary, context.where)
+    return parse_density(model.model_dump(exclude_none=True, warnings=False), boundary, context.source_name)
 
 
 def _dump_density(density: Density | None, _: object) -> object:

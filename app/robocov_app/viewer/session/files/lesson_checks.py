@@ -10,14 +10,14 @@ from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel
 _Path = tuple[str | int, ...]
 
 
-def check_lesson_references(lesson: LessonModel, where: str, nodes: Sequence[Node]) -> None:
+def check_lesson_references(lesson: LessonModel, source_name: str, nodes: Sequence[Node]) -> None:
     """Check that the chapters of a lesson refer only to existing edits and robots, and that they can end.
 
     Parameters
     ----------
     lesson : LessonModel
         The lesson.
-    where : str
+    source_name : str
         Name of the file, for messages.
     nodes : sequence of Node
         The edits of the session.
@@ -32,12 +32,12 @@ def check_lesson_references(lesson: LessonModel, where: str, nodes: Sequence[Nod
         path: _Path = ("lesson", "chapters", index)
         if chapter.edit >= len(nodes):
             expected = f"the index of an edit, 0 to {len(nodes) - 1}"
-            refuse_value(where, (*path, "edit"), chapter.edit, expected)
-        _check_answer(chapter, where, path)
-        _check_robot(chapter.robot, where, (*path, "robot"), robot_count)
-        _check_condition(chapter.until, where, (*path, "until"), robot_count)
+            refuse_value(source_name, (*path, "edit"), chapter.edit, expected)
+        _check_answer(chapter, source_name, path)
+        _check_robot(chapter.robot, source_name, (*path, "robot"), robot_count)
+        _check_condition(chapter.until, source_name, (*path, "until"), robot_count)
         if chapter.task is not None:
-            _check_condition(chapter.task.until, where, (*path, "task", "until"), robot_count)
+            _check_condition(chapter.task.until, source_name, (*path, "task", "until"), robot_count)
 
 
 def count_robots(nodes: Iterable[Node]) -> int:
@@ -52,19 +52,19 @@ def count_robots(nodes: Iterable[Node]) -> int:
     return count
 
 
-def _check_answer(chapter: ChapterModel, where: str, path: _Path) -> None:
+def _check_answer(chapter: ChapterModel, source_name: str, path: _Path) -> None:
     question = chapter.question
     if question is not None and question.right > len(question.answers):
         expected = f"the number of an answer, 1 to {len(question.answers)}"
-        refuse_value(where, (*path, "question", "right"), question.right, expected)
+        refuse_value(source_name, (*path, "question", "right"), question.right, expected)
 
 
-def _check_robot(robot: int | None, where: str, path: _Path, robot_count: int) -> None:
+def _check_robot(robot: int | None, source_name: str, path: _Path, robot_count: int) -> None:
     if robot is not None and robot > robot_count:
-        refuse_value(where, path, robot, f"a robot of the session, 1 to {robot_count}")
+        refuse_value(source_name, path, robot, f"a robot of the session, 1 to {robot_count}")
 
 
-def _check_condition(condition: ConditionModel, where: str, path: _Path, robot_count: int) -> None:
+def _check_condition(condition: ConditionModel, source_name: str, path: _Path, robot_count: int) -> None:
     """Check that a condition can be fulfilled: it has one, and a robot and a box belong together."""
     boxes = {"inside": condition.inside, "outside": condition.outside}
     has_box = any(box is not None for box in boxes.values())
@@ -72,8 +72,8 @@ def _check_condition(condition: ConditionModel, where: str, path: _Path, robot_c
     content = condition.model_dump(exclude_none=True)
     if not content or has_robot != has_box:
         expected = '"step", "settled", "mean_distance_below", or "robot" with "inside" or "outside"'
-        refuse_value(where, path, content, expected)
-    _check_robot(condition.robot, where, (*path, "robot"), robot_count)
+        refuse_value(source_name, path, content, expected)
+    _check_robot(condition.robot, source_name, (*path, "robot"), robot_count)
     for name, box in boxes.items():
         if box is not None and not (box[0] < box[2] and box[1] < box[3]):
-            refuse_value(where, (*path, name), box, "[left, bottom, right, top]")
+            refuse_value(source_name, (*path, name), box, "[left, bottom, right, top]")

@@ -37,12 +37,12 @@ _DIGESTS_WITH_DESCRIPTION = {
 """Digests of the bundled maps in sessions of earlier versions, whose digests included the description."""
 
 
-def refuse_value(where: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
+def refuse_value(source_name: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
     """Raise a MapError about a value in a session file.
 
     Parameters
     ----------
-    where : str
+    source_name : str
         Name of the file.
     path : tuple of str and int
         JSON path of the value.
@@ -52,7 +52,7 @@ def refuse_value(where: str, path: tuple[str | int, ...], value: object, expecte
         Description of the expected value.
     """
     message = f"expected {expected}, got {quote_json(value)}"
-    raise MapError.from_issues(where, [Issue.at_path(path, message)])
+    raise MapError.from_issues(source_name, [Issue.at_path(path, message)])
 
 
 class FileContext:
@@ -60,7 +60,7 @@ class FileContext:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         Name of the file.
     controllers : collection of str
         Controllers in users' files that may be loaded, as the user has named them.
@@ -71,8 +71,8 @@ class FileContext:
         The maps as represented in the file.
     """
 
-    def __init__(self, where: str = "", controllers: Collection[str] = ()) -> None:
-        self.where = where
+    def __init__(self, source_name: str = "", controllers: Collection[str] = ()) -> None:
+        self.source_name = source_name
         self.controllers = controllers
         self.maps: list[Any] = []
         self._environments: dict[int, Environment] = {}
@@ -108,19 +108,19 @@ class FileContext:
             return from_json(content)
         except MapError as error:
             message = f"maps[{number}]: {str(error).removeprefix('map: ')}"
-            raise MapError.from_issues(self.where, [Issue(("maps", number), message)]) from None
+            raise MapError.from_issues(self.source_name, [Issue(("maps", number), message)]) from None
 
     def _load_bundled_map(self, number: int, content: BundledMapModel) -> Environment:
         if content.bundled not in list_bundled_maps():
             path = ("maps", number, "bundled")
-            refuse_value(self.where, path, content.bundled, "the name of a bundled map")
+            refuse_value(self.source_name, path, content.bundled, "the name of a bundled map")
         environment = load_map(content.bundled)
         digest = _compute_digest(to_json(environment))
         if content.digest not in (digest, _DIGESTS_WITH_DESCRIPTION.get(content.bundled)):
             expected = quote_json(digest)
             reason = f"the bundled map {quote(content.bundled)} has changed since the session was saved"
             message = f"expected {expected}, got {quote_json(content.digest)}: {reason}"
-            raise MapError.from_issues(self.where, [Issue.at_path(("maps", number, "digest"), message)])
+            raise MapError.from_issues(self.source_name, [Issue.at_path(("maps", number, "digest"), message)])
         return environment
 
 

@@ -184,22 +184,22 @@ def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
         If the file cannot be used. The message names the file, line and column, and the JSON path.
     """
     text = read_bytes(path)
-    where = str(path)
-    content = parse_json(text, where)
+    source_name = str(path)
+    content = parse_json(text, source_name)
     try:
-        return parse_session(content, where, controllers)
+        return parse_session(content, source_name, controllers)
     except MapError as error:
-        raise locate_issues(error, text, where) from None
+        raise locate_issues(error, text, source_name) from None
 
 
-def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -> SavedSession:
+def parse_session(content: Any, source_name: str, controllers: Collection[str] = ()) -> SavedSession:
     """Read the content of a session file.
 
     Parameters
     ----------
     content : object
         The JSON content.
-    where : str
+    source_name : str
         Name of the file, for messages.
     controllers : collection of str
         Controllers in users' files that may be loaded, as the user has named them.
@@ -213,22 +213,22 @@ def parse_session(content: Any, where: str, controllers: Collection[str] = ()) -
     MapError
         If the content cannot be used.
     """
-    check_header(content, where, FORMAT, VERSION)
+    check_header(content, source_name, FORMAT, VERSION)
     try:
-        model = SessionModel.model_validate(content, context=FileContext(where, controllers))
+        model = SessionModel.model_validate(content, context=FileContext(source_name, controllers))
     except ValidationError as error:
-        raise build_document_error(error, where, _build_issue) from None
+        raise build_document_error(error, source_name, _build_issue) from None
     nodes: list[Node] = []
     for node_model in model.edits:
-        nodes.append(_NodeReader(where, nodes).read(node_model))
+        nodes.append(_NodeReader(source_name, nodes).read(node_model))
     if model.head >= len(nodes):
-        refuse_value(where, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
+        refuse_value(source_name, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
     head = nodes[model.head]
     if not head.first_step <= model.step <= head.last_step:
         expected = f"a step of the head, {head.first_step} to {head.last_step}"
-        refuse_value(where, ("step",), model.step, expected)
+        refuse_value(source_name, ("step",), model.step, expected)
     if model.lesson is not None:
-        check_lesson_references(model.lesson, where, nodes)
+        check_lesson_references(model.lesson, source_name, nodes)
     return SavedSession(SessionDocument(nodes), head, model.step, model.view, model.lesson)
 
 
@@ -237,14 +237,14 @@ class _NodeReader:
 
     Parameters
     ----------
-    where : str
+    source_name : str
         Name of the file, for messages.
     nodes : list of Node
         The earlier nodes.
     """
 
-    def __init__(self, where: str, nodes: list[Node]) -> None:
-        self._where = where
+    def __init__(self, source_name: str, nodes: list[Node]) -> None:
+        self._where = source_name
         self._nodes = nodes
 
     def read(self, model: NodeModel) -> Node:
