@@ -66,7 +66,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     out: Path | None = None
     """Folder for the frames of --frames: 000000.png, 000001.png, ..."""
     video: Path | None = None
-    """MP4 file to render without a display; with --tour, all of the tour."""
+    """MP4 file to render without a display; with --tour or --lesson, the whole lesson."""
 
     def __post_init__(self) -> None:
         """Check that the options are in range and do not contradict each other."""
@@ -91,8 +91,8 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
             raise ParameterError("--serve: cannot be combined with --frames or --video")
         if self.video is None:
             return
-        if self.frames is None and not self.tour:
-            raise ParameterError("--video: requires --frames N or --tour")
+        if self.frames is None and not self.tour and self.lesson is None:
+            raise ParameterError("--video: requires --frames N, --tour or --lesson FILE")
         if self.video.suffix.lower() != ".mp4":
             raise ParameterError(f"--video: expected a name ending in .mp4, got {str(self.video)!r}")
 
@@ -301,9 +301,13 @@ def _open_window(launcher: ViewerLauncher, options: Arguments) -> int:
 
 def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
     """Start the lesson or the tour that the options select, if any."""
+    if options.lesson is None and not options.tour:
+        return
+    # The class sees this session when the lesson has ended; it starts when the user plays it.
+    window.viewer.session.playback.is_playing = False
     if options.lesson is not None:
         window.lesson.start(options.lesson)
-    elif options.tour:
+    else:
         window.do("tour")
 
 
@@ -325,8 +329,8 @@ def _render(launcher: ViewerLauncher, options: Arguments) -> int:
             assert window.lesson.player is not None
             count = round(window.lesson.player.duration * HEADLESS_FPS)
         with show_progress("frames", count) as update:
-            stops_at_tour_end = options.frames is None
-            frames = _draw_frames(window, count, interruption, update, stops_at_tour_end=stops_at_tour_end)
+            stops_at_end = options.frames is None
+            frames = _draw_frames(window, count, interruption, update, stops_at_lesson_end=stops_at_end)
             folder = None
             if result is not None:
                 folder = result.staging
@@ -343,20 +347,20 @@ def _draw_frames(
     interruption: Interruption,
     update: Callable[[int], None],
     *,
-    stops_at_tour_end: bool,
+    stops_at_lesson_end: bool,
 ) -> Iterator[Frame]:
-    """Draw frames of the window until `count` are drawn, the tour is over, or the user interrupts.
+    """Draw frames of the window until `count` are drawn, the lesson is over, or the user interrupts.
 
-    The end of the tour only counts with `stops_at_tour_end`. `update` is called with the number of drawn
+    The end of the lesson only counts with `stops_at_lesson_end`. `update` is called with the number of drawn
     frames.
     """
     from robocov_app.viewer.launch import HEADLESS_FPS
     from robocov_app.viewer.window.screen_video import copy_pixels
 
     for number in range(1, count + 1):
-        # The lesson has no player once its tour has ended.
-        is_tour_over = stops_at_tour_end and window.lesson.player is None
-        if interruption.requested or is_tour_over:
+        # There is no player once the lesson has ended.
+        is_lesson_over = stops_at_lesson_end and window.lesson.player is None
+        if interruption.requested or is_lesson_over:
             return
         window.run_frame(1.0 / HEADLESS_FPS)
         yield copy_pixels(window.screen)

@@ -58,7 +58,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
     ]
     duration = result.facts.get("duration_s")
     if duration is not None:
-        facts.append(("Duration", f"{duration:.6g} s"))
+        facts.append(("Duration", f"{duration:.4g} s"))
     period = result.facts.get("dt_s")
     if period is not None:
         facts.append(("Control period", f"{1000 * period:.4g} ms"))

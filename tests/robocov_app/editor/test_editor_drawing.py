@@ -209,9 +209,10 @@ def test_doors_are_opened_by_a_click_and_by_dragging(driver: EditorDriver) -> No
     assert [wall.points for wall in driver.shapes] == [((1, 2), (2.55, 2)), ((3.45, 2), (9, 2))]
     driver.type("1.2")
     driver.press_key("return")
+    assert [wall.points for wall in driver.shapes] == [((1, 2), (2.4, 2)), ((3.6, 2), (9, 2))]
     driver.wait()
     driver.click_at((6, 2))
-    assert [wall.points[0][0] for wall in driver.shapes] == [1, 3.45, 6.6]
+    assert [wall.points[0][0] for wall in driver.shapes] == [1, 3.6, 6.6]
     driver.wait()
     driver.drag_at((7, 2), (7.5, 2), (8, 2))
     assert [wall.points for wall in driver.shapes][2:] == [((6.6, 2), (7, 2)), ((8, 2), (9, 2))]

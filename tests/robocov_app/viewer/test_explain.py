@@ -22,7 +22,7 @@ from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 def test_format_direction():
     angles = np.arange(8) * np.pi / 4
     directions = [format_direction(complex(np.cos(angle), np.sin(angle))) for angle in angles]
-    assert directions == "east north-east north north-west west south-west south south-east".split()
+    assert directions == "east northeast north northwest west southwest south southeast".split()
     assert format_direction(0j) == ""
     assert format_direction(-1 - 1e-9j) == "west"
     assert format_direction(complex(2.0, 5e-324)) == "east"
@@ -90,7 +90,7 @@ def test_each_force_is_described_with_its_cause():
 def test_robots_at_similar_distances_are_named_together():
     report = build_report([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
     pushed = (
-        "pushed with 0.36 N south-east by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
+        "pushed with 0.36 N southeast by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
     )
     assert get_line(report, "repulsion_robots").text == pushed
 
@@ -210,10 +210,10 @@ def test_arrival_near_a_goal_inside_an_obstacle():
 @pytest.mark.parametrize(
     ("velocity", "force", "verdict"),
     [
-        ((0.58, 0.58), (0, 0), "moving 0.82 m/s north-east to its goal"),
+        ((0.58, 0.58), (0, 0), "moving 0.82 m/s northeast to its goal"),
         ((-0.5, 0), (-1, 0), "moving 0.50 m/s west, its goal is 2.8 m away"),
-        ((0.5, 0.5), (-3, -3), "braking from 0.71 m/s north-east, its goal is 2.8 m away"),
-        ((0.02, 0), (1, 1), "setting off north-east to its goal"),
+        ((0.5, 0.5), (-3, -3), "braking from 0.71 m/s northeast, its goal is 2.8 m away"),
+        ((0.02, 0), (1, 1), "setting off northeast to its goal"),
         ((0.02, 0), (-1, 0), "setting off west"),
     ],
 )
@@ -301,7 +301,7 @@ def test_unexplained_forces_are_described():
     windy = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
     assert (
         get_line(windy, UNEXPLAINED_FORCE).text
-        == "pushed with 1.1 N south-east by other forces of its controller"
+        == "pushed with 1.1 N southeast by other forces of its controller"
     )
     for report in (calm, windy):
         assert_forces_sum_up(report)
@@ -335,8 +335,7 @@ def test_braking_before_the_goal_is_not_described_as_a_pull():
     assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
     aside = build_report([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
     assert (
-        get_line(aside, "attraction").text
-        == "pulled with 1.4 N north-east on the way to its goal, 2.0 m away"
+        get_line(aside, "attraction").text == "pulled with 1.4 N northeast on the way to its goal, 2.0 m away"
     )
 
 

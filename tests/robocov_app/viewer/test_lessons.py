@@ -199,6 +199,36 @@ def test_the_closing_page_says_what_was_found_out(tmp_path: Path) -> None:
     assert LESSON.next_steps
 
 
+def test_an_own_lesson_can_be_played_again(tmp_path: Path) -> None:
+    path = write_short_lesson(tmp_path)
+    with open_viewer(tmp_path) as driver:
+        advance_session(driver.session, 10)
+        driver.window.lesson.start(path)
+        driver.window.lesson.end()
+        assert driver.viewer.message == "The lesson has ended; your session from before is back"
+        driver.press_key("f2")
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        assert lesson.lesson.title == "Two"
+
+
+def test_an_own_lesson_becomes_a_video(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(player, "READING_S", 0.1)
+    path = write_short_lesson(tmp_path)
+    video = tmp_path / "two.mp4"
+    assert main(["demo", "--lesson", str(path), "--video", str(video), "--size", "900x600"]) == 0
+    assert video.stat().st_size > 0
+    assert f"saved {video}" in capsys.readouterr().out
+
+
+def test_a_lesson_shows_no_branches_of_other_chapters(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.press_key("f2")
+        driver.run_frames(3)
+        assert driver.window.lesson.player is not None
+        assert driver.window.chart.branch_lines == []
+
+
 def test_a_lesson_can_be_paused_left_and_resumed(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False

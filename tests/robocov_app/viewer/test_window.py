@@ -313,7 +313,7 @@ def test_the_lesson_ends_by_a_key(driver: Driver) -> None:
     assert driver.window.lesson.player is None
     assert driver.viewer.view.layers == shown
     assert driver.viewer.session is driver.session
-    assert driver.viewer.message == "The lesson has ended; your session from before is back"
+    assert driver.viewer.message == "The lesson has ended; F2 plays it again"
 
 
 def test_the_lesson_pauses_when_the_arena_is_clicked(driver: Driver) -> None:

@@ -149,7 +149,7 @@ def parse_weight(text: str) -> float:
 def describe_density(density: Density | None) -> str:
     """Describe a density in a few words, for example "2 hot spots, floor 0.5"."""
     if density is None:
-        return "none: all positions have the same weight"
+        return "none: equal everywhere"
     if isinstance(density, Gaussians):
         return f"{format_count(len(density.peaks), 'hot spot')}, floor {density.floor:g}"
     if isinstance(density, Raster):
@@ -236,7 +236,7 @@ def _check_area(area: WeightedArea) -> WeightedArea:
 
 def _round_sigma(sigma: float) -> float:
     is_possible = create.MIN_DRAWN_LENGTH_M <= sigma <= MAX_SIZE_M
-    require(is_possible, "a hot spot needs a size: drag from its middle outwards")
+    require(is_possible, "a hot spot needs a size: drag from its middle outward")
     return round_length(sigma)
 
 

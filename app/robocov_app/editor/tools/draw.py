@@ -230,7 +230,7 @@ class MeasureTool(LineTool):
     name = "measure"
     title = "Measure"
     key = "m"
-    hint = "click points, or drag; “level” turns the map so that the line lies level; Esc removes the tape"
+    hint = "click points, or drag; “level” turns the map until the line is level; Esc clears the measurement"
     allows_drag = True
 
     @property
@@ -372,7 +372,7 @@ class CircleTool(DrawTool):
     name = "circle"
     title = "Circle"
     key = "c"
-    hint = "drag from the middle to the rim, or click both; type the radius for meters"
+    hint = "drag from the center to the rim, or click both; type the radius for meters"
     max_points = 2
     allows_drag = True
 
@@ -397,7 +397,7 @@ class DiscTool(CircleTool):
     name = "disc"
     title = "Start disc"
     key = "s"
-    hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for meters"
+    hint = "drag from the center to the rim: the robots start somewhere in it; type the radius for meters"
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the start."""

@@ -51,7 +51,7 @@ class SelectTool(EditorTool):
     name = "select"
     title = "Select"
     key = "v"
-    hint = "click or drag a box; drag to move, Alt-drag to copy; double click on an edge inserts a vertex"
+    hint = "click or drag a box; drag to move, Alt-drag to copy; double-click an edge to insert a vertex"
     snaps = False
 
     def __init__(self) -> None:

@@ -67,7 +67,13 @@ def list_branch_lines(timeline: Timeline) -> list[BranchLine]:
     document = timeline.document
     dt = timeline.scenario.dt
     present_path = document.get_path(timeline.head)
-    others = [branch for branch in document.list_branches() if branch.node not in present_path]
+    root = present_path[0]
+    # The chapters of a lesson are runs of their own, which share no time with the displayed one.
+    others = [
+        branch
+        for branch in document.list_branches()
+        if branch.node not in present_path and document.get_path(branch.node)[0] is root
+    ]
     paths = [present_path]
     lines: list[BranchLine] = []
     for branch in others[-MAX_BRANCH_LINES:]:

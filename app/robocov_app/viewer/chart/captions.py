@@ -89,7 +89,8 @@ def _draw_caption(
     value = values[pane.number]
     text = f"{value:.3f}"
     if len(values) > 1:
-        text += format_gap(value, min(values.values()))
+        if len(set(values.values())) > 1:
+            text += format_gap(value, min(values.values()))
         width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
         text = _add_name(canvas, pane.controller.label, text, width)
     canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)

@@ -150,7 +150,7 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
     group.add("branch:previous", "Previous branch", previous_branch, "alt+left")
     group.add("branch:next", "Next branch", next_branch, "alt+right")
     group.add("time", "Go to a time", playback.show_time, argument=time_argument)
-    group.add("branch", "Enter a branch", playback.go_to_branch, argument=branch_argument)
+    group.add("branch", "Go to a branch", playback.go_to_branch, argument=branch_argument)
     return group.commands
 
 

@@ -13,14 +13,14 @@ _ONE_DECIMAL = 0.995
 _TWO_DECIMALS = 0.00995
 _MIN_NUMBER = 0.005
 """Smaller numbers are rounded to 0."""
-_DIRECTIONS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+_DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 
 
 def format_direction(vector: complex) -> str:
     """Return the nearest of eight compass directions of a vector x + i y; empty for a zero vector.
 
     >>> format_direction(1 + 1j)
-    'north-east'
+    'northeast'
     """
     if not vector:
         return ""

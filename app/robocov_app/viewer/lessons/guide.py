@@ -63,6 +63,7 @@ class LessonGuide:
         self.player: LessonPlayer | None = None
         self.click_areas: list[ClickArea] = []
         self.is_unattended = is_unattended
+        self._path = FIRST_LESSON  # of the current lesson, or of the last one
         self._viewer = viewer
         self._fit_view = fit_view
         self._scroll_key: object = None  # the text that is scrolled
@@ -99,12 +100,13 @@ class LessonGuide:
             If the lesson cannot be loaded.
         """
         saved = load_lesson(path)
+        self._path = path
         self.player = LessonPlayer(self._viewer, self._fit_view, saved, is_unattended=self.is_unattended)
 
     def toggle(self) -> None:
-        """Start the first lesson; if there is a lesson, leave it or return to it."""
+        """Leave the lesson or return to it; if none is open, start the last one, or the first lesson."""
         if self.player is None:
-            self.start()
+            self.start(self._path)
         elif self.player.state is LessonState.LEFT:
             self.player.skip(0)
         else:

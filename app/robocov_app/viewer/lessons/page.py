@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import pygame
 
+from robocov.errors import format_count
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
@@ -120,7 +121,7 @@ _PAGE_HINT = "Space: stay · F2: play freely · Esc: end"
 _CLOSING_TITLE = "What you found out"
 _NEXT_TITLE = "Try next"
 _DEFAULT_NEXT_STEPS = (
-    "Press Esc, then draw a wall in a doorway (W).",
+    "End the lesson, then draw a wall (W) and see how the robots react.",
     "Let a robot fail (D), and watch its neighbors.",
     "Compare two controllers on a map of your own (K).",
 )
@@ -301,7 +302,8 @@ class LessonPage:
         self._write_title(_CLOSING_TITLE)
         right_count, answer_count = lesson.score
         if answer_count:
-            text = f"{right_count} of {answer_count} predictions were right."
+            predictions = format_count(answer_count, "prediction")
+            text = f"You got {right_count} of {predictions} right."
             self._write_paragraph(text, self.theme.accent)
             self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:

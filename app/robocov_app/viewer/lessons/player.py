@@ -290,10 +290,13 @@ class LessonPlayer:
 
     @property
     def duration(self) -> float:
-        """Duration of the lesson in an unattended window, s of real time."""
+        """Maximum duration of the lesson in an unattended window, s of real time."""
         duration = 0.0
         for chapter in self.lesson.chapters:
-            duration += (chapter.until.step or 0) / STEPS_PER_SECOND / chapter.speed
+            simulated_s = MAX_TASK_S
+            if chapter.until.step is not None:
+                simulated_s = chapter.until.step / STEPS_PER_SECOND
+            duration += simulated_s / chapter.speed
             duration += READING_S + _CHAPTER_CHANGE_S
             if chapter.question is not None:
                 duration += READING_S
@@ -402,7 +405,10 @@ class LessonPlayer:
         viewer.show_session(before.workspace.session)
         viewer.files.map_name = before.map_name
         viewer.inspection.selected = before.selected
-        viewer.show_message("the lesson has ended; your session from before is back")
+        message = "the lesson has ended; F2 plays it again"
+        if before.workspace.session.timeline.end_time > 0.0:
+            message = "the lesson has ended; your session from before is back"
+        viewer.show_message(message)
         self._fit_view()
         self.is_done = True
 

@@ -107,8 +107,8 @@ def trace_outline(free: BoolArray, source_name: str) -> MultiPolygon:
     if not len(corners.row):
         return MultiPolygon()
     order, starts = _connect_rings(_pair_vertically(corners), corners.is_north_east_free)
-    # At the first corner of an outer ring, the free cell is north-east of it. If that cell is not free, the
-    # ring is a hole, and the cell south-west of the corner is free.
+    # At the first corner of an outer ring, the free cell is northeast of it. If that cell is not free, the
+    # ring is a hole, and the cell southwest of the corner is free.
     first = order[starts]
     is_hole = ~corners.is_north_east_free[first]
     part = ndimage.label(free)[0][corners.row[first] - is_hole, corners.column[first] - is_hole]
@@ -137,7 +137,7 @@ class _Corners(NamedTuple):
     neck : array
         Length of the neck, in cells; 0 where no obstacles touch.
     is_north_east_free : array of bool
-        Whether the cell north-east of the corner is free.
+        Whether the cell northeast of the corner is free.
     """
 
     column: IntArray
