@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 FAILED = 1
 """Exit status of a sweep with failed runs."""
 
+_AXIS_LABELS = {"starts": "starts of all maps"}
+"""Labels of the parameters of a study whose names would be misunderstood in an estimate."""
+
 
 @dataclass
 class Arguments(JsonOption):
@@ -116,7 +119,7 @@ def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
     """Return the estimate of a sweep as lines of text."""
     from robocov_app.sweep.progress import format_duration
 
-    lines = [f"{name:<20} {count:>7}" for name, count in estimate.axes.items()]
+    lines = [f"{_AXIS_LABELS.get(name, name):<20} {count:>7}" for name, count in estimate.axes.items()]
     runs = f"{'runs':<20} {estimate.runs:>7}"
     finished = estimate.runs - estimate.left
     if finished:

@@ -124,9 +124,12 @@ def _list_reasons(reasons: Sequence[str]) -> str:
 def list_problems(result: ReportedResult) -> list[str]:
     """Describe in how many runs there were contacts, stuck robots, and teams that had not settled."""
     runs = result.completed_runs
+    stuck_problem = "a robot was stuck at the end"
+    if len(runs) == 1 and (runs[0].figures.get("stuck_robots") or 0) > 1:
+        stuck_problem = f"{runs[0].figures['stuck_robots']} robots were stuck at the end"
     counts = {
         "a robot touched a wall or another one": sum((run.figures.get("contacts") or 0) > 0 for run in runs),
-        "a robot was stuck at the end": sum((run.figures.get("stuck_robots") or 0) > 0 for run in runs),
+        stuck_problem: sum((run.figures.get("stuck_robots") or 0) > 0 for run in runs),
         "the team had not settled by the end": sum(_is_unsettled(run) for run in runs),
     }
     problems = {problem: count for problem, count in counts.items() if count}

@@ -109,7 +109,7 @@ class Comparison(Drawable):
             cells = [
                 row["controller"],
                 f"{row['mean_distance_m']:.3f}",
-                f"{100 * row['above_best']:.1f} %",
+                f"{row['above_best']:.1%}",
                 "-" if settled is None else f"{settled:.1f}",
                 str(row["contacts"]),
                 f"{row['mean_path_length_m']:.1f}",

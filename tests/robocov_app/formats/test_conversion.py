@@ -72,6 +72,9 @@ def test_a_large_omitted_part_is_noted() -> None:
         "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
     )
     assert build_environment(build_foreign_map(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
+    # A speck next to it, such as the inside of a letter, is not offered.
+    _, report = build_environment(build_foreign_map(CLOSET, ROOM, box(30, 0, 30.2, 0.2)), Shaping(), "plan")
+    assert len(report.others) == 1
     assert "stays" not in join_lines(
         build_environment(build_foreign_map(CLOSET, ROOM), Shaping(keep="all"), "plan")[1]
     )

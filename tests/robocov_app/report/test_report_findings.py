@@ -89,6 +89,8 @@ def test_problems_are_counted() -> None:
 def test_problems_of_a_single_run_are_not_counted() -> None:
     stuck_run = build_run(settled_at_s=1.0, stuck_robots=1)
     assert list_problems(build_result([stuck_run])) == ["A robot was stuck at the end."]
+    two_stuck = build_run(settled_at_s=1.0, stuck_robots=2)
+    assert list_problems(build_result([two_stuck])) == ["2 robots were stuck at the end."]
     assert list_problems(build_result([build_run(settled_at_s=1.0)])) == []
     assert list_problems(build_result([build_run(error="no")])) == []
 

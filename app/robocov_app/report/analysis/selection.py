@@ -14,8 +14,8 @@ from robocov_app.report.results.result import ReportedResult, ReportedRun
 MAX_SHOWN_RUNS = 50
 """Maximum number of runs of a result that a page shows."""
 _CRITERIA = (
-    "the best and the worst run of each controller by its final mean distance, and the most typical case "
-    "(start and seed) of all controllers, with the gains used in the comparison"
+    "the best and the worst run of each controller by its final mean distance, with any gains, and the most "
+    "typical case (start and seed) of all controllers, with the gains of the comparison in pairs"
 )
 
 

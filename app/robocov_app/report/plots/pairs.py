@@ -49,5 +49,6 @@ def _list_rows(comparison: GroupComparison, styles: GroupStyles) -> list[Pairs]:
             ratios = pairs.first_distances / pairs.second_distances
             rows.append(Pairs(pairs.map_name, style, ratios, pairs.ratio))
     map_ratios = np.array([pairs.ratio.estimate for pairs in maps])
-    rows.append(Pairs(f"all {len(maps)} maps", style, map_ratios, comparison.ratio))
+    label = "both maps" if len(maps) == 2 else f"all {len(maps)} maps"
+    rows.append(Pairs(label, style, map_ratios, comparison.ratio))
     return rows

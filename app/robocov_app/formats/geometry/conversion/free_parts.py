@@ -24,6 +24,8 @@ _MIN_KEPT_SHARE = 0.5
 _LARGE_PART_SHARE = 0.1
 """If a dropped part is a larger share of the free area, the report offers it, too."""
 _MAX_OFFERED_PARTS = 3
+_MIN_OFFERED_SHARE = 0.01
+"""The report offers no part below this fraction of the largest dropped one, such as the inside of letters."""
 _MIN_PAGE_EDGE_SHARE = 0.2
 """The largest part may be the paper around a plan if it borders on this fraction of the edge of the page."""
 _MIN_PLAN_SHARE = 0.05
@@ -220,7 +222,8 @@ def _report_dropped_parts(
     share = area[stays].sum() / area.sum()
     if share >= _MIN_KEPT_SHARE and dropped[0].area / area.sum() <= _LARGE_PART_SHARE:
         return ()
-    offered = dropped[:_MAX_OFFERED_PARTS]
+    min_area = _MIN_OFFERED_SHARE * dropped[0].area
+    offered = [part for part in dropped[:_MAX_OFFERED_PARTS] if part.area >= min_area]
     positions = tuple(_choose_position_in(part) for part in offered)
     choices = [
         f"--inside {x:.10g} {y:.10g} ({format_area(part.area, 3)})"
