@@ -6,12 +6,10 @@ and a turning rate ω. In every substep, the acceleration of the point determine
 motion:
 
 - The turning rate. The point would have the velocity v h + τ a after the response time τ = 0.2 s. The
-unicycle
-  turns toward this velocity, which differs from the heading by the angle e: ω* = e / τ, limited by the
-  maximum turning rate, and by the rate from which the wheels can still stop at e = 0.
+  unicycle turns toward this velocity, which differs from the heading by the angle e: ω* = e / τ, limited by
+  the maximum turning rate, and by the rate from which the wheels can still stop at e = 0.
 - The speed. It changes by the acceleration along the heading, a·h. Across the heading, turning provides only
-the
-  acceleration v ω. If the point would accelerate more, the unicycle brakes by the difference:
+  the acceleration v ω. If the point would accelerate more, the unicycle brakes by the difference:
   v* = v + dt (a·h - max(0, |a × h| - v ω)), but at least 0.
 
 The unicycle thus turns in place if the point would start in another direction, and drives once it nearly
@@ -25,8 +23,7 @@ to Aicardi, Casalino, Bicchi and Balestrino (1995) and Astolfi (1999). Their tex
 Guarantees:
 
 - Neither the wheels nor the turning rate exceed their limits. In a substep, a unicycle gains no more speed
-than
-  the point would along the heading.
+  than the point would along the heading.
 - If the point would brake along the heading, the unicycle brakes just as hard, at once and without turning.
 - There is no sideways slip, except in contact and under external forces. Under an external force, a unicycle
   moves as a point and keeps its heading. When the force ends, the wheels stop the sideways part of its
