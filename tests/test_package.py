@@ -15,6 +15,7 @@ import pytest
 from hatchling.builders.sdist import SdistBuilder
 from hatchling.builders.wheel import WheelBuilder
 
+from robocov import __version__
 from robocov_app.cli import main
 from robocov_app.commands import handbook
 
@@ -39,6 +40,15 @@ def test_the_description_names_the_extras_and_links_to_nothing() -> None:
     named = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|.*?\|", TEXT, re.M))))
     assert named == EXTRAS.keys() - {"all", "test", "bench"}
     assert not re.findall(r"\]\(|<\w+", TEXT), "pictures and pages of the repository are not on an index"
+
+
+def test_references_name_the_current_version() -> None:
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"\nversion: {__version__}\n" in citation
+    recipes = (ROOT / "app/handbook/recipes.md").read_text()
+    assert f"version = {{{__version__}}}" in recipes
+    title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
+    assert title is not None and f"title   = {{{title[1]}}}" in recipes
 
 
 def test_a_bundled_handbook_is_used(
