@@ -33,8 +33,8 @@ _SCALED_NOTE = f"{_SCALED_HEADING}: divided by the median over all runs on the s
 _SEVERAL_RUNS_NOTE = (
     "Numbers with brackets are medians over runs, with the quartiles in brackets. Over the run: the mean "
     "distance, averaged over time. Contacts: runs in which a robot touched a wall or another robot. "
-    "Clearance: the smallest gap to a wall in any run. Stuck robots: the mean number of robots that have stopped away "
-    "from their goals; a dash if they have no goals."
+    "Clearance: the smallest gap to a wall in any run. Stuck robots: the mean number of robots that have "
+    "stopped away from their goals; a dash if they have no goals."
 )
 _REFERENCE_NOTE = (
     f"Above J_ref: J/J_ref − 1 of the final mean distance; J_ref is the lowest of {RESTARTS} "
