@@ -207,7 +207,7 @@ def _search_weighted(
     convex, or almost without mass, keep their centroids.
     """
     is_convex = shapes.clearances > _MIN_WEIGHTED_CLEARANCE * shapes.half_perimeters
-    has_mass = cells.mass > _MIN_MEAN_DENSITY * density.max_value * shapes.areas
+    has_mass = cells.masses > _MIN_MEAN_DENSITY * density.max_value * shapes.areas
     search = _start_search(centroids, is_convex & has_mass)
     for _ in range(_MAX_WEIGHTED_ITERATIONS + 1):
         if not search.is_active.any():

@@ -30,12 +30,12 @@ class Cells(ABC):
 
     generators: Array
     """(n, 2) m, the points to which the cells belong."""
-    mass: Array
+    masses: Array
     """(n,) m², M of equation (2): the area of each cell if the density is 1."""
     centroid: Array
     """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
-    """φ, the density of mass, centroid and moments; None stands for 1 everywhere."""
+    """φ, the density of masses, centroids and moments; None stands for 1 everywhere."""
     triangulation: NDArray[np.int32] | None = None
     """Triangulation from which the partition of slightly moved generators can start, or None."""
 

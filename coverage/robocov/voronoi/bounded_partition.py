@@ -45,7 +45,7 @@ class VoronoiPartition(Cells):
     ----------
     generators : (n, 2) array, m
         The point to which each cell belongs.
-    mass : (n,) array, m²
+    masses : (n,) array, m²
         Mass M of each cell, equation (2). It is the area if the density is 1.
     centroid : (n, 2) array, m
         Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
@@ -150,7 +150,7 @@ def partition(
     >>> import robocov as rc
     >>> square = rc.Region(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]))
     >>> halves = rc.partition(np.array([[0.5, 1.0], [1.5, 1.0]]), square)
-    >>> halves.mass, halves.adjacency
+    >>> halves.masses, halves.adjacency
     (array([2., 2.]), array([[0, 1]]))
     """
     points = to_generators(generators)
@@ -170,7 +170,7 @@ def partition(
     mesh.setflags(write=False)
     voronoi_cells = VoronoiPartition(
         generators=points,
-        mass=cells.masses,
+        masses=cells.masses,
         centroid=cells.centroids,
         triangulation=mesh if mesh.shape[1] > 0 else None,
         _compute_edges=partial(_compute_edges, points, region.sides, neighbor_positions, mesh, edge_count),
@@ -251,12 +251,12 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     """
     cells.density = density
     if density is not None and density.is_uniform:
-        cells.mass = cells.mass * density.max_value
+        cells.masses = cells.masses * density.max_value
     elif density is not None:
-        cells.mass, cells.centroid = density.compute_masses_and_centroids(
-            cells.edges, cells.generators, cells.mass, cells.centroid
+        cells.masses, cells.centroid = density.compute_masses_and_centroids(
+            cells.edges, cells.generators, cells.masses, cells.centroid
         )
-    for values in (cells.generators, cells.mass, cells.centroid):
+    for values in (cells.generators, cells.masses, cells.centroid):
         values.setflags(write=False)
     return cells
 

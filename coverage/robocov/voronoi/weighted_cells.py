@@ -58,7 +58,7 @@ class WeightedCells(Cells):
     ----------
     generators : (n, 2) array, m
         The position of the robot to which each cell belongs.
-    mass : (n,) array, m²
+    masses : (n,) array, m²
         Mass M of each cell, equation (2). It is the area if the density is 1.
     centroid : (n, 2) array, m
         Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
@@ -85,7 +85,7 @@ class WeightedCells(Cells):
     >>> square = rc.Region([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     >>> positions = np.array([[0.5, 1.0], [1.5, 1.0]])
     >>> cells = rc.partition_by_travel_time(positions, np.array([0.5, 1.0]), square)
-    >>> bool(cells.mass[0] < cells.mass[1]), round(float(cells.mass.sum()), 9)
+    >>> bool(cells.masses[0] < cells.masses[1]), round(float(cells.masses.sum()), 9)
     (True, 4.0)
     """
 
@@ -133,7 +133,7 @@ class WeightedCells(Cells):
             return super().polar_moment
         weight = 1.0 if self.density is None else self.density.max_value
         moments = compute_moments(self.pieces, cell_count=len(self.generators))
-        return np.where(self.mass > 0.0, weight * moments[:, POLAR_MOMENT], 0.0)
+        return np.where(self.masses > 0.0, weight * moments[:, POLAR_MOMENT], 0.0)
 
 
 def partition_by_travel_time(
@@ -192,7 +192,7 @@ def partition_by_travel_time(
     >>> import robocov as rc
     >>> square = rc.Region(np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]))
     >>> cells = rc.partition_by_travel_time(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([1.0, 2.0]), square)
-    >>> bool(abs(cells.mass[0] - np.pi * 2.0**2) < 1e-12), cells.centroid[0].round(12).tolist()
+    >>> bool(abs(cells.masses[0] - np.pi * 2.0**2) < 1e-12), cells.centroid[0].round(12).tolist()
     (True, [-1.0, 0.0])
     """
     points = to_generators(generators)
@@ -253,12 +253,12 @@ def _compute_weighted_cells(
     centroids = points + first_moments / np.where(masses > 0.0, masses, np.inf)[:, None]
     # A cell without arcs is one of the polygons. Take the mass and centroid that were computed for the
     # polygon, so that their last bits do not depend on the presence of other robots.
-    masses = np.where(is_straight, polygons.mass, masses)
+    masses = np.where(is_straight, polygons.masses, masses)
     centroids = np.where(is_straight[:, None], polygons.centroid, centroids)
     speeds.setflags(write=False)
     return WeightedCells(
         generators=points,
-        mass=masses,
+        masses=masses,
         centroid=centroids,
         speeds=speeds,
         pieces=pieces,

@@ -324,7 +324,7 @@ def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: in
     for i in range(n):
         known_positions = np.concatenate([positions[i : i + 1], reported[robot == i]])
         own_cells = partition(known_positions, SQUARE)
-        assert cells.mass[i] == pytest.approx(own_cells.mass[0], rel=1e-9, abs=1e-12)
+        assert cells.masses[i] == pytest.approx(own_cells.masses[0], rel=1e-9, abs=1e-12)
         np.testing.assert_allclose(cells.centroid[i], own_cells.centroid[0], atol=1e-9)
         other_cells = cells.edges.other_cells[cells.edges.cells == i]
         assert set(other_cells.tolist()) <= {-1, *other[robot == i].tolist()}
@@ -339,7 +339,7 @@ def test_cells_by_true_reports_equal_ordinary_cells(n: int) -> None:
     _, other = neighbors.list_pairs()
     ordinary = partition(positions, SQUARE, neighbors)
     by_reports = partition(positions, SQUARE, neighbors, reported_positions=positions[other])
-    assert by_reports.mass.tobytes() == ordinary.mass.tobytes()
+    assert by_reports.masses.tobytes() == ordinary.masses.tobytes()
     assert by_reports.centroid.tobytes() == ordinary.centroid.tobytes()
 
 

@@ -74,7 +74,7 @@ def test_a_disc_that_contains_the_cell_changes_nothing(radius: float) -> None:
     positions = np.random.default_rng(1).uniform((2, 1), (10, 7), size=(9, 2))
     cells = partition(positions, REGION)
     area, offsets = compute_disc_limited_moments(cells.edges, np.full(9, radius))
-    np.testing.assert_allclose(area, cells.mass, rtol=1e-12)
+    np.testing.assert_allclose(area, cells.masses, rtol=1e-12)
     np.testing.assert_allclose(positions + offsets, cells.centroid, rtol=1e-12)
 
 

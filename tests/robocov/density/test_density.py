@@ -42,7 +42,7 @@ def test_mass_centroid_and_polar_moment_agree_with_quadrature(density):
         mass, centroid, polar = integrate_on_fine_lattice(density, ring, cells.generators[k])
         is_smooth = isinstance(density, Uniform | Gaussians)
         tolerance = 2e-4 if is_smooth else 8e-3
-        assert cells.mass[k] == pytest.approx(mass, rel=tolerance)
+        assert cells.masses[k] == pytest.approx(mass, rel=tolerance)
         assert_allclose(cells.centroid[k], centroid, atol=tolerance)
         assert cells.polar_moment[k] == pytest.approx(polar, rel=2 * tolerance)
 
@@ -55,11 +55,11 @@ def test_moments_of_cells_add_up_to_those_of_the_region(density, seed, count):
     points = np.random.default_rng(seed).uniform((0.0, 0.0), (8.0, 8.0), (count, 2))
     cells = build_cells(density, points, SQUARE)
     region_cell = build_cells(density, [[4.0, 4.0]], SQUARE)
-    assert cells.mass.sum() == pytest.approx(region_cell.mass[0], rel=1e-11)
-    first_moment = region_cell.mass[0] * region_cell.centroid[0]
-    assert_allclose(cells.mass @ cells.centroid, first_moment, rtol=1e-10)
+    assert cells.masses.sum() == pytest.approx(region_cell.masses[0], rel=1e-11)
+    first_moment = region_cell.masses[0] * region_cell.centroid[0]
+    assert_allclose(cells.masses @ cells.centroid, first_moment, rtol=1e-10)
     lever = np.square(cells.centroid - [4.0, 4.0]).sum(axis=1)
-    polar_moments = compute_moment_about_centroid(cells) + cells.mass * lever
+    polar_moments = compute_moment_about_centroid(cells) + cells.masses * lever
     assert polar_moments.sum() == pytest.approx(region_cell.polar_moment[0], rel=1e-10)
 
 
@@ -85,7 +85,7 @@ def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(dens
     i = int(rng.integers(5))
     cells = build_cells(density, points, SQUARE)
     step = 1e-5
-    slope = 2.0 * cells.mass[i] * (points[i] - cells.centroid[i])
+    slope = 2.0 * cells.masses[i] * (points[i] - cells.centroid[i])
     for axis in (0, 1):
         costs = []
         for sign in (1.0, -1.0):
@@ -93,7 +93,7 @@ def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(dens
             moved[i, axis] += sign * step
             costs.append(build_cells(density, moved, SQUARE).polar_moment.sum())
         difference_quotient = (costs[0] - costs[1]) / (2 * step)
-        assert difference_quotient == pytest.approx(slope[axis], abs=1e-4 * cells.mass.sum())
+        assert difference_quotient == pytest.approx(slope[axis], abs=1e-4 * cells.masses.sum())
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
@@ -105,7 +105,7 @@ def test_voronoi_cells_are_the_best_partition(density):
     for _ in range(5):
         cells = build_cells(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
         squared_lever = np.square(points - cells.centroid).sum(axis=1)
-        assert (compute_moment_about_centroid(cells) + cells.mass * squared_lever).sum() > best
+        assert (compute_moment_about_centroid(cells) + cells.masses * squared_lever).sum() > best
 
 
 @pytest.mark.parametrize("count", [5, 30])
@@ -113,10 +113,10 @@ def test_a_density_of_one_equals_no_density_to_the_last_bit(count):
     points = np.random.default_rng(3).uniform(1.0, 6.0, (count, 2))
     plain = build_cells(None, points)
     uniform = build_cells(Uniform(), points)
-    assert np.array_equal(plain.mass, uniform.mass)
+    assert np.array_equal(plain.masses, uniform.masses)
     assert np.array_equal(plain.centroid, uniform.centroid)
     assert np.array_equal(plain.polar_moment, uniform.polar_moment)
-    assert_allclose(build_cells(Uniform(3.0), points).mass, 3.0 * plain.mass, rtol=1e-15)
+    assert_allclose(build_cells(Uniform(3.0), points).masses, 3.0 * plain.masses, rtol=1e-15)
     assert np.array_equal(build_cells(Uniform(3.0), points).centroid, plain.centroid)
     assert np.array_equal(build_cells(Gaussians((), 2.0), points).centroid, plain.centroid)
 
@@ -159,7 +159,7 @@ def test_cells_without_mass_have_the_centroid_of_their_area():
     points = [[0.5, 0.5], [6.0, 6.0], [7.0, 1.0]]
     cells = build_cells(WeightedPolygons((corner,), 0.0), points, SQUARE)
     plain = build_cells(None, points, SQUARE)
-    assert cells.mass.tolist() == pytest.approx([1.0, 0.0, 0.0], abs=1e-13)
+    assert cells.masses.tolist() == pytest.approx([1.0, 0.0, 0.0], abs=1e-13)
     assert_allclose(cells.centroid[0], [0.5, 0.5], atol=1e-6)
     assert_allclose(cells.centroid[1:], plain.centroid[1:], atol=1e-6)
 
@@ -182,11 +182,11 @@ def test_edges_of_areas_on_borders_of_cells_count_once():
     for shift in (0.0, 1e-16, 1e-15, -1e-13, 1e-9):
         area = WeightedArea(((4.0 + shift, 0.0), (8.0, 0.0), (8.0, 8.0), (4.0 + shift, 8.0)), 3.0)
         cells = build_cells(WeightedPolygons((area,), 0.0), centers, SQUARE)
-        assert_allclose(cells.mass, [0.0, 96.0], atol=1e-6)
+        assert_allclose(cells.masses, [0.0, 96.0], atol=1e-6)
     ring = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))
     hole = ((2.0, 2.0), (2.0, 6.0), (6.0, 6.0), (6.0, 2.0))
     cells = build_cells(WeightedPolygons((WeightedArea(ring, 2.0, (hole,)),), 1.0), centers, SQUARE)
-    assert_allclose(cells.mass, [32.0 + 24.0] * 2, rtol=1e-14)
+    assert_allclose(cells.masses, [32.0 + 24.0] * 2, rtol=1e-14)
 
 
 @given(seed=st.integers(0, 10_000))
@@ -208,7 +208,7 @@ def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
         above = above | area.polygon
         mass += [area.weight * (ring & visible_part).area for ring in rings]
     mass += [0.5 * (ring - above).area for ring in rings]
-    assert_allclose(cells.mass, mass, rtol=1e-9)
+    assert_allclose(cells.masses, mass, rtol=1e-9)
 
 
 @given(seed=st.integers(0, 10_000), rows=st.integers(1, 9), columns=st.integers(1, 9))
@@ -227,7 +227,7 @@ def test_a_raster_of_cells_equals_polygons(seed, rows, columns):
     points = rng.uniform((1.0, 0.0), (7.0, 8.0), (6, 2))
     raster = build_cells(Raster(values, (1.0, 0.0, 7.0, 8.0), "cells"), points, inner)
     polygons = build_cells(WeightedPolygons(tuple(areas), 0.0), points, inner)
-    assert_allclose(raster.mass, polygons.mass, rtol=1e-9, atol=1e-12)
+    assert_allclose(raster.masses, polygons.masses, rtol=1e-9, atol=1e-12)
     assert_allclose(raster.polar_moment, polygons.polar_moment, rtol=1e-9, atol=1e-12)
 
 
@@ -241,7 +241,7 @@ def test_a_cell_depends_only_on_robots_within_range(density):
     def list_cell_values(positions, i):
         neighbors = Neighbors.from_ranges(positions, ranges[: len(positions)])
         cells = partition(positions, SQUARE, neighbors, density=density)
-        return cells.mass[i], *cells.centroid[i], cells.polar_moment[i]
+        return cells.masses[i], *cells.centroid[i], cells.polar_moment[i]
 
     moved = points.copy()
     distant = np.flatnonzero(np.hypot(*(points - points[0]).T) > 3.4)

@@ -110,7 +110,7 @@ def test_best_points_lie_in_their_cells_and_have_no_gradient(
     distance_outside = cross[is_long] / length[is_long]
     assert distance_outside.max(initial=-1.0) <= 1e-9 * size
     # In cells that are not extremely thin the gradient is small against the cost per width.
-    width = cells.mass / np.maximum(np.bincount(edges.cells, length, len(points)), 1e-300)
+    width = cells.masses / np.maximum(np.bincount(edges.cells, length, len(points)), 1e-300)
     is_wide = width > 1e-5 * size
     scale = np.abs(compute_locational_costs(edges, offsets, f)) / np.maximum(width, 1e-300)
     residual = np.abs(compute_gradients(edges, offsets, f)).max(axis=1)
@@ -147,7 +147,7 @@ def test_no_point_of_a_grid_over_the_cell_is_better_for_a_sensor(
     max_values = compute_locational_costs(cells.edges, find_best_points(cells, f) - cells.generators, f)
     fractions = np.linspace(0.02, 0.98, 12)
     for k, ring in enumerate(cells.polygons):
-        if len(ring) < 3 or cells.mass[k] < 1e-6 * region.area:
+        if len(ring) < 3 or cells.masses[k] < 1e-6 * region.area:
             continue
         low = ring.min(axis=0)
         high = ring.max(axis=0)
@@ -236,10 +236,10 @@ def test_the_best_point_of_a_cell_without_area_is_its_generator() -> None:
     square = REGIONS["square"]
     points = np.array([[1.0, 1.0], [2.0, 2.0], [90.0, 90.0], [91.0, 91.0]])
     cells = partition(points, square)
-    assert (cells.mass == 0.0).any()
+    assert (cells.masses == 0.0).any()
     for f in FUNCTIONS:
         best_points = find_best_points(cells, f)
-        np.testing.assert_array_equal(best_points[cells.mass == 0.0], points[cells.mass == 0.0])
+        np.testing.assert_array_equal(best_points[cells.masses == 0.0], points[cells.masses == 0.0])
     outside = partition(np.array([[90.0, 90.0], [-91.0, -91.0], [30.0, 3.0]]), square)
     assert np.isfinite(find_best_points(outside, Distance())).all()
 
@@ -276,7 +276,7 @@ def test_best_points_do_not_depend_on_other_cells_to_the_last_bit() -> None:
             row = slice(i, i + 1)
             single_cell = VoronoiPartition(
                 cells.generators[row],
-                cells.mass[row],
+                cells.masses[row],
                 cells.centroid[row],
                 _compute_edges=lambda edges=single_edges: edges,
             )

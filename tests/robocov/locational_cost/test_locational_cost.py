@@ -194,21 +194,21 @@ def test_squared_distances_obey_the_parallel_axis_theorem(seed: int, name: str, 
     points = rng.normal(scale=2.0, size=(n, 2))
     lever = points + cells.generators - cells.centroid
     size = region.diameter
-    expected = compute_moment_about_centroid(cells) + cells.mass * (lever**2).sum(axis=1)
+    expected = compute_moment_about_centroid(cells) + cells.masses * (lever**2).sum(axis=1)
     f = SquaredDistance()
     np.testing.assert_allclose(
         compute_locational_costs(cells.edges, points, f), expected, rtol=1e-9, atol=1e-12 * size**4
     )
-    slope = 2.0 * cells.mass[:, None] * lever
+    slope = 2.0 * cells.masses[:, None] * lever
     np.testing.assert_allclose(
         compute_gradients(cells.edges, points, f), slope, rtol=1e-9, atol=1e-11 * size**3
     )
-    curvature = 2.0 * cells.mass[:, None, None] * np.eye(2)
+    curvature = 2.0 * cells.masses[:, None, None] * np.eye(2)
     np.testing.assert_allclose(
         compute_hessians(cells.edges, points, f), curvature, rtol=1e-9, atol=1e-12 * size**2
     )
     np.testing.assert_allclose(
-        compute_derivatives(cells.edges, points, f).areas, cells.mass, rtol=1e-9, atol=1e-12 * size**2
+        compute_derivatives(cells.edges, points, f).areas, cells.masses, rtol=1e-9, atol=1e-12 * size**2
     )
 
 

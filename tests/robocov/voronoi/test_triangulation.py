@@ -86,13 +86,13 @@ def assert_delaunay(mesh: Mesh, points: Array) -> None:
 
 def assert_same_cells(updated: VoronoiPartition, built: VoronoiPartition, region: Region) -> None:
     size = region.area
-    assert updated.mass == pytest.approx(built.mass, rel=1e-12, abs=1e-12 * size)
-    moments = [cells.mass[:, None] * (cells.centroid - cells.generators) for cells in (updated, built)]
+    assert updated.masses == pytest.approx(built.masses, rel=1e-12, abs=1e-12 * size)
+    moments = [cells.masses[:, None] * (cells.centroid - cells.generators) for cells in (updated, built)]
     assert moments[0] == pytest.approx(moments[1], rel=1e-12, abs=1e-12 * size * region.diameter)
     if updated.triangulation is None or built.triangulation is None:
         return
     if list_triangles(updated.triangulation) == list_triangles(built.triangulation):
-        assert updated.mass.tobytes() == built.mass.tobytes()
+        assert updated.masses.tobytes() == built.masses.tobytes()
         assert updated.centroid.tobytes() == built.centroid.tobytes()
         assert updated.edges.starts.tobytes() == built.edges.starts.tobytes()
 
@@ -115,10 +115,10 @@ def test_triangulated_and_clipped_cells_agree(n: int, name: str) -> None:
     triangulated = partition(points, region)
     clipped = partition_by_clipping(points, region)
     assert triangulated.triangulation is not None
-    assert triangulated.mass == pytest.approx(clipped.mass, rel=1e-9, abs=1e-12 * region.area)
+    assert triangulated.masses == pytest.approx(clipped.masses, rel=1e-9, abs=1e-12 * region.area)
     assert triangulated.centroid == pytest.approx(clipped.centroid, abs=1e-9 * region.diameter)
     for cells in (triangulated, clipped):
-        assert cells.mass.sum() == pytest.approx(region.area, rel=1e-12)
+        assert cells.masses.sum() == pytest.approx(region.area, rel=1e-12)
     assert triangulated.adjacency.tolist() == clipped.adjacency.tolist()
     assert triangulated.polar_moment == pytest.approx(clipped.polar_moment, rel=1e-9)
     for a, b in zip(triangulated.polygons, clipped.polygons, strict=True):
@@ -141,7 +141,9 @@ def test_lattices_are_triangulated(side: int, name: str) -> None:
     turned = region.centroid + (points - region.centroid) @ np.array([[1.0, 1.0], [-1.0, 1.0]])
     cells = partition(turned, region)
     assert cells.triangulation is not None
-    assert cells.mass == pytest.approx(partition_by_clipping(turned, region).mass, abs=1e-12 * region.area)
+    assert cells.masses == pytest.approx(
+        partition_by_clipping(turned, region).masses, abs=1e-12 * region.area
+    )
 
 
 @settings(deadline=None, max_examples=60)
@@ -235,9 +237,11 @@ def test_a_team_on_a_circle_needs_no_clipping(name: str) -> None:
             points = place_on_circle(REGIONS[name], n, np.random.default_rng(seed))
             cells = partition(points, REGIONS[name])
             assert cells.triangulation is not None
-            assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+            assert cells.masses.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
             # All bisectors meet in one corner of the cells.
-            assert cells.mass == pytest.approx(partition_by_clipping(points, REGIONS[name]).mass, rel=1e-9)
+            assert cells.masses == pytest.approx(
+                partition_by_clipping(points, REGIONS[name]).masses, rel=1e-9
+            )
 
 
 def test_small_teams_have_no_triangulation() -> None:

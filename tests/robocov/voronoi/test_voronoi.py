@@ -39,7 +39,7 @@ def test_small_teams_are_exact(n: int, name: str) -> None:
     rng = np.random.default_rng(n)
     cells = partition(scatter_points(REGIONS[name], n, rng), REGIONS[name])
     assert_cells_are_exact(cells, REGIONS[name])
-    assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
+    assert cells.masses.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> 
 
 def test_one_robot_gets_the_whole_region() -> None:
     cells = partition(np.array([[1.0, 1.0]]), PENTAGON)
-    assert cells.mass == pytest.approx([PENTAGON.area])
+    assert cells.masses == pytest.approx([PENTAGON.area])
     assert cells.centroid == pytest.approx(PENTAGON.centroid[None])
     assert cells.polygons[0] == pytest.approx(PENTAGON.vertices)
     assert cells.adjacency.shape == (0, 2)
@@ -62,7 +62,7 @@ def test_one_robot_gets_the_whole_region() -> None:
 
 def test_an_empty_team_has_no_cells() -> None:
     cells = partition(np.empty((0, 2)), SQUARE)
-    assert cells.mass.shape == (0,)
+    assert cells.masses.shape == (0,)
     assert cells.centroid.shape == (0, 2)
     assert cells.polygons == []
     assert cells.adjacency.shape == (0, 2)
@@ -73,7 +73,7 @@ def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
     points = np.column_stack([x.ravel(), y.ravel()])
     across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
     for cells in (partition(points, SQUARE), partition_by_clipping(points, SQUARE)):
-        assert cells.mass == pytest.approx(np.full(9, 4.0), rel=1e-13)
+        assert cells.masses == pytest.approx(np.full(9, 4.0), rel=1e-13)
         assert cells.centroid == pytest.approx(points, rel=1e-13)
         assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
         assert cells.adjacency.tolist() == [list(pair) for pair in across]
@@ -82,7 +82,7 @@ def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
 
 def test_three_cells_that_meet_on_the_boundary() -> None:
     cells = partition(np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 0.0]]), SQUARE)
-    assert cells.mass == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
+    assert cells.masses == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
     assert cells.adjacency.tolist() == [[0, 1], [1, 2]]
     assert sorted(cells.edges.other_cells[cells.edges.cells == 1].tolist()) == [REGION, REGION, REGION, 0, 2]
     assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
@@ -96,9 +96,9 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
     points = family(region, n, rng)
     cells = partition(points, region)
     distinct = np.unique(points, axis=0, return_index=True)[1]
-    assert cells.mass[distinct].sum() == pytest.approx(region.area, rel=5e-12)
+    assert cells.masses[distinct].sum() == pytest.approx(region.area, rel=5e-12)
     shapes = [shapely.Polygon(ring) if len(ring) > 2 else shapely.Point() for ring in cells.polygons]
-    assert [shape.area for shape in shapes] == pytest.approx(cells.mass, abs=1e-11 * region.diameter**2)
+    assert [shape.area for shape in shapes] == pytest.approx(cells.masses, abs=1e-11 * region.diameter**2)
     samples = rng.dirichlet(np.ones(len(region.vertices)), 200) @ region.vertices
     distance = np.hypot(*(samples[:, None] - points).transpose(2, 0, 1))
     is_inside = np.column_stack([shapely.contains_xy(shape, *samples.T) for shape in shapes])
@@ -117,7 +117,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
 def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
     cells = partition(family(region, n, np.random.default_rng(seed)), region)
-    for ring, mass, centroid in zip(cells.polygons, cells.mass, cells.centroid, strict=True):
+    for ring, mass, centroid in zip(cells.polygons, cells.masses, cells.centroid, strict=True):
         if mass < 1e-9 * region.area:
             continue
         local = ring - centroid
@@ -143,7 +143,7 @@ def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
             direct.append(edges.sum())
         assert compute_moment_about_centroid(cells) == pytest.approx(np.array(direct), abs=1e-11)
         lever = points - cells.centroid
-        shifted = np.array(direct) + cells.mass * (lever**2).sum(axis=1)
+        shifted = np.array(direct) + cells.masses * (lever**2).sum(axis=1)
         assert cells.polar_moment == pytest.approx(shifted, abs=1e-11)
 
 
@@ -156,9 +156,9 @@ def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float
         turn = np.diag([-1.0, 1.0]) @ turn
     plain = partition(points, PENTAGON)
     turned = partition(points @ turn, Region(PENTAGON.vertices @ turn))
-    assert turned.mass == pytest.approx(plain.mass, abs=1e-11)
+    assert turned.masses == pytest.approx(plain.masses, abs=1e-11)
     lever = plain.centroid @ turn - turned.centroid
-    assert plain.mass[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
+    assert plain.masses[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
 
 
 @settings(deadline=None, max_examples=60)
@@ -169,7 +169,7 @@ def test_order_of_the_robots_does_not_matter(seed: int, n: int) -> None:
     order = rng.permutation(n)
     cells = partition(points, SQUARE)
     permuted = partition(points[order], SQUARE)
-    assert permuted.mass == pytest.approx(cells.mass[order], abs=1e-11)
+    assert permuted.masses == pytest.approx(cells.masses[order], abs=1e-11)
 
 
 def test_coincident_robots_get_the_same_cell() -> None:
@@ -177,25 +177,25 @@ def test_coincident_robots_get_the_same_cell() -> None:
         points = scatter_points(PENTAGON, n, np.random.default_rng(n))
         twice = partition(np.concatenate([points, points[:2]]), PENTAGON)
         once = partition(points, PENTAGON)
-        assert twice.mass[:n] == pytest.approx(once.mass, rel=1e-12)
-        assert twice.mass[n:].tolist() == twice.mass[:2].tolist()
+        assert twice.masses[:n] == pytest.approx(once.masses, rel=1e-12)
+        assert twice.masses[n:].tolist() == twice.masses[:2].tolist()
         assert twice.centroid[n:].tolist() == twice.centroid[:2].tolist()
         assert twice.polygons[n].tolist() == twice.polygons[0].tolist()
 
 
 def test_robots_at_one_position_get_the_region_each() -> None:
     cells = partition(np.full((7, 2), 1.5), PENTAGON)
-    assert cells.mass == pytest.approx(np.full(7, PENTAGON.area))
+    assert cells.masses == pytest.approx(np.full(7, PENTAGON.area))
     assert cells.adjacency.shape == (0, 2)
 
 
 def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
     cells = partition(np.array([[1.0, 1.0], [-9.0, 1.0], [5.0, 5.0]]), SQUARE)
-    assert cells.mass[1] == 0.0
+    assert cells.masses[1] == 0.0
     assert cells.centroid[1].tolist() == [-9.0, 1.0]
     assert cells.polygons[1].shape == (0, 2)
     assert cells.polar_moment[1] == 0.0
-    assert cells.mass.sum() == pytest.approx(SQUARE.area)
+    assert cells.masses.sum() == pytest.approx(SQUARE.area)
 
 
 @settings(deadline=None, max_examples=200)
@@ -221,7 +221,7 @@ def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int,
     index = int(np.searchsorted(remaining, robot))
     after = partition(moved, SQUARE, Neighbors.from_ranges(moved, np.full(len(moved), range_)))
 
-    assert after.mass[index] == before.mass[robot]
+    assert after.masses[index] == before.masses[robot]
     assert after.centroid[index].tolist() == before.centroid[robot].tolist()
     assert after.polygons[index].tolist() == before.polygons[robot].tolist()
     assert after.polar_moment[index] == before.polar_moment[robot]
@@ -236,9 +236,9 @@ def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, ran
     for robot in range(n):
         heard = np.concatenate([points[robot : robot + 1], points[neighbors.list_neighbors(robot)]])
         area, mx, my, _ = map(float, compute_exact_cell(0, heard, PENTAGON))
-        assert cells.mass[robot] == pytest.approx(area, abs=1e-11)
+        assert cells.masses[robot] == pytest.approx(area, abs=1e-11)
         lever = cells.centroid[robot] - points[robot]
-        assert cells.mass[robot] * lever == pytest.approx([mx, my], abs=1e-10)
+        assert cells.masses[robot] * lever == pytest.approx([mx, my], abs=1e-10)
 
 
 def test_adjacent_cells_share_a_piece_of_boundary() -> None:
@@ -259,14 +259,14 @@ def test_equal_input_gives_equal_bits_and_read_only_cells(n: int) -> None:
     points = scatter_points(PENTAGON, n, np.random.default_rng(n))
     first = partition(points, PENTAGON)
     second = partition(points, Region(PENTAGON.vertices))
-    assert first.mass.tobytes() == second.mass.tobytes()
+    assert first.masses.tobytes() == second.masses.tobytes()
     assert first.centroid.tobytes() == second.centroid.tobytes()
     rings = [ring.tobytes() for ring in second.polygons]
     # The partition does not share the array of the caller.
     points[:] = 0.0
     assert [ring.tobytes() for ring in first.polygons] == rings
     with pytest.raises(ValueError, match="read-only"):
-        first.mass[0] = 1.0
+        first.masses[0] = 1.0
     copy = pickle.loads(pickle.dumps(first))
     assert [ring.tobytes() for ring in copy.polygons] == rings
 

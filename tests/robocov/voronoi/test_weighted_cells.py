@@ -76,8 +76,8 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     cells = partition_by_travel_time(points, SPEEDS[speeds](len(points), rng), region)
     # Nearly tangent circles of some micrometers and of a kilometer keep fewer digits.
     tolerance = 1e-6 if speeds == "very different" else 1e-9
-    assert cells.mass.sum() == pytest.approx(region.area, rel=tolerance)
-    first = cells.mass @ (cells.centroid - region.centroid)
+    assert cells.masses.sum() == pytest.approx(region.area, rel=tolerance)
+    first = cells.masses @ (cells.centroid - region.centroid)
     np.testing.assert_allclose(first, 0.0, atol=tolerance * region.area * region.diameter)
 
 
@@ -93,7 +93,7 @@ def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: floa
     cells = partition_by_travel_time(points, speeds, region, neighbors)
     for i in range(n):
         expected = build_cell_of_discs(i, points, speeds, region, neighbors.list_neighbors(i))
-        assert cells.mass[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
+        assert cells.masses[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
         if expected.area > 1e-3 * region.area:
             np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
 
@@ -130,7 +130,7 @@ def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: s
     points = scatter_points(REGIONS[name], n, rng)
     cells = partition_by_travel_time(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
-    assert cells.mass.tobytes() == ordinary.mass.tobytes()
+    assert cells.masses.tobytes() == ordinary.masses.tobytes()
     assert cells.centroid.tobytes() == ordinary.centroid.tobytes()
 
 
@@ -144,8 +144,8 @@ def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: in
         return
     cells = partition_by_travel_time(points, 1.0 + 1e-14 * rng.integers(1, 9, n), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
-    np.testing.assert_allclose(cells.mass, ordinary.mass, atol=1e-10)
-    large = ordinary.mass > 0.01
+    np.testing.assert_allclose(cells.masses, ordinary.masses, atol=1e-10)
+    large = ordinary.masses > 0.01
     np.testing.assert_allclose(cells.centroid[large], ordinary.centroid[large], atol=1e-9)
 
 
@@ -153,14 +153,14 @@ def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
     cells = partition_by_travel_time(np.array([[3.0, 3.0], [4.0, 3.0]]), np.array([1.0, 3.0]), SQUARE)
     assert isinstance(cells, WeightedCells)
     # Apollonius: center p - d / (k² - 1), radius k d / (k² - 1), k = 3
-    assert cells.mass[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
+    assert cells.masses[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
     np.testing.assert_allclose(cells.centroid[0], [3.0 - 1 / 8, 3.0], atol=1e-15)
-    assert cells.mass[1] == pytest.approx(36.0 - cells.mass[0], rel=1e-14)
+    assert cells.masses[1] == pytest.approx(36.0 - cells.masses[0], rel=1e-14)
     assert compute_moment_about_centroid(cells)[0] == pytest.approx(np.pi * (3 / 8) ** 4 / 2, rel=1e-13)
     outlines, owners = cells.outlines
     assert owners.tolist() == [1, 1, 0]
     assert cells.adjacency.tolist() == [[0, 1]]
-    assert shapely.Polygon(outlines[2]).area == pytest.approx(cells.mass[0], rel=0.01)
+    assert shapely.Polygon(outlines[2]).area == pytest.approx(cells.masses[0], rel=0.01)
 
 
 def test_a_cell_may_have_two_components_and_a_centroid_outside() -> None:
@@ -185,16 +185,16 @@ def test_speeds_that_differ_by_rounding_give_the_ordinary_cells() -> None:
     speeds = 1.0 + 4.0 * np.finfo(float).eps * np.arange(3)
     ordinary = partition(points, PENTAGON)
     np.testing.assert_allclose(
-        partition_by_travel_time(points, speeds, PENTAGON).mass, ordinary.mass, rtol=1e-9
+        partition_by_travel_time(points, speeds, PENTAGON).masses, ordinary.masses, rtol=1e-9
     )
 
 
 def test_robots_at_one_position_share_a_cell_if_they_are_equally_fast() -> None:
     points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
     cells = partition_by_travel_time(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
-    assert cells.mass[0] == 0.0
+    assert cells.masses[0] == 0.0
     np.testing.assert_array_equal(cells.centroid[0], points[0])
-    np.testing.assert_allclose(cells.mass[[1, 2, 3]], [18.0, 18.0, 18.0])
+    np.testing.assert_allclose(cells.masses[[1, 2, 3]], [18.0, 18.0, 18.0])
     np.testing.assert_array_equal(cells.centroid[1], cells.centroid[3])
 
 
@@ -206,7 +206,7 @@ def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -
     points = scatter_points(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
     cells = partition_by_travel_time(points, speeds, SQUARE)
-    slope = 2.0 * (cells.mass / speeds**2)[:, None] * (points - cells.centroid)
+    slope = 2.0 * (cells.masses / speeds**2)[:, None] * (points - cells.centroid)
 
     def compute_cost(positions: np.ndarray) -> float:
         moments = partition_by_travel_time(positions, speeds, SQUARE).polar_moment
@@ -242,7 +242,7 @@ def test_a_cell_depends_only_on_the_neighbors_of_its_robot(seed: int, n: int, re
     before = partition_by_travel_time(points, speeds, SQUARE, neighbors)
     new_neighbors = Neighbors.from_ranges(new_points, np.full(n, reach))
     after = partition_by_travel_time(new_points, new_speeds, SQUARE, new_neighbors)
-    assert before.mass[i].tobytes() == after.mass[i].tobytes()
+    assert before.masses[i].tobytes() == after.masses[i].tobytes()
     assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
 
 
@@ -256,7 +256,7 @@ def test_reported_positions_replace_the_true_ones() -> None:
         known = points.copy()
         known[neighbors.list_neighbors(i)] = reports[neighbors.indptr[i] : neighbors.indptr[i + 1]]
         alone = partition_by_travel_time(known, speeds, SQUARE)
-        assert cells.mass[i] == pytest.approx(alone.mass[i], rel=1e-12)
+        assert cells.masses[i] == pytest.approx(alone.masses[i], rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_mass_and_moments_are_weighted_by_a_density(name: str) -> None:
     for i in range(5):
         is_owned = owner == i
         mass = weight[is_owned].sum()
-        assert cells.mass[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
+        assert cells.masses[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
         if mass > 0.1:
             centroid = weight[is_owned] @ samples[is_owned] / mass
             np.testing.assert_allclose(cells.centroid[i], centroid, atol=0.02)

@@ -412,7 +412,7 @@ def test_cells_are_voronoi_cells(browser, robots) -> None:
     )
     cells = browser.run_script(script, ROOMS.region.vertices.ravel().tolist(), places.ravel().tolist())
     wanted = partition(places, ROOMS.region)
-    for cell, mass in zip(cells, wanted.mass, strict=True):
+    for cell, mass in zip(cells, wanted.masses, strict=True):
         x, y = np.array(cell).reshape(-1, 2).T
         area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         assert area == pytest.approx(mass, rel=1e-9)

@@ -79,7 +79,7 @@ def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
 
 def _find_ground_optimum(cell: VoronoiPartition) -> SensorOptimum:
     """Find the limit of the best position for h → 0, from a height that is tiny compared with the cell."""
-    size = float(np.sqrt(cell.mass[0]))
+    size = float(np.sqrt(cell.masses[0]))
     position = find_best_points(cell, Sensing(_GROUND_HEIGHT * size))[0]
     return _build_optimum(cell, 0.0, position, float("nan"))
 
