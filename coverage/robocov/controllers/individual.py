@@ -1,5 +1,7 @@
 """Controllers of a single robot, and the adapter that calls them for each robot of a team."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite

@@ -227,13 +227,13 @@ def _mark_changed_rows(rows: Mapping[str, str], previous_rows: Mapping[str, str]
 
 def _format_rows(report: MapReport) -> dict[str, str]:
     """Return the values of a report as text, by title."""
-    areas = [f"{area:.6g} m²" for area in report.components[:_MAX_LISTED_COMPONENTS]]
+    areas = [_format_area(area) for area in report.components[:_MAX_LISTED_COMPONENTS]]
     if len(report.components) > _MAX_LISTED_COMPONENTS:
         areas.append("...")
     rows = {
         "name": report.name,
-        "area": f"{report.area:.6g} m²",
-        "free area": f"{report.free_area:.6g} m² ({report.free_fraction:.1%})",
+        "area": _format_area(report.area),
+        "free area": f"{_format_area(report.free_area)} ({report.free_fraction:.1%})",
         "obstacles": f"{report.obstacle_count}, with {report.vertex_count} vertices (boundary included)",
         "components": f"{len(report.components)} ({', '.join(areas)})",
         "narrowest gap": _format_narrowest_gap(report),
@@ -244,6 +244,12 @@ def _format_rows(report: MapReport) -> dict[str, str]:
     for start in report.starts:
         rows[f"start {start.name}"] = f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"
     return rows
+
+
+def _format_area(area: float) -> str:
+    """Return an area as text: two decimals at most, or three significant digits if it is below 1 m²."""
+    text = f"{round(area, 2):.10g}" if area >= 1.0 else f"{area:.3g}"
+    return f"{text} m²"
 
 
 def _format_narrowest_gap(report: MapReport) -> str:
