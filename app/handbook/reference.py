@@ -263,7 +263,9 @@ def read_attribute_docs(kind: type) -> dict[str, str]:
 def build_names_page() -> str:
     """Build the page that documents every public name of the library."""
     text = build_heading("Python: every public name", "=")
-    text += "\nAll are names of ``robocov``: ``import robocov as rc``.\n\n.. py:currentmodule:: robocov\n"
+    text += "\nAll are names of ``robocov``: ``import robocov as rc``. "
+    text += ":doc:`/names-in-use` shows them by topic.\n"
+    text += "\n.. py:currentmodule:: robocov\n"
     for name in sorted(rc.__all__, key=str.lower):
         text += "\n" + build_heading(name, "-") + "\n"
         value = getattr(rc, name)
