@@ -71,8 +71,10 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         confine_files(folder),
         ending_on_signals(),
     ):
-        echo(f"open {display.link}", flush=True)
-        echo(f"to watch only: {display.watch_link}", flush=True)
+        echo(f"Control the window: {display.link}", flush=True)
+        echo(f"Watch it:           {display.watch_link}", flush=True)
+        if not is_relayed:
+            echo("Press Ctrl+C to stop.", flush=True)
         window.remote = display
         window.hide_folder(folder)
         was_interrupted = False

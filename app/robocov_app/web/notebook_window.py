@@ -66,7 +66,7 @@ class LiveWindow:
             )
             self.close = weakref.finalize(self, _end_process, self._process)
             assert self._process.stdout is not None
-            link_match = re.match(r"open (\S+)", self._process.stdout.readline())
+            link_match = re.search(r"(http\S+)", self._process.stdout.readline())
             if link_match is None:
                 self._process.wait()
                 errors.seek(0)

@@ -47,6 +47,8 @@ class SharedWindow:
         clipboard.
     uploads : dict
         Modification time of each uploaded file by its name, s since the epoch.
+    invitation : dict
+        Link for watching and its QR code, for pages opened with the control link; see `build_invitation`.
     """
 
     pages: Pages
@@ -64,6 +66,7 @@ class SharedWindow:
         }
     )
     uploads: dict[str, float] = field(default_factory=dict)
+    invitation: dict[str, str] = field(default_factory=dict)
 
     def update_sizes(self) -> None:
         """Pass the sizes that the window and the map should have to the window."""
@@ -264,6 +267,8 @@ class PageConnection:
             "may_control": page.may_control,
             "shows_map": page.shown_map is not None,
         }
+        if page.may_control:
+            state["invitation"] = self._shared.invitation
         if not self._is_controlling:
             # Only the controlling page may see the clipboard, and downloads what its user saves.
             state.pop("copied", None)

@@ -39,6 +39,7 @@ from robocov_app.web.connections import (
 from robocov_app.web.files import TransferError, list_saved, read_saved
 from robocov_app.web.frame_delivery import SERVED_FPS, FrameDelivery
 from robocov_app.web.frames import Frame
+from robocov_app.web.invitations import build_invitation
 from robocov_app.web.page_connection import PageConnection, SharedWindow
 from robocov_app.web.pages import Page, Pages, TooManyPagesError
 from robocov_app.web.window_input import WindowInput
@@ -151,6 +152,7 @@ class WebDisplay:
             raise self._start_error
         self.link = build_link(self.host, self.port, self.token)
         self.watch_link = build_link(self.host, self.port, self.watch_token)
+        self.shared.invitation = build_invitation(self.host, self.share_link)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -140,7 +140,7 @@ class VisitorServer:
         Parameters
         ----------
         print_line : callable
-            Called with the line that contains the link.
+            Called with each line to print: the link, and how to stop the server.
 
         Raises
         ------
@@ -154,7 +154,8 @@ class VisitorServer:
         try:
             # Open the first window now, so that errors in the options are reported at once.
             self._spare = await self._open(self._folders.create())
-            print_line(f"open {build_link(host, port, self.token)}")
+            print_line(f"For everyone: {build_link(host, port, self.token)}")
+            print_line("Press Ctrl+C to stop.")
             while True:
                 await asyncio.sleep(CHECK_INTERVAL_S)
                 self._remove_idle_windows()

@@ -156,6 +156,23 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         assert not browser.read_console()
 
 
+def test_the_teacher_shows_a_qr_code(browser, tmp_path):
+    with serve_window("demo", "square", "--host", "0.0.0.0", cwd=tmp_path) as link:
+        set_size(browser, 1280, 720)
+        browser.driver.get(link)
+        browser.wait_until(lambda: browser.find("summary").is_displayed())
+        browser.find("summary").click()
+        browser.find_all("#here button")[-1].click()
+        invitation = browser.find("#invitation")
+        assert invitation.is_displayed()
+        assert browser.find("#invitation img").get_attribute("src").startswith("data:image/svg+xml")
+        watch_link = browser.find("#invitation p").text
+        assert watch_link.startswith("http://")
+        assert watch_link != link
+        browser.find("#invitation button").click()
+        assert not invitation.is_displayed()
+
+
 def record_messages(browser):
     """Let the page keep what it tells; the result returns that, and forgets it."""
     browser.run_script(

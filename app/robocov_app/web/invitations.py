@@ -1,0 +1,47 @@
+"""Invitations to a served window: its link, and a QR code from which a phone opens it."""
+
+from __future__ import annotations
+
+import ipaddress
+
+from robocov_app.web.access import find_network_address
+
+
+def build_invitation(host: str, link: str) -> dict[str, str]:
+    """Build the invitation that the pages in control can show on a projector.
+
+    Parameters
+    ----------
+    host : str
+        Address at which the server listens.
+    link : str
+        Link for watching; empty if there is none.
+
+    Returns
+    -------
+    dict
+        ``link``, and ``qr_code`` as a data URI, which is empty if segno is not installed. The dictionary is
+        empty if only this computer reaches the server.
+    """
+    if not link or _is_loopback(find_network_address(host)):
+        return {}
+    return {"link": link, "qr_code": build_qr_code(link)}
+
+
+def build_qr_code(link: str) -> str:
+    """Return the QR code of a link as the data URI of an SVG image; empty if segno is not installed."""
+    try:
+        import segno
+    except ImportError:
+        return ""
+    # Black on white in both themes, with the margin of the standard, so that every camera reads it.
+    return segno.make_qr(link, error="m").svg_data_uri(border=4, dark="#000", light="#fff")
+
+
+def _is_loopback(address: str) -> bool:
+    if address == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:  # the name of a computer
+        return False
