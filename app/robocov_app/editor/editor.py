@@ -51,6 +51,8 @@ class Editor(EditorContext):
         Colors: "light" or "dark".
     shows_panel : bool
         Whether the panel is shown.
+    is_compact : bool
+        Whether the buttons of the bar and of the rail are left to the page of a phone.
     shown : set of str
         Names of the visible layers; see `LAYERS`.
     radius : float
@@ -94,6 +96,7 @@ class Editor(EditorContext):
         self.toolbox = EditorToolbox()
         self.theme: str = settings.theme
         self.shows_panel = True
+        self.is_compact = False
         self.shown = set(settings.shown) & set(LAYERS)
         self.snaps = set(settings.snaps) & set(SNAPS)
         self.grid = settings.grid

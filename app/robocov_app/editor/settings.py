@@ -33,7 +33,7 @@ LAYERS = {
     "impassable": LayerSwitch("Too narrow", "alt+1"),
     "problems": LayerSwitch("Problems", "alt+5"),
     "robots": LayerSwitch("Robots at start", "a"),
-    "picture": LayerSwitch("Picture", "alt+6"),
+    "picture": LayerSwitch("Image", "alt+6"),
     "legend": LayerSwitch("Legend", "alt+7"),
     "handles": LayerSwitch("Handles", "alt+4"),
 }

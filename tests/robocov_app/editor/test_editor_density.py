@@ -149,7 +149,7 @@ class TestEdits:
     def test_densities_are_described(self):
         assert density_edits.describe_density(None) == "none: equal everywhere"
         assert density_edits.describe_density(ONE) == "1 hot spot, floor 0.5"
-        assert density_edits.describe_density(KINDS["bilinear"]) == "picture, 13 x 11"
+        assert density_edits.describe_density(KINDS["bilinear"]) == "image, 13 x 11"
         assert density_edits.describe_density(KINDS["rooms"]) == "2 areas, 0.3 to 4"
 
 

@@ -274,7 +274,7 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDri
 def test_scaling_requires_a_picture(driver: EditorDriver) -> None:
     driver.press_key("i")
     driver.click_all((2, 2))
-    assert driver.editor.has_error_message and "no picture" in driver.message
+    assert driver.editor.has_error_message and "no image" in driver.message
 
 
 def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:

@@ -374,7 +374,10 @@ def test_a_polygon_becomes_the_boundary(sketch):
     change = properties.convert_to_boundary(sketch, Selection.of(0))
     assert change.sketch.boundary == BOX.vertices
     assert [item.key for item in change.sketch.obstacles] == [1, 2]
-    assert properties.set_background(sketch, Background("p.png", (3, 4))).description == "picture laid under"
+    assert (
+        properties.set_background(sketch, Background("p.png", (3, 4))).description
+        == "image put under the map"
+    )
 
 
 def test_bounds_enclose_objects_and_vertices(sketch):

@@ -188,7 +188,7 @@ def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_
     driver.press_key("ctrl+b")
     driver.type("no.png")
     driver.press_key("return")
-    assert "not a picture" in driver.read_refusal()
+    assert "not an image" in driver.read_refusal()
     driver.window.do("background:none")
     assert driver.sketch.background is None
     driver.editor.apply(set_background(driver.sketch, Background("gone.png", (40, 30))))

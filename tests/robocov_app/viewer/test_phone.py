@@ -255,5 +255,6 @@ def test_every_button_of_the_page_has_a_command(upright_phone: Driver) -> None:
     assert len(others) > 9
     for name in others:
         assert name in commands or name in ("open", "keyboard")
-    for name in re.findall(r'runCommand\("([\w:]+)"\)', page):
+    editor_names = {"delete", "save", "editor"}
+    for name in set(re.findall(r'runCommand\("([\w:]+)"\)', page)) - editor_names:
         assert name in commands

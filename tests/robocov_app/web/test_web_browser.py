@@ -15,6 +15,14 @@ pytest.importorskip("websockets")
 MAPS = Path(__file__).parents[3] / "maps"
 DOWNLOADS_HEIGHT = 32
 """Height of the bar of saved files on pages without touch, CSS px."""
+EMPTY_MAP = json.dumps(
+    {
+        "format": "robocov-map",
+        "version": 1,
+        "boundary": [[0, 0], [10, 0], [10, 10], [0, 10]],
+        "obstacles": [],
+    }
+)
 
 pytestmark = [
     pytest.mark.slow,
@@ -403,6 +411,62 @@ def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(
             browser.find("#lesson").click()
             browser.wait_until(lambda: browser.find("#lesson").get_attribute("aria-pressed") == "true")
             assert not browser.find("#panel").is_enabled()
+            assert browser.read_console() == []
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+def test_the_editor_on_a_telephone_is_used_by_fingers_alone(browser, tmp_path):
+    touch = {"enabled": True, "maxTouchPoints": 2}
+    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    try:
+        set_size(browser, 390, 844, 2.0)
+        path = tmp_path / "plan.json"
+        path.write_text(EMPTY_MAP)
+        with serve_window("edit", str(path), "--folder", str(tmp_path)) as link:
+            browser.driver.get(link)
+            browser.wait_until(lambda: get_classes(browser) == {"phone"})
+            browser.wait_until(lambda: browser.find("#try").is_displayed())
+            wait_for_rest(browser)
+            shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
+            labels = [button.text for button in shown]
+            assert labels == ["Try it", "Undo", "Tools", "Delete", "Save", "More"]
+            assert all(min(button.size.values()) >= 48 for button in shown)
+
+            def touch(*points):
+                for number, (x, y) in enumerate(points):
+                    event = {"type": "touchMove" if number else "touchStart"}
+                    event["touchPoints"] = [{"x": x, "y": y, "id": 0}]
+                    browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+                    time.sleep(0.05)
+                event = {"type": "touchEnd", "touchPoints": []}
+                browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+                time.sleep(0.6)
+
+            def choose_tool(name):
+                browser.find("#to-tools").click()
+                browser.find(f"[data-command='tool:{name}']").click()
+
+            choose_tool("wall")
+            browser.wait_until(lambda: browser.find("#to-tools").text == "Wall")
+            touch((110, 400))
+            touch((250, 400))
+            browser.wait_until(lambda: browser.find("#try").text == "Finish")
+            browser.find("#try").click()
+            browser.wait_until(lambda: browser.find("#try").text == "Try it")
+            browser.find("#save").click()
+            browser.wait_until(lambda: len(json.loads(path.read_text())["obstacles"]) == 1)
+            drawn = path.read_text()
+            choose_tool("select")
+            browser.wait_until(lambda: browser.find("#to-tools").text == "Tools")
+            touch(*((180, 400 + 10 * k) for k in range(8)))
+            browser.wait_until(lambda: browser.find("#delete").is_enabled())
+            browser.find("#save").click()
+            browser.wait_until(lambda: path.read_text() != drawn)
+            browser.find("#delete").click()
+            browser.wait_until(lambda: not browser.find("#delete").is_enabled())
+            browser.find("#save").click()
+            browser.wait_until(lambda: not json.loads(path.read_text())["obstacles"])
             assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})

@@ -1,4 +1,4 @@
-"""The reference picture under the map."""
+"""The reference image under the map."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ MIN_PIXELATED_FACTOR = 4.0  # from this magnification on, pixels are drawn as sq
 
 
 class ReferenceImage:
-    """Loads and draws the picture under a map; the latest picture is cached.
+    """Loads and draws the image under a map; the latest one is cached.
 
     Attributes
     ----------

@@ -211,7 +211,7 @@ class Sheet:
                 canvas.draw_outline(corners, edge, 1)
 
     def _draw_translucent_items(self, canvas: Canvas, items: list[Item], box: Rect) -> None:
-        """Draw translucent obstacles, so that the picture under them stays visible."""
+        """Draw translucent obstacles, so that the image under them stays visible."""
         layer = Surface(box.size, pygame.SRCALPHA, 32)
         left, top, width, height = canvas.camera.view
         camera = canvas.camera.with_view((left - box.x, top - box.y, width, height))

@@ -154,7 +154,7 @@ def describe_density(density: Density | None) -> str:
         return f"{format_count(len(density.peaks), 'hot spot')}, floor {density.floor:g}"
     if isinstance(density, Raster):
         rows, columns = density.values.shape
-        return f"picture, {columns} x {rows}"
+        return f"image, {columns} x {rows}"
     kind = density.kind
     if isinstance(density, WeightedPolygons):
         kind = format_count(len(density.areas), "area")

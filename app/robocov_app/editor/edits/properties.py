@@ -204,11 +204,11 @@ def convert_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def set_background(sketch: Sketch, background: Background | None) -> Change:
-    """Set the picture under the map, or remove it if None is given."""
+    """Set the image under the map, or remove it if None is given."""
     if background is None:
-        description = "picture removed"
+        description = "image removed"
     elif sketch.background is None:
-        description = "picture laid under"
+        description = "image put under the map"
     else:
-        description = "picture changed"
+        description = "image changed"
     return Change(replace(sketch, background=background), Selection(), description)

@@ -30,7 +30,7 @@ _KEYS = {"rotation_deg": "turn"}
 
 @dataclass(frozen=True)
 class Background:
-    """A picture under the map. Pixel coordinates start at the upper left corner; y points down.
+    """An image under the map. Pixel coordinates start at the upper left corner; y points down.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT
     """
     if min(pixels) < 1 or math.prod(pixels) > MAX_PIXELS:
         size = f"{pixels[0]} x {pixels[1]} pixels"
-        raise MapError(f"the picture has {size}: expected 1 to {MAX_PIXELS // 1_000_000} million pixels")
+        raise MapError(f"the image has {size}: expected 1 to {MAX_PIXELS // 1_000_000} million pixels")
     return Background(path, pixels, width / pixels[0])
 
 
@@ -162,7 +162,7 @@ def rotate_background(background: Background, degrees: float, about: Point) -> B
 
 def _require_apart(background: Background, a: Point, b: Point) -> None:
     is_apart = math.dist(a, b) >= 2 * background.scale
-    require(is_apart, "click two points of the picture that are farther apart")
+    require(is_apart, "click two points of the image that are farther apart")
 
 
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}

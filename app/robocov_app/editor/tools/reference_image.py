@@ -1,4 +1,4 @@
-"""The tool for the picture under the map: two clicked points scale or level it, and a drag moves it."""
+"""The tool for the image under the map: two clicked points scale or level it, and a drag moves it."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ class ReferenceImageTool(EditorTool):
     """
 
     name = "picture"
-    title = "Picture"
+    title = "Image"
     key = "i"
     hint = "click two points; type their distance, or Enter to make their line level; drag moves it"
     snaps = False
@@ -36,9 +36,7 @@ class ReferenceImageTool(EditorTool):
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Start a click or a drag; raise MapError if there is no picture."""
-        require(
-            context.sketch.background is not None, "there is no picture under the map: Ctrl+B chooses one"
-        )
+        require(context.sketch.background is not None, "there is no image under the map: Ctrl+B chooses one")
         self.pressed = event
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
@@ -90,7 +88,7 @@ class ReferenceImageTool(EditorTool):
     def enter_text(self, context: EditorContext, text: str) -> None:
         """Scale the image so that the distance between the two points is a typed length."""
         if len(self.clicked) != 2 or context.sketch.background is None:
-            raise MapError("click two points of the picture first")
+            raise MapError("click two points of the image first")
         start, end = self.clicked
         background = scale_to_length(context.sketch.background, start, end, parse_length(text))
         self.clicked = []

@@ -132,10 +132,10 @@ def list_commands(
 def _build_file_group(
     editor: Editor, documents: FileCommands, window: EditorWindowActions
 ) -> EditorCommandGroup:
-    """Build the group of commands on files, on the picture under the map, and on the whole window."""
+    """Build the group of commands on files, on the image under the map, and on the whole window."""
     ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
     ask_picture = partial(
-        documents.ask_path, "Picture under the map", documents.open_background, PICTURE_SUFFIXES
+        documents.ask_path, "Image under the map", documents.open_background, PICTURE_SUFFIXES
     )
 
     def remove_picture() -> None:
@@ -148,8 +148,8 @@ def _build_file_group(
     group.add("save", "Save", documents.save, "ctrl+s")
     group.add("save:as", "Save as", documents.ask_name, "ctrl+shift+s")
     group.add("export", "Export to another format", documents.ask_export, "ctrl+e")
-    group.add("background", "Picture under the map", ask_picture, "ctrl+b")
-    group.add("background:none", "Remove the picture under the map", remove_picture)
+    group.add("background", "Image under the map", ask_picture, "ctrl+b")
+    group.add("background:none", "Remove the image under the map", remove_picture)
     group.add("reload", "Reload the file", documents.reload, "ctrl+r")
     group.add("try", "Try the map in the viewer", window.start_play_mode, "f5")
     group.add("screenshot", "Screenshot", window.save_screenshot, "f12")

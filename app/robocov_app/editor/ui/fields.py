@@ -159,7 +159,7 @@ def _write_description(editor: Editor, text: str) -> None:
 
 
 def _require_picture(editor: Editor) -> Background:
-    return require(editor.sketch.background, "there is no picture under the map: Ctrl+B chooses one")
+    return require(editor.sketch.background, "there is no image under the map: Ctrl+B chooses one")
 
 
 def _read_picture_scale(editor: Editor) -> str:
@@ -184,7 +184,7 @@ def _write_picture_rotation(editor: Editor, text: str) -> None:
 
 
 def set_picture_opacity(editor: Editor, opacity: float) -> None:
-    """Set the opacity of the picture under the map, from 0 to 1."""
+    """Set the opacity of the image under the map, from 0 to 1."""
     picture = replace(_require_picture(editor), opacity=opacity)
     editor.apply(properties.set_background(editor.sketch, picture), drag="opacity")
 

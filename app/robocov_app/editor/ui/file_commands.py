@@ -319,14 +319,14 @@ class FileCommands:
         return f"read again: {self.editor.document.title}"
 
     def open_background(self, path: Path) -> None:
-        """Put a picture under the map, and choose the tool that scales and moves it."""
+        """Put an image under the map, and choose the tool that scales and moves it."""
         set_reference_image(self.editor, path)
         self.editor.choose_tool("picture")
         self._fit()
 
 
 def set_reference_image(editor: Editor, path: Path) -> None:
-    """Put a picture under the map. It becomes as wide as the map, or gets a default width.
+    """Put an image under the map. It becomes as wide as the map, or gets a default width.
 
     Raises
     ------
@@ -338,12 +338,10 @@ def set_reference_image(editor: Editor, path: Path) -> None:
         with Image.open(path) as picture:
             pixels = picture.size
     except _PICTURE_ERRORS:
-        raise MapError(f"{path}: not a picture that can be read") from None
+        raise MapError(f"{path}: not an image that can be read") from None
     name = _describe_picture_path(path, editor.document.path)
     if remove_controls(name) != name:
-        raise MapError(
-            f"{path}: expected a picture whose path is text, got control characters or other bytes"
-        )
+        raise MapError(f"{path}: expected an image whose path is text, got control characters or other bytes")
     background = create_background(name, pixels)
     bounds = editor.sketch.bounds
     if bounds is not None and editor.sketch.background is None:

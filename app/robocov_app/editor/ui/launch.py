@@ -141,7 +141,7 @@ class EditorLauncher:
         return ""
 
     def _prepare_editor(self, editor: Editor, settings: EditorSettings) -> None:
-        """Apply the theme, and put the picture under the map."""
+        """Apply the theme, and put the image under the map."""
         editor.theme = self.theme or settings.theme
         if self.background is not None:
             set_reference_image(editor, self.background)

@@ -334,7 +334,7 @@ class EditorPanel(CommandPanel):
             self._draw_field_pair(ui, FieldCell("width", "Thickness", "m"))
 
     def _draw_snap_page(self, ui: Ui) -> None:
-        """Draw the page "snap": snap modes, grid, visible layers, and the picture under the map."""
+        """Draw the page "snap": snap modes, grid, visible layers, and the image under the map."""
         with ui.scroll("snap"):
             ui.header("Snap to")
             ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
@@ -351,8 +351,8 @@ class EditorPanel(CommandPanel):
             self._draw_picture_section(ui)
 
     def _draw_picture_section(self, ui: Ui) -> None:
-        """Draw the buttons, fields and opacity slider of the picture under the map."""
-        ui.header("Picture under the map")
+        """Draw the buttons, fields and opacity slider of the image under the map."""
+        ui.header("Image under the map")
         self.show_buttons(ui, PICTURE_BUTTONS)
         scale = FieldCell("picture:scale", "Pixel", "m")
         turn = FieldCell("picture:turn", "Turn", "°")
@@ -361,7 +361,7 @@ class EditorPanel(CommandPanel):
         ui.label("Opacity")
         picture = self.editor.sketch.background
         if picture is None:
-            ui.slider("opacity", 0.5, 0.0, 1.0, disabled_reason="there is no picture under the map")
+            ui.slider("opacity", 0.5, 0.0, 1.0, disabled_reason="there is no image under the map")
             return
         opacity = ui.slider("opacity", picture.opacity, 0.0, 1.0)
         if opacity is not None:

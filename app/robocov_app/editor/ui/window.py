@@ -21,6 +21,7 @@ from robocov_app.editor.ui.field_focus import FieldFocus
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
+from robocov_app.editor.ui.page_controls import read_page_controls
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
@@ -39,7 +40,7 @@ from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
-from robocov_app.toolkit.window.page_view import PageAppearance
+from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 
 STATUS_HINT = "F5: try it · F1: keys"
@@ -168,6 +169,11 @@ class EditorWindow(CommandWindow):
         """Top bar, tool rail and panel."""
         return (self.top_bar, self.tool_rail, self.panel)
 
+    @property
+    def controls(self) -> WindowControls:
+        """State that the buttons of a phone's page show."""
+        return read_page_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
+
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state of the document after an unexpected error."""
         editor = self.editor
@@ -241,6 +247,7 @@ class EditorWindow(CommandWindow):
         """Adopt the appearance that suits the browser page that shows the window; see `BaseWindow`."""
         self.scale = appearance.scale
         self.editor.theme = appearance.theme
+        self.editor.is_compact = appearance.is_compact
         if appearance.shows_panel is not None:
             self.editor.shows_panel = appearance.shows_panel
         self.editor.revision += 1
@@ -289,12 +296,14 @@ class EditorWindow(CommandWindow):
     def _arrange(self) -> None:
         """Update the layout after a change of size, scale, panel or theme; otherwise do nothing."""
         editor = self.editor
-        key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.theme)
+        key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.is_compact, editor.theme)
         if key == self._layout_key:
             return
         self._layout_key = key
         self.theme = get_theme(editor.theme)
-        self.layout = build_layout(key[0], self.scale, panel=editor.shows_panel, plot=False)
+        self.layout = build_layout(
+            key[0], self.scale, panel=editor.shows_panel, plot=False, is_compact=editor.is_compact
+        )
         self.canvas.arrange(self.layout, self.theme)
         for part in self.parts:
             part.arrange(self.layout, self.theme)
@@ -305,15 +314,17 @@ class EditorWindow(CommandWindow):
         theme = self.theme
         editor = self.editor
         self.canvas.draw(self.screen)
-        status = list_status(editor, self.frame_rate, self.canvas.team)
-        draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
+        if layout.status.height:
+            status = list_status(editor, self.frame_rate, self.canvas.team)
+            draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
         if layout.has_panel:
             self.panel.draw(self.screen)
         self.sheet_handle.draw(self.screen, layout, theme)
         is_error = editor.has_error_message
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
-        self.tool_rail.draw(self.screen)
-        self.top_bar.draw(self.screen)
+        if not layout.is_compact:
+            self.tool_rail.draw(self.screen)
+            self.top_bar.draw(self.screen)
         self.draw_above_map()
 
     def _attempt(self, action: Callable[[], object]) -> None:

@@ -55,6 +55,12 @@ class WindowControls:
         Whether typed text goes to a text field.
     scroll_box : Box or None
         Part of the window that a vertical drag of a finger scrolls.
+    kind : str
+        ``viewer``, ``editor``, or ``trial`` for a viewer that was opened by the editor.
+    is_drawing : bool
+        Whether a drawing of the editor is unfinished.
+    can_delete : bool
+        Whether something is selected in the editor.
     """
 
     theme: str
@@ -66,6 +72,9 @@ class WindowControls:
     has_panel: bool
     is_typing: bool
     scroll_box: Box | None
+    kind: str = "viewer"
+    is_drawing: bool = False
+    can_delete: bool = False
 
 
 class MapDrawing(Protocol):

@@ -58,7 +58,12 @@ class PlayMode:
             # A drag is cancelled, but an unfinished drawing is kept.
             editor.toolbox.selector.cancel(editor)
         window = open_play_window(editor, host.display, host.scale, waits_for_workers=self._waits_for_workers)
-        window.viewer.view.is_motion_reduced = self._is_motion_reduced
+        view = window.viewer.view
+        view.is_motion_reduced = self._is_motion_reduced
+        view.is_compact = editor.is_compact
+        if editor.is_compact:
+            # On a phone, the map needs the space; the page has a button for the panel.
+            view.has_panel = False
         window.cursor = host.cursor
         window.model.hidden_folder = host.model.hidden_folder
         self.window = window

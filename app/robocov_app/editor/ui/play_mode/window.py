@@ -1,6 +1,7 @@
 """The window of the viewer in play mode, and how it is opened for the map of an editor."""
 
 import math
+from dataclasses import replace
 
 import pygame
 
@@ -13,6 +14,7 @@ from robocov_app.toolkit.command_bar import BarCell, measure_cells
 from robocov_app.toolkit.commands.command import Command
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import get_key_name
+from robocov_app.toolkit.window.page_view import WindowControls
 from robocov_app.toolkit.window.window_display import WindowDisplay
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.session import Session
@@ -82,6 +84,11 @@ class PlayWindow(ViewerWindow):
     def list_more_commands(self) -> list[Command]:
         """Return the command that leads back to the editor."""
         return [Command(BACK_COMMAND, "Back to the editor", "File", self.return_to_editor, ("f5",))]
+
+    @property
+    def controls(self) -> WindowControls:
+        """State that the buttons of a phone's page show; one of them leads back to the editor."""
+        return replace(super().controls, kind="trial")
 
     def return_to_editor(self) -> None:
         """Return to the editor at the end of the frame."""
