@@ -8,7 +8,7 @@ import io
 import json
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -26,6 +26,8 @@ from robocov.metrics.run_metrics import COLUMNS
 from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
 from robocov_app.editor.ui.launch import EditorLauncher
+from robocov_app.sweep.study.gains import NO_LIMIT
+from robocov_app.sweep.study.parameters import TEAM_PARAMETERS, UNITS
 from robocov_app.sweep.study.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
 from robocov_app.toolkit.commands.command import Command
@@ -61,6 +63,45 @@ OTHER_NAMES = {
     ),
 }
 """Names outside the top level, by heading, that the handbook imports or that public functions return."""
+
+STUDY_MEANINGS = {
+    "maps": 'Names of bundled maps, or paths relative to this file; `"*"` for all bundled maps',
+    "controllers": "Names of controllers, or `mine.py:MyController`",
+    "robots": "Number of robots (default: 6)",
+    "starts": 'Names of starts; `"*"` for all starts of each map (default: the first one)',
+    "seeds": "Seeds of the starting positions and conditions: a list, or 10 for 0 to 9 (default: seed 0)",
+    "duration": "Simulated time, s (default: 60)",
+    "dt": "Control period, s (default: 1/60)",
+    "cost_hz": "Evaluations of the cost per second; 0 for the first and last step only (default: 2)",
+    "record_hz": "Saved samples per second; 0 for the first and last step only (default: 5)",
+    "lattice": "Number of sites along each side of the map at which the cost is computed (default: 64)",
+    "metrics": "Whether the table contains the [metrics](metrics.md) of the record",
+    "max_runs": "Maximum number of runs; larger studies are rejected (default: 100,000)",
+    "team": "Parameters of the robots",
+    "team.kinematics": "`point` or `unicycle`",
+    "team.track_width": "Distance between the wheels of a unicycle, m",
+    "team.turning_rate": "Maximum turning rate of a unicycle, rad/s",
+    "team.group": "Groups of robots, [as in a team file](../teams.md#robots-with-different-properties)",
+    "conditions": "[Conditions](../teams.md#message-loss-and-noise)",
+    "conditions.loss": "Probability that a message is lost",
+    "conditions.delay": "Message latency, s",
+    "conditions.message_rate": "Messages per second that each robot sends (default: one in every step)",
+    "conditions.bandwidth": "Bytes per second that each robot can send (default: unlimited)",
+    "conditions.forget_after": "Time without messages after which a robot is forgotten, s",
+    "conditions.position_noise": "Standard deviation of the localization noise, m",
+    "conditions.sensing_noise": "Standard deviation of the noise of the range sensor, m",
+    "conditions.failure_rate": "Failures per second of each robot",
+    "conditions.fail": "Failures, as in `3@20 5@40`",
+    "conditions.join": "Late robots, as in `6@30:2.5,1`",
+    "gains": "Gains to try; all others have their defaults",
+    "gains.NAME": "Gains of a controller, by its name",
+    "gains.NAME.NAME": 'A gain; `{low = 3, high = 100, scale = "log"}` is a range to sample',
+    "sampling": "Sampling of all gains with a range",
+    "sampling.method": "Method of sampling",
+    "sampling.samples": "Number of samples of each controller's gains",
+    "sampling.seed": "Seed of the samples (default: 0)",
+}
+"""Meanings of the keys of study files; those of other parameters of the robots are their names and units."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -108,7 +149,9 @@ def build_commands_page() -> str:
         with contextlib.redirect_stdout(output), contextlib.suppress(SystemExit):
             main([name, "-h"])
         text += f"\n## robocov {name}\n\n{capitalize(command.summary)}.\n\n"
-        text += f"```text\n{output.getvalue().strip()}\n```\n"
+        # Without a terminal, lines of hyphens stand for the boxes around groups of options.
+        help_text = re.sub(r"^ *-{20,} *\n| +$", "", output.getvalue(), flags=re.M)
+        text += f"```text\n{help_text.strip()}\n```\n"
     return text
 
 
@@ -194,31 +237,57 @@ def build_formats_page() -> str:
         "[the folder of a run](../results.md) has a page of its own. `robocov schema map` and "
         "`robocov schema session` print the schemas.\n"
     )
-    text += build_schema_tables("Maps", build_map_schema())
-    text += build_schema_tables("Sessions", build_session_schema())
-    rows = [(f"`{key}`", escape_cell(value)) for key, value in list_study_keys().items()]
-    text += "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys.\n\n"
-    return text + build_table(("key", "value"), rows)
+    map_schema = build_map_schema()
+    text += "\n## Maps\n\n[Draw a map](../draw-a-map.md) and [maps](../maps.md) have examples.\n"
+    text += build_schema_tables("map", map_schema)
+    text += "\n## Sessions\n\n[The window](../window.md#save) saves sessions. "
+    text += "[A lesson](../lesson.md) is one, too. Obstacles, densities and paths are as in [maps](#maps).\n"
+    text += build_schema_tables("session", build_session_schema(), described=map_schema["$defs"])
+    text += (
+        "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys. A list means that each value is tried. "
+    )
+    text += f'"{NO_LIMIT}" means no limit.\n\n'
+    meanings = read_study_meanings()
+    rows = []
+    for key, value in list_study_keys().items():
+        rows.append((f"`{key}`", escape_cell(meanings[key]), escape_cell(value)))
+    return text + build_table(("key", "meaning", "value"), rows)
 
 
-def build_schema_tables(title: str, schema: Mapping[str, Any]) -> str:
-    """Build a table of fields for each type of a JSON schema."""
-    text = f"\n## {title}\n"
+def read_study_meanings() -> dict[str, str]:
+    """Return the meaning of each key of study files."""
+    meanings = dict(STUDY_MEANINGS)
+    for name in TEAM_PARAMETERS:
+        label = name.replace("max_", "maximum_").replace("_", " ").capitalize()
+        meanings[f"team.{name}"] = f"{label} of the robots, {UNITS[name]}"
+    return meanings
+
+
+def build_schema_tables(title: str, schema: Mapping[str, Any], described: Container[str] = ()) -> str:
+    """Build a table of fields for each type of a JSON schema, except for types that are described already."""
+    text = ""
     types = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
     for name, definition in types.items():
-        if not definition.get("properties"):
+        if not definition.get("properties") or name in described:
             continue
         required = definition.get("required", [])
         rows = []
         for field, field_schema in definition["properties"].items():
             default = "required"
             if field not in required:
-                default = f"`{escape_cell(json.dumps(field_schema.get('default')))}`"
+                default = format_default(field_schema)
             meaning = escape_cell(field_schema.get("description", ""))
             rows.append((f"`{field}`", meaning, escape_cell(format_type(field_schema)), default))
         text += f"\n### {name}\n\n{escape_text(definition.get('description', ''))}\n\n"
         text += build_table(("field", "meaning", "type", "default"), rows)
     return text
+
+
+def format_default(schema: Mapping[str, Any]) -> str:
+    """Format the default of an optional value in a JSON schema."""
+    if "default" not in schema:
+        return "optional"
+    return f"`{escape_cell(json.dumps(schema['default']))}`"
 
 
 def format_type(schema: Mapping[str, Any]) -> str:

@@ -113,7 +113,7 @@ class CircleObstacle:
 
 @dataclass(frozen=True)
 class WallObstacle:
-    """A wall along a polyline, with flat ends and mitred corners.
+    """A wall along a polyline, with flat ends and mitered corners.
 
     Attributes
     ----------

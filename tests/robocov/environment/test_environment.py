@@ -22,7 +22,7 @@ def test_polygons_of_circles_deviate_by_at_most_a_millimeter(radius: float) -> N
     assert center.hausdorff_distance(polygon) <= radius * (1 + 1e-12)
 
 
-def test_a_wall_ends_flat_and_has_mitred_corners() -> None:
+def test_a_wall_ends_flat_and_has_mitered_corners() -> None:
     wall = WallObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 3.0)), 0.2).polygon
     assert wall.area == pytest.approx(2 * 0.2 + 3 * 0.2)
     assert wall.bounds == pytest.approx((0.0, -0.1, 2.1, 3.0))

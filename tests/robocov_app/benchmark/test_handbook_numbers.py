@@ -1,4 +1,4 @@
-"""The handbook's numbers are those of the entries that the package holds."""
+"""The handbook's numbers are those of the entries that the package contains."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
 
 
-def format_row(law: str, track: str) -> str:
-    """Return the row of a law's results on a track."""
-    rows = [row for row in read_result(ENTRIES / f"{law}.json.gz")["rows"] if row["track"] == track]
+def format_row(controller: str, track: str) -> str:
+    """Return the row of a controller's results on a track."""
+    rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
     assert not any("error" in row for row in rows)
-    rating = Rating(law, track, rows, 0)
+    rating = Rating(controller, track, rows, 0)
     medians = {}
     for name in suite.TRACKS[track].maps:
         gaps = [row["gap"] for row in rows if row["map"] == name and row["gap"] is not None]
@@ -29,32 +29,40 @@ def format_row(law: str, track: str) -> str:
     above = sum(median > 0.05 for median in medians.values())
     touched = sum(row["contacts"] > 0 for row in rows)
     gap = 100.0 * rating.gap.estimate
-    way = rating.compute_median("path_length_m")
+    path_length = rating.compute_median("path_length_m")
     cells = f"{gap:.1f}", f"{above} of {len(medians)}", f"{touched} of {len(rows)}"
-    rest = 100.0 * rating.compute_rest()[0]
-    return f"| `{law}` | {' | '.join(cells)} | {rest:.0f} | {way:.1f} |"
+    settled = 100.0 * rating.compute_rest()[0]
+    return f"| `{controller}` | {' | '.join(cells)} | {settled:.0f} | {path_length:.1f} |"
 
 
 RIVALS = ("rapf", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_ROWS = [
-    *((law, track) for track in PLAN_TRACKS for law in ("rapf", "lloyd")),
+    *((controller, track) for track in PLAN_TRACKS for controller in ("rapf", "lloyd")),
     *(
-        (law, "plans-small")
-        for law in ("atlas-shared", "frontier-median", "greedy-submodular", "geodesic-lloyd", "local-search")
+        (controller, "plans-small")
+        for controller in (
+            "atlas-shared",
+            "frontier-median",
+            "greedy-submodular",
+            "geodesic-lloyd",
+            "local-search",
+        )
     ),
 ]
 """Controllers and tracks with runs on large plans."""
 ROWS = [
-    *((law, track) for track in suite.RATED_TRACKS for law in ("atlas", "atlas-shared")),
-    *((law, track) for track in ("ideal", "short-range", "large-team") for law in RIVALS),
+    *((controller, track) for track in suite.RATED_TRACKS for controller in ("atlas", "atlas-shared")),
+    *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
     *PLAN_ROWS,
 ]
 
 
-@pytest.mark.parametrize(("law", "track"), ROWS)
-def test_rows_are_those_of_the_entries(law: str, track: str) -> None:
-    assert f"| {suite.format_heading(track)} {format_row(law, track)}\n" in PAGE.read_text(encoding="utf-8")
+@pytest.mark.parametrize(("controller", "track"), ROWS)
+def test_rows_are_those_of_the_entries(controller: str, track: str) -> None:
+    assert f"| {suite.format_heading(track)} {format_row(controller, track)}\n" in PAGE.read_text(
+        encoding="utf-8"
+    )
 
 
 def test_the_first_table_has_the_gaps_of_the_entries() -> None:

@@ -232,3 +232,12 @@ def test_early_files_with_other_keys_are_read_and_saved_with_the_present_keys(tm
     path.write_text(json.dumps(early))
     with pytest.raises(MapError, match="edits: missing"):
         load_session(path)
+
+
+def test_the_schema_describes_every_field_and_is_strict_json() -> None:
+    schema = build_session_schema()
+    json.dumps(schema, allow_nan=False)
+    for name, definition in schema["$defs"].items():
+        assert "Attributes" not in definition["description"], name
+        for key, field_schema in definition["properties"].items():
+            assert field_schema.get("description"), (name, key)

@@ -302,7 +302,7 @@ class SetRobotProperties(_Edit):
         The properties.
     """
 
-    properties: Annotated[FileProperties, Field(alias="team")]
+    properties: Annotated[FileProperties, Field(alias="team", description="The properties")]
     do: Literal["team"] = field(default="team", kw_only=True)
 
     def build_continuation(self, pane: Pane) -> Continuation:

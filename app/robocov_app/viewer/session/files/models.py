@@ -4,6 +4,8 @@ Files of early versions have other names for some keys, which are read, but neve
 `edits`, `touch` for `edit`, and `words` for `description`.
 """
 
+import math
+import re
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -21,6 +23,8 @@ from robocov_app.viewer.session.editing.edits import (
 )
 from robocov_app.viewer.session.files.fields import Coordinate, RobotNumber, Step, Text
 
+_ATTRIBUTE = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*(?:\n|$))+)", re.M)
+"""An attribute in a docstring: its name and its description, which is indented."""
 MIN_CHAPTER_SPEED = 0.1
 MAX_CHAPTER_SPEED = 16
 MAX_ANSWERS = 4
@@ -62,12 +66,15 @@ class NodeModel(_Model):
     """One edit, and the time span until the next one."""
 
     parent: Annotated[int | None, Field(ge=0, description="Number of the edit before; null for the first")]
-    at: Step
-    kind: Text
-    description: Text = Field(validation_alias=AliasChoices("description", "words"))
-    name: Text = ""
-    end: Step
-    changes: Annotated[list[_FileEdit], Field(min_length=1)]
+    at: Step = Field(description="Step before which the edit is made")
+    kind: Text = Field(description="Kind of edit, which determines its icon")
+    description: Text = Field(
+        description="Description of the edit in the window",
+        validation_alias=AliasChoices("description", "words"),
+    )
+    name: Text = Field("", description="Name of the branch that starts here")
+    end: Step = Field(description="Last step of the time span")
+    changes: Annotated[list[_FileEdit], Field(min_length=1, description="What the edit changes, in order")]
     curves: dict[str, list[list[Coordinate]]] = Field(
         {},
         description='Samples of the curves in this span: [times, values] of "pane distance" and "pane time"',
@@ -87,8 +94,8 @@ class NodeModel(_Model):
 class BundledMapModel(_Model):
     """A map that comes with robocov."""
 
-    bundled: Text
-    digest: Text
+    bundled: Text = Field(description="Name of the map")
+    digest: Text = Field(description="Digest of its content, by which a changed map is recognized")
 
 
 class ConditionModel(_Model):
@@ -99,51 +106,63 @@ class ConditionModel(_Model):
     robot: RobotNumber | None = Field(
         None, description="The robot that is to be in `inside`, or out of `outside`"
     )
-    inside: _Box | None = None
-    outside: _Box | None = None
-    mean_distance_below: Annotated[float, Field(gt=0)] | None = None
+    inside: _Box | None = Field(None, description="Box [x_min, y_min, x_max, y_max] in meters")
+    outside: _Box | None = Field(None, description="Box [x_min, y_min, x_max, y_max] in meters")
+    mean_distance_below: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="The mean distance is below this value, in meters"
+    )
 
 
 class QuestionModel(_Model):
     """A question for a prediction, before a chapter continues."""
 
-    text: Text
-    answers: Annotated[list[Text], Field(min_length=2, max_length=MAX_ANSWERS)]
-    right: Annotated[int, Field(ge=1, le=MAX_ANSWERS, description="Number of the right answer")]
-    why: Text = ""
+    text: Text = Field(description="The question")
+    answers: Annotated[list[Text], Field(min_length=2, max_length=MAX_ANSWERS)] = Field(
+        description="Answers to choose from"
+    )
+    right: Annotated[int, Field(ge=1, le=MAX_ANSWERS, description="Number of the right answer, from 1")]
+    why: Text = Field("", description="Explanation, displayed after the answer")
 
 
 class TaskModel(_Model):
     """Something that the viewer of a lesson does."""
 
-    text: Text
-    until: ConditionModel
-    done: Text = "Done."
+    text: Text = Field(description="What the viewer does")
+    until: ConditionModel = Field(description="Condition at which the task is done")
+    done: Text = Field("Done.", description="Text displayed when the task is done")
 
 
 class ChapterModel(_Model):
     """A chapter of a lesson: the edits on the path to a node are repeated as time passes."""
 
-    title: Annotated[str, Field(min_length=1, max_length=MAX_CHAPTER_TITLE_CHARS)]
-    text: Text
+    title: Annotated[
+        str, Field(min_length=1, max_length=MAX_CHAPTER_TITLE_CHARS, description="Title of the chapter")
+    ]
+    text: Text = Field(description="Text of the chapter")
     edit: int = Field(
         ge=0,
         description="Index of the last edit that the chapter repeats",
         validation_alias=AliasChoices("edit", "touch"),
     )
-    until: ConditionModel
-    speed: Annotated[float, Field(ge=MIN_CHAPTER_SPEED, le=MAX_CHAPTER_SPEED)] = 1.0
+    until: ConditionModel = Field(description="Condition at which the chapter ends")
+    speed: Annotated[float, Field(ge=MIN_CHAPTER_SPEED, le=MAX_CHAPTER_SPEED)] = Field(
+        1.0, description="Playback speed"
+    )
     show: list[str] = Field([], description="Layers in addition to the usual ones")
     robot: RobotNumber | None = Field(None, description="The robot that is inspected")
-    question: QuestionModel | None = None
-    task: TaskModel | None = None
+    question: QuestionModel | None = Field(None, description="Question before the chapter plays")
+    task: TaskModel | None = Field(None, description="Task after the chapter has played")
 
 
 class LessonModel(_Model):
     """The chapters of a lesson."""
 
-    title: Annotated[str, Field(min_length=1, max_length=MAX_LESSON_TITLE_CHARS)]
-    chapters: Annotated[list[ChapterModel], Field(min_length=1, max_length=MAX_CHAPTERS)]
+    title: Annotated[
+        str, Field(min_length=1, max_length=MAX_LESSON_TITLE_CHARS, description="Title of the lesson")
+    ]
+    chapters: Annotated[list[ChapterModel], Field(min_length=1, max_length=MAX_CHAPTERS)] = Field(
+        description="Chapters in order"
+    )
     found: Annotated[list[Text], Field(max_length=MAX_CLOSING_LINES)] = Field(
         default=[], description="Findings of the lesson, listed on its closing page"
     )
@@ -161,18 +180,57 @@ def _note_maps(maps: list[BundledMapModel | dict[str, Any]], info: Any) -> list[
 class SessionModel(_Model, title="robocov session"):
     """A session of the window: a tree of edits from which every state can be recomputed."""
 
-    schema_: Annotated[str | None, Field(alias="$schema")] = None
-    format: Literal["robocov-session"]
-    version: Literal[1]
-    robocov: Text = ""
-    maps: Annotated[list[BundledMapModel | dict[str, Any]], Field(min_length=1), AfterValidator(_note_maps)]
-    edits: list[NodeModel] = Field(min_length=1, validation_alias=AliasChoices("edits", "touches"))
+    schema_: str | None = Field(None, alias="$schema", description="Address of the schema, for text editors")
+    format: Literal["robocov-session"] = Field(description="Format of the file")
+    version: Literal[1] = Field(description="Version of the format")
+    robocov: Text = Field("", description="Version of robocov that has saved the session")
+    maps: Annotated[
+        list[BundledMapModel | dict[str, Any]],
+        Field(min_length=1, description="Bundled maps by name, others with their content"),
+        AfterValidator(_note_maps),
+    ]
+    edits: list[NodeModel] = Field(
+        min_length=1,
+        description="All edits; the first one starts the session",
+        validation_alias=AliasChoices("edits", "touches"),
+    )
     head: Annotated[int, Field(ge=0, description="Number of the edit whose time span contains the present")]
-    step: Step
+    step: Step = Field(description="Displayed step")
     view: dict[str, Any] = Field({}, description="Displayed layers and theme")
-    lesson: LessonModel | None = None
+    lesson: LessonModel | None = Field(None, description="The lesson, if the session is one")
 
 
 def build_session_schema() -> dict[str, Any]:
     """Return the JSON schema of session files."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **SessionModel.model_json_schema()}
+    schema = SessionModel.model_json_schema()
+    for definition in schema["$defs"].values():
+        _describe_fields(definition)
+        _correct_defaults(definition)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _describe_fields(definition: dict[str, Any]) -> None:
+    """Keep the summary of a docstring as description, and describe fields as its section Attributes does."""
+    summary, _, sections = definition.get("description", "").partition("\n\n")
+    definition["description"] = summary
+    fields = definition.get("properties", {})
+    for name, meaning in _ATTRIBUTE.findall(sections):
+        if name in fields:
+            fields[name].setdefault("description", _format_meaning(meaning))
+    if "do" in fields:
+        fields["do"].setdefault("description", "Kind of the change, which determines the other keys")
+
+
+def _format_meaning(text: str) -> str:
+    """Format the description of an attribute for JSON, in which None is null."""
+    return " ".join(text.split()).removesuffix(".").replace("None", "null")
+
+
+def _correct_defaults(definition: dict[str, Any]) -> None:
+    """Write defaults as files do: null for no limit; and omit those that the type of the field describes."""
+    for field_schema in definition.get("properties", {}).values():
+        default = field_schema.get("default")
+        if default == math.inf:
+            field_schema["default"] = None
+        elif isinstance(default, dict) and default:
+            del field_schema["default"]

@@ -25,7 +25,9 @@ from robocov_app.viewer.session.files.fields import convert_field
 MAX_PROPERTY = 1e9
 
 _VALUE = convert_field(
-    Annotated[float | None, Field(strict=True, ge=0, le=MAX_PROPERTY, description="null: no limit")],
+    Annotated[
+        float | None, Field(strict=True, ge=0, le=MAX_PROPERTY, description="In SI units; null for no limit")
+    ],
     load=lambda value, _: np.inf if value is None else value,
     dump=lambda value, _: value if np.isfinite(value) else None,
 )
@@ -56,9 +58,12 @@ turning_rate : float
     communication_range: PropertyValue = DEFAULT_COMMUNICATION_RANGE_M
     track_width: PropertyValue = DEFAULT_TRACK_WIDTH_M
     turning_rate: PropertyValue = DEFAULT_TURNING_RATE_RAD_S
-    values_by_robot: Annotated[Mapping[str, Mapping[int, PropertyValue]], Field(alias="different")] = field(
-        default_factory=dict
-    )
+    values_by_robot: Annotated[
+        Mapping[str, Mapping[int, PropertyValue]],
+        Field(
+            alias="different", description="Values of single robots that differ, by property and robot number"
+        ),
+    ] = field(default_factory=dict)
 
     @classmethod
     def from_team(cls, team: Team, numbers: Sequence[int] | None = None) -> Self:

@@ -83,10 +83,23 @@ class SessionScenario:
     robots: Annotated[int, Field(strict=True, ge=1, le=MAX_ROBOTS)] = DEFAULT_ROBOTS
     start: Text | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    properties: Annotated[FileProperties, Field(alias="team")] = DEFAULT_PROPERTIES
-    dt: Annotated[float, Field(strict=True, alias="dt_s", ge=MIN_DT_S, le=MAX_DT_S)] = DEFAULT_DT_S
-    given_starts: Annotated[Array | None, _ROWS, Field(alias="starts_m")] = None
-    velocities: Annotated[Array | None, _ROWS, Field(alias="start_velocities_m_per_s")] = None
+    properties: Annotated[FileProperties, Field(alias="team", description="Properties of the robots")] = (
+        DEFAULT_PROPERTIES
+    )
+    dt: Annotated[
+        float,
+        Field(strict=True, alias="dt_s", ge=MIN_DT_S, le=MAX_DT_S, description="Control period in seconds"),
+    ] = DEFAULT_DT_S
+    given_starts: Annotated[
+        Array | None,
+        _ROWS,
+        Field(alias="starts_m", description="[x, y] of each robot in meters; null to sample them"),
+    ] = None
+    velocities: Annotated[
+        Array | None,
+        _ROWS,
+        Field(alias="start_velocities_m_per_s", description="Initial velocities [vx, vy] in m/s"),
+    ] = None
     conditions: Annotated[Conditions | None, _CONDITIONS] = None
 
     def __post_init__(self) -> None:
