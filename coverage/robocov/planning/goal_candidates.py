@@ -12,9 +12,9 @@ from robocov.planning.lattice_graph import LatticeGraph
 from robocov.planning.window import Window
 
 _MAX_CANDIDATES = 180
-"""Maximum number of nodes that `choose_regular_nodes` returns in a small window."""
+"""Maximum number of nodes that `_choose_regular_nodes` returns in a small window."""
 _NODES_PER_CANDIDATE = 9
-"""Minimum number of nodes for each node that `choose_regular_nodes` returns in a large window."""
+"""Minimum number of nodes for each node that `_choose_regular_nodes` returns in a large window."""
 _MAX_CANDIDATE_DISTANCE_STEPS = 1.5
 """Maximum distance of a usable node from the nearest candidate, in steps between regular nodes."""
 
@@ -28,7 +28,7 @@ class TeamCandidates(NamedTuple):
     """(c, m) m, distances from these nodes to all nodes."""
 
 
-def choose_regular_nodes(window: Window, is_usable: BoolArray) -> tuple[IntArray, int]:
+def _choose_regular_nodes(window: Window, is_usable: BoolArray) -> tuple[IntArray, int]:
     """Choose the usable nodes in every k-th row and column of the nodes of a window.
 
     Parameters
@@ -67,10 +67,10 @@ def choose_candidates(graph: LatticeGraph, is_usable: BoolArray) -> IntArray:
     Returns
     -------
     (c,) int array
-        The nodes from `choose_regular_nodes`, whose rows and columns may miss narrow passages, and as
+        The nodes from `_choose_regular_nodes`, whose rows and columns may miss narrow passages, and as
         many further nodes as are needed so that no usable node is far from all candidates.
     """
-    candidates, step = choose_regular_nodes(graph.map_window.window, is_usable)
+    candidates, step = _choose_regular_nodes(graph.map_window.window, is_usable)
     max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * step * graph.map_window.spacing
     distances = graph.search(candidates, np.zeros(len(candidates)))
     while True:

@@ -183,7 +183,7 @@ def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
 
 
 def test_a_team_spreads_over_narrow_tunnels() -> None:
-    """Tunnels are so narrow that three of the seven contain no node of `choose_regular_nodes`."""
+    """Tunnels are so narrow that three of the seven contain no node of `_choose_regular_nodes`."""
     region = Region(np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 24.0], [0.0, 24.0]]))
     raster = Raster(region, 0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)

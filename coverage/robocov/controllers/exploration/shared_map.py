@@ -21,7 +21,7 @@ from robocov.k_median import run_lloyd
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
-from robocov.planning.goal_candidates import choose_regular_nodes
+from robocov.planning.goal_candidates import choose_candidates
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.raster import Raster
 from robocov.planning.team_placement import UNREACHABLE_M
@@ -147,7 +147,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
-        """Build candidates at regularly spaced nodes that robots can reach.
+        """Build candidates at nodes that are spread over the nodes with clearance.
 
         Parameters
         ----------
@@ -159,8 +159,8 @@ class Candidates(NamedTuple):
         -------
         Candidates
         """
-        map_window = situation.planner.map_window
-        nodes, _ = choose_regular_nodes(map_window.window, map_window.has_clearance)
+        planner = situation.planner
+        nodes = choose_candidates(planner.graph, planner.map_window.has_clearance)
         return cls.build_at_nodes(situation, weights, nodes)
 
     def compute_cost(self, chosen: IntArray) -> float:

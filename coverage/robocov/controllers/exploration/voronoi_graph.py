@@ -121,7 +121,7 @@ def _assign_vertices(situation: Situation, vertices: Array) -> Array:
     if not len(vertices):
         return goals
     planner = situation.planner
-    nodes = [planner.visibility.find_nearest_node(vertex) for vertex in vertices]
+    nodes = [planner.visibility.find_visible_node(vertex) for vertex in vertices]
     distances = np.array(
         [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
     )

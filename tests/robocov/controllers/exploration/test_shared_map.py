@@ -11,7 +11,7 @@ from robocov.controllers import CONTROLLERS, Rapf, get_information, make_control
 from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.scan_exchange import ScanExchange
-from robocov.controllers.exploration.shared_map import Situation, assign_goals
+from robocov.controllers.exploration.shared_map import Candidates, Situation, assign_goals
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.cost import CoverageCost
 from robocov.density import Gaussian, Gaussians
@@ -136,6 +136,19 @@ def test_goals_are_assigned_with_the_smallest_sum_of_squared_path_lengths() -> N
 
 
 THREE_ROBOTS = [[4.0, 3.0], [4.0, 5.0], [4.0, 4.0]]
+
+
+def test_every_narrow_passage_has_candidates() -> None:
+    """Regularly spaced nodes miss every other passage."""
+    state = np.full(RASTER.shape, FREE, dtype=np.uint8)
+    for first_row in range(2, 78, 8):
+        state[first_row : first_row + 4, 8:72] = WALL
+    window = Window.build_around(RASTER, np.array([4.0, 4.0]), np.inf, 1600)
+    planner = GridPlanner(DiscoveredMap(RASTER, state), window, 0.13)
+    situation = build_situation(state, THREE_ROBOTS)._replace(planner=planner)
+    candidates = Candidates.build_for_team(situation, np.ones(len(planner.map_window.nodes)))
+    distances = planner.compute_distances_from(candidates.positions)
+    assert distances[planner.map_window.has_clearance].max() < 1.0
 
 
 def test_on_a_complete_map_there_is_no_frontier() -> None:
