@@ -54,6 +54,7 @@ PLAN_ROWS = [
 ROWS = [
     *((controller, track) for track in suite.RATED_TRACKS for controller in ("atlas", "atlas-shared")),
     *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
+    *((controller, "ideal") for controller in ("local-search", "exemplar")),
     *PLAN_ROWS,
 ]
 
