@@ -61,6 +61,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         return
     from robocov_app.terminal.interruption import unblock_interrupts
     from robocov_app.toolkit.window.termination import ending_on_signals, is_ending
+    from robocov_app.web.access import CONTROL_LABEL
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
 
@@ -71,7 +72,7 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
         confine_files(folder),
         ending_on_signals(),
     ):
-        echo(f"Control the window: {display.link}", flush=True)
+        echo(f"{CONTROL_LABEL}{display.link}", flush=True)
         echo(f"Watch it:           {display.watch_link}", flush=True)
         if not is_relayed:
             echo("Press Ctrl+C to stop.", flush=True)

@@ -8,6 +8,8 @@ from urllib.parse import parse_qsl
 
 from robocov.errors import InputError
 
+CONTROL_LABEL = "Control the window: "
+"""Text before the link in the first line that a served window prints."""
 _LOOPBACK_ADDRESSES = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Addresses that a browser on this machine can open, for a server that listens at all addresses."""
 _PROBES = {"0.0.0.0": (socket.AF_INET, "192.0.2.1"), "::": (socket.AF_INET6, "2001:db8::1")}

@@ -1,7 +1,6 @@
 """A served window in a notebook cell: a separate process, and an iframe that shows it."""
 
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -13,6 +12,7 @@ from urllib.parse import urlsplit
 from robocov.errors import RobocovError
 from robocov.optional_imports import import_optional
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
+from robocov_app.web.access import CONTROL_LABEL
 
 _END_TIMEOUT_S = 5.0
 """Time for the process to end before it is killed."""
@@ -66,13 +66,13 @@ class LiveWindow:
             )
             self.close = weakref.finalize(self, _end_process, self._process)
             assert self._process.stdout is not None
-            link_match = re.search(r"(http\S+)", self._process.stdout.readline())
-            if link_match is None:
+            line = self._process.stdout.readline()
+            if not line.startswith(CONTROL_LABEL):
                 self._process.wait()
                 errors.seek(0)
                 text = errors.read().decode(errors="replace").strip().removeprefix("robocov: error: ")
                 raise RobocovError(text or "the window did not open")
-            self.link = link_match[1]
+            self.link = line.removeprefix(CONTROL_LABEL).strip()
 
     def _repr_html_(self) -> str:
         link = self.link

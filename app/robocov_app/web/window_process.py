@@ -21,7 +21,7 @@ from urllib.parse import urlsplit
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.terminal.interruption import block_interrupts, unblock_interrupts
-from robocov_app.web.access import get_token
+from robocov_app.web.access import CONTROL_LABEL, get_token
 
 OPENING_TIMEOUT_S = 120.0
 ENDING_TIMEOUT_S = 5.0
@@ -127,8 +127,8 @@ async def wait_until_open(process: SpawnProcess, output: Connection, folder: Pat
     """
     with output:
         line = await asyncio.to_thread(_receive_line, output)
-    word, _, link = line.strip().partition(" ")
-    if word == "open":
+    if line.startswith(CONTROL_LABEL):
+        link = line.removeprefix(CONTROL_LABEL).strip()
         return WindowProcess(process, folder, urlsplit(link).port or 0, get_token(link))
     process.terminate()
     with suppress(OSError):
