@@ -10,7 +10,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import imageio_ffmpeg
+import numpy as np
 import pygame
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from robocov.mapfile import find_map_file, load_map
@@ -34,6 +36,8 @@ DIALOG_SIZE = (900, 600)
 METERS_PER_PIXEL = 0.025
 """Scale of the floor plan in the import dialog."""
 BLUE = (74, 111, 165)
+EXACT_COLORS = 64
+"""Number of the most frequent colors that screenshots contain exactly."""
 
 
 def draw_window(theme: str, name: str) -> None:
@@ -132,8 +136,36 @@ def draw_import_dialog(theme: str, name: str) -> None:
 
 def save_screenshot(window: ViewerWindow | EditorWindow, file: Path) -> None:
     """Save a screenshot of a window as a small file."""
-    small = Image.fromarray(copy_pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
-    small.save(file, optimize=True)
+    reduce_colors(copy_pixels(window.screen)).save(file, optimize=True)
+
+
+def reduce_colors(pixels: NDArray[np.uint8]) -> Image.Image:
+    """Reduce an image to 256 colors: the most frequent ones exactly, and others that resemble the rest.
+
+    Large areas keep their colors, and so do small ones, such as arrows.
+
+    Parameters
+    ----------
+    pixels : (height, width, 3) uint8 array
+
+    Returns
+    -------
+    Image.Image
+    """
+    colors, indices, counts = np.unique(
+        pixels.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(-counts)
+    exact = colors[order[:EXACT_COLORS]]
+    rare = Image.fromarray(colors[order[EXACT_COLORS:]][None])
+    similar = rare.quantize(256 - EXACT_COLORS, method=Image.Quantize.MAXCOVERAGE).getpalette()
+    assert similar is not None
+    palette = np.concatenate([exact, np.reshape(similar, (-1, 3))])[:256]
+    offsets = colors[:, None].astype(int) - palette
+    nearest = (offsets**2).sum(axis=2).argmin(axis=1).astype(np.uint8)
+    image = Image.fromarray(nearest[indices].reshape(pixels.shape[:2]), "P")
+    image.putpalette(palette.astype(np.uint8).tobytes())
+    return image
 
 
 def record_tour(name: str) -> None:
