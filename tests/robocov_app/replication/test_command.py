@@ -1,4 +1,4 @@
-"""Bad input of `robocov paper`; what it does is in `test_whole_study`."""
+"""Bad input of `robocov paper`; `test_whole_study` tests the study itself."""
 
 from called import read_complaint
 

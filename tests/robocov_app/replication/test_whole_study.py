@@ -1,4 +1,4 @@
-"""A whole study, as small as it can be: done, gone on with, stopped, read, drawn and written."""
+"""The whole study of the paper, as small as possible: runs, interruptions, tables, figures and pages."""
 
 import json
 import os
@@ -62,7 +62,7 @@ def small_parts():
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The folder, what both parts gave, and the pictures of the paper's page."""
+    """The folder, the results of both parts, and the images of the paper's page."""
     with share_folder(tmp_path_factory, "tiny-paper") as root:
         folder = root / "out"
         kept = root / "images"
@@ -70,9 +70,9 @@ def study(tmp_path_factory):
         paper = parts.run_paper(folder, TINY, build_options())
         if not kept.exists():
             images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
-            found = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
-            study_pages.write_claims(folder, found)
-            page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found)
+            claims = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
+            study_pages.write_claims(folder, claims)
+            page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=claims)
             study_pages.write_text(folder / study_pages.PAGE_FILE, page)
             kept.write_bytes(pickle.dumps(images))
         beyond = parts.run_beyond(folder, TINY, build_options(), paper)
@@ -100,24 +100,24 @@ def beyond(study):
 
 
 @pytest.fixture(scope="module")
-def content(folder):
+def paper_page(folder):
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
-def more(beyond):
+def beyond_page(beyond):
     return study_pages.build_beyond_page(DRAWN, beyond)
 
 
-def format_claims(found) -> str:
+def format_claims(claims) -> str:
     """Return claims as text: one that is not a number equals itself there."""
-    return json.dumps([claim.to_json() for claim in found])
+    return json.dumps([claim.to_json() for claim in claims])
 
 
 class TestRuns:
-    def test_as_many_as_were_forecast(self, folder, paper, beyond, tmp_path):
+    def test_the_forecast_is_the_number_of_runs(self, folder, paper, beyond, tmp_path):
         expected = forecast_study(tmp_path, TINY, 2, claims=True, beyond=True)
-        # none of the tiny grid's gains are the shared ones
+        # The tiny grid does not contain the shared gains.
         assert expected.left == expected.runs == paper.runs + beyond.runs
         assert paper.failed == beyond.failed == 0
         assert expected.seconds > 0.0 and set(expected.seconds_per_run) == set(CONTROLLERS)
@@ -125,17 +125,17 @@ class TestRuns:
         assert (again.left, again.seconds) == (0, 0.0)
         assert forecast_study(folder, TINY, 2, claims=False, beyond=False).runs == 16
 
-    def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
+    def test_the_forecast_includes_the_best_gains_of_a_finished_grid(self, tmp_path, monkeypatch):
         monkeypatch.setattr("robocov_app.sweep.worker.perform", lambda task: None)
         without = forecast_study(tmp_path, TINY, 2, claims=False, beyond=True)
         for task in generate_tasks(studies.build_gains_study(TINY)):
             (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
-        # what a former version has done lies there as well
+        # Runs of an earlier version are in the same folder.
         (tmp_path / "studies" / "gains" / "runs" / "of-a-former-version").mkdir()
         expected = forecast_study(tmp_path, TINY, 2, claims=False, beyond=True)
         assert expected.runs == expected.left == without.runs + 2 * 3 * 2  # RAPF's and RPF's
 
-    def test_the_same_call_does_nothing_again_and_gives_the_same(self, folder, paper, beyond):
+    def test_a_finished_study_repeats_no_runs(self, folder, paper, beyond):
         rows = sorted((folder / "studies").glob("*/runs/*/row.json"))
         before = [path.stat().st_mtime_ns for path in rows]
         again = parts.run_paper(folder, TINY, build_options())
@@ -148,24 +148,27 @@ class TestRuns:
         ) == format_claims(paper_claims)
         assert format_claims(judge_beyond_claims(alone)) == format_claims(judge_beyond_claims(beyond))
 
-    def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
+    def test_lost_runs_are_repeated_with_equal_results(self, folder, paper, beyond, tmp_path):
         out = tmp_path / "out"
         shutil.copytree(folder, out)
         lost = sorted((out / "studies" / "rivals" / "runs").iterdir())[::5]
         lost += sorted((out / "studies").glob("conditions-*/runs/*"))[::6]
         for path in lost:
             shutil.rmtree(path)
-        (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
+        (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as a killed run leaves it
         again = parts.run_beyond(out, TINY, build_options(), paper)
         assert format_claims(judge_beyond_claims(again)) == format_claims(judge_beyond_claims(beyond))
         for name in ("rivals", "conditions-loss"):
             table = f"studies/{name}/results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
 
-    def test_best_gains_are_those_with_the_least_mean_excess(self, folder, paper, beyond):
-        of = {each.key: each for each in paper.contenders}
-        for law, grid in paper.gains.items():
-            assert of[f"{law}-best"].gains == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+    def test_the_best_gains_have_the_lowest_mean_excess(self, folder, paper, beyond):
+        contenders_by_key = {each.key: each for each in paper.contenders}
+        for controller, grid in paper.gains.items():
+            assert (
+                contenders_by_key[f"{controller}-best"].gains
+                == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+            )
         assert set(beyond.gains) == set(GAIN_GRIDS)
         table = list(read_results(folder / "studies" / "rivals").rows())
         for name, grid in beyond.gains.items():
@@ -175,7 +178,7 @@ class TestRuns:
                 if row["controller"] == name:
                     assert {gain: row[gain] for gain in best} == best
 
-    def test_all_contenders_began_in_the_same_places(self, folder):
+    def test_all_contenders_start_from_the_same_positions(self, folder):
         starts: dict = {}
         for path in folder.glob("studies/claims/runs/*/run.json"):
             run = json.loads(path.read_text())
@@ -184,7 +187,7 @@ class TestRuns:
         assert len(starts) == 6
         assert all(len(places) == 1 for places in starts.values())
 
-    def test_the_worst_runs_are_rapfs_worst_on_each_map(self, paper):
+    def test_the_worst_runs_are_those_of_rapf_on_each_map(self, paper):
         gap = paper.claims.get_values("rapf-shared", "gap")
         assert len({scenario.map for scenario, _ in paper.worst}) == len(paper.worst) == 2
         first, record = paper.worst[0]
@@ -193,26 +196,28 @@ class TestRuns:
         assert record.positions[-1] == pytest.approx(paper.claims.values["rapf-shared", "placement"][k])
         assert record.gains["k_att"] == 3.0
 
-    def test_figures_show_their_runs(self, paper):
+    def test_figures_contain_their_runs(self, paper):
         assert set(paper.figures[""]) == {
-            f"{case}/{law}"
+            f"{case}/{controller}"
             for case in ("convex", "a", "b", "other")
-            for law in ("rapf", "lloyd" if case == "convex" else "rpf")
+            for controller in ("rapf", "lloyd" if case == "convex" else "rpf")
         }
         other = paper.figures[""]["other/rapf"].record
         same = paper.figures[""]["b/rpf"].record
         assert (other.start, same.start) == ("other", "paper")
         assert same.positions[0] == pytest.approx(paper.figures[""]["a/rapf"].record.positions[0])
 
-    def test_figures_4_to_8_show_the_best_gains_as_well(self, paper):
+    def test_figures_4_to_8_also_contain_the_best_gains(self, paper):
         best = paper.figures["best"]
-        of = {each.key: each for each in paper.contenders}
-        assert set(best) == {f"{case}/{law}" for case in ("a", "b", "other") for law in ("rapf", "rpf")}
+        contenders_by_key = {each.key: each for each in paper.contenders}
+        assert set(best) == {
+            f"{case}/{controller}" for case in ("a", "b", "other") for controller in ("rapf", "rpf")
+        }
         for name, run in best.items():
-            assert dict(run.record.gains) == of[f"{name.partition('/')[2]}-best"].all_gains
+            assert dict(run.record.gains) == contenders_by_key[f"{name.partition('/')[2]}-best"].all_gains
             assert run.record.positions[0] == pytest.approx(paper.figures[""][name].record.positions[0])
 
-    def test_a_task_of_two_studies_is_done_once(self, tmp_path):
+    def test_a_run_that_two_studies_share_is_executed_once(self, tmp_path):
         common = {
             "maps": study_maps.build_generated_maps(TINY.beyond.maps),
             "duration": 0.2,
@@ -240,12 +245,12 @@ class TestBeyond:
         samples = build_gap_samples(beyond)
         assert [sample.label for sample in samples] == [row.contender.label for row in rows]
 
-    def test_the_papers_runs_count_where_baselines_ran(self, paper):
+    def test_runs_of_the_paper_count_on_the_maps_of_the_baselines(self, paper):
         fewer = replace(TINY, beyond=replace(TINY.beyond, generated=()))
         outcomes = parts.select_baseline_outcomes(paper.claims, fewer)
         assert set(outcomes.maps) == {"blocks-a"} and set(outcomes.starts) == {"corner"}
 
-    def test_both_runs_are_judged_by_the_density(self, folder, beyond):
+    def test_runs_with_and_without_the_density_are_rated_by_it(self, folder, beyond):
         known, ignored = beyond.density.figure_runs
         assert not known.record.environment.density.is_uniform
         assert ignored.record.environment.density is None
@@ -257,10 +262,10 @@ class TestBeyond:
         finals = beyond.density.outcomes.get_values("known", "final")
         assert finals == pytest.approx([row["mean_distance_m"] for row in table])
 
-    def test_mixed_teams_are_judged_by_time(self, beyond):
-        for law in TEAMS:
-            seconds = beyond.teams.get_values(law.key, "time")
-            meters = beyond.teams.get_values(law.key, "final")
+    def test_mixed_teams_are_rated_by_travel_time(self, beyond):
+        for team in TEAMS:
+            seconds = beyond.teams.get_values(team.key, "time")
+            meters = beyond.teams.get_values(team.key, "final")
             assert (seconds > meters).all() and (seconds < 4.0 * meters + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
@@ -297,7 +302,7 @@ TINY_COMMAND = (
 
 
 def start_study(*words: str) -> subprocess.Popen[str]:
-    """Start the command with the tiny study in a process of its own."""
+    """Start the command with the tiny study in its own process."""
     return subprocess.Popen(
         [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parents[1]), *words],
         stdout=subprocess.PIPE,
@@ -312,7 +317,7 @@ def count_finished_runs(out: Path) -> int:
 
 
 def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None:
-    end = time.monotonic() + 300.0  # a hang limit: two busy cores are enough in a fifth of it
+    end = time.monotonic() + 300.0  # Two busy cores need a fifth of this time.
     while count_finished_runs(out) < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
@@ -320,19 +325,17 @@ def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None
 
 
 class TestStopping:
-    def test_a_study_that_was_interrupted_and_killed_ends_as_an_undisturbed_one(
-        self, folder, content, tmp_path
-    ):
+    def test_an_interrupted_and_killed_study_ends_like_an_undisturbed_one(self, folder, paper_page, tmp_path):
         out = tmp_path / "out"
         process = start_study("--out", str(out), "--workers", "2")
         wait_for_runs(out, 12, process)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        said, told = process.communicate(timeout=300)
+        output, messages = process.communicate(timeout=300)
         assert process.returncode == 130
-        first = next(line for line in told.splitlines() if line.startswith("paper"))
+        first = next(line for line in messages.splitlines() if line.startswith("paper"))
         assert first.startswith("paper (quick): 142 runs, about ")
         assert "on 2 processes (measured: rapf 0." in first and "Ctrl+C keeps finished runs" in first
-        assert f"To resume: robocov paper --out {out} --quick --without-beyond" in said
+        assert f"To resume: robocov paper --out {out} --quick --without-beyond" in output
         kept = count_finished_runs(out)
         assert 12 <= kept < 142
 
@@ -342,19 +345,19 @@ class TestStopping:
         process.communicate(timeout=300)
 
         process = start_study("--out", str(out), "--workers", "2", "--json")
-        said, told = process.communicate(timeout=500)
-        assert process.returncode == 0, told
-        answer = json.loads(said)
+        output, messages = process.communicate(timeout=500)
+        assert process.returncode == 0, messages
+        answer = json.loads(output)
         assert (answer["runs"], answer["failed"], answer["interrupted"]) == (142, 0, False)
         assert (out / "claims.json").read_bytes() == (folder / "claims.json").read_bytes()
-        assert (out / "index.html").read_text(encoding="utf-8") == content
+        assert (out / "index.html").read_text(encoding="utf-8") == paper_page
         for name in ("gains", "convex", "claims"):
             table = Path("studies") / name / "results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
         for picture in (folder / "figures").iterdir():
             assert (out / "figures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
 
-    def test_nothing_is_done_after_ctrl_c(self, folder, tmp_path):
+    def test_no_run_starts_after_ctrl_c(self, folder, tmp_path):
         open_folder(tmp_path / "out", TINY)
         stopped = build_options()
         stopped.stop.requested = True
@@ -368,7 +371,7 @@ class TestStopping:
 
 
 class TestTables:
-    def test_a_row_for_each_law(self, paper):
+    def test_the_table_has_a_row_for_each_contender(self, paper):
         rows = summarize_contenders(paper.claims, paper.contenders, TINY.duration)
         assert [row.contender for row in rows] == list(paper.contenders)
         for row in rows:
@@ -384,11 +387,14 @@ class TestTables:
             assert row.medians["work"] == np.median(work) and work.min() > 0.0
             assert row.rest_time <= TINY.duration or (row.rest_time == np.inf and row.rest_fraction <= 0.5)
 
-    def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
-        (table,) = re.findall(r"<caption><span>Map by map.*?</table>", content, re.DOTALL)
+    def test_the_table_has_a_row_for_each_map(self, paper, paper_page):
+        (table,) = re.findall(r"<caption><span>Map by map.*?</table>", paper_page, re.DOTALL)
         assert re.findall(r'<th scope="row">(.*?)</th>', table) == ["blocks-a", "generated-1"]
         here = [scenario.map == "blocks-a" for scenario in paper.claims.instances]
-        gaps = [format_amount(np.median(paper.claims.get_values(law, "gap")[here]), "%") for law in LABELS]
+        gaps = [
+            format_amount(np.median(paper.claims.get_values(controller, "gap")[here]), "%")
+            for controller in LABELS
+        ]
         reference = paper.references["blocks-a"]
         cells = [f"{reference.mean_distance:.3f} m", format_amount(reference.agreement, "%"), *gaps]
         row = table.partition("blocks-a</th>")[2].partition("</tr>")[0]
@@ -396,18 +402,18 @@ class TestTables:
 
 
 class TestWords:
-    def test_what_is_said_of_figures_is_what_they_show(self, paper):
-        def said(number: int) -> str:
+    def test_descriptions_of_figures_match_the_data(self, paper):
+        def describe(number: int) -> str:
             return describe_figure(number, paper.figures[""], FIRST)
 
         for case, number in (("convex", 2), ("a", 4), ("b", 6)):
             final = paper.figures[""][f"{case}/rapf"].history.mean_distance[-1]
-            assert f"{final:.3f} m" in said(number)
-            assert re.search(r"RAPF's is the lower one \S+ % of the time", said(number + 1))
-        assert "robots are" in said(8)
-        assert "“Pentagon”" in said(1)
+            assert f"{final:.3f} m" in describe(number)
+            assert re.search(r"RAPF's is the lower one \S+ % of the time", describe(number + 1))
+        assert "robots are" in describe(8)
+        assert "“Pentagon”" in describe(1)
 
-    def test_a_cost_has_arrived_when_it_stays(self, paper):
+    def test_the_cost_stays_near_its_end_after_the_arrival_time(self, paper):
         history = paper.figures[""]["a/rapf"].history
         time = find_arrival_time(history)
         later = history.mean_distance[history.time >= time]
@@ -416,29 +422,29 @@ class TestWords:
 
 
 class _Tags(HTMLParser):
-    def __init__(self, content: str) -> None:
+    def __init__(self, text: str) -> None:
         super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.feed(content)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
 
     def handle_starttag(self, tag, attrs):
-        self.found.append((tag, dict(attrs)))
+        self.tags.append((tag, dict(attrs)))
 
-    def of(self, *names):
-        return [attributes for tag, attributes in self.found if tag in names]
+    def select(self, *names):
+        return [attributes for tag, attributes in self.tags if tag in names]
 
 
-def remove_escapes(content: str) -> str:
-    return content.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
+def remove_escapes(text: str) -> str:
+    return text.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
 
 
 class TestPages:
-    @pytest.fixture(params=["content", "more"])
-    def either(self, request):
+    @pytest.fixture(params=["paper_page", "beyond_page"])
+    def page(self, request):
         return request.getfixturevalue(request.param)
 
-    def test_links_lead_somewhere_and_ids_are_unique(self, either):
-        tags = _Tags(either).found
+    def test_links_have_targets_and_ids_are_unique(self, page):
+        tags = _Tags(page).tags
         ids = [str(attributes["id"]) for _, attributes in tags if "id" in attributes]
         assert len(ids) == len(set(ids))
         for _, attributes in tags:
@@ -446,41 +452,41 @@ class TestPages:
                 if target and target.startswith("#") and target != "#None":
                     assert target[1:] in ids, target
 
-    def test_they_ask_for_no_network(self, either):
-        for _, attributes in _Tags(either).found:
+    def test_pages_load_nothing_from_the_network(self, page):
+        for _, attributes in _Tags(page).tags:
             for name, value in attributes.items():
                 assert name == "xmlns" or not re.match(r"(?:https?:)?//", str(value)), value
-        assert "@import" not in either and "url(" not in either
+        assert "@import" not in page and "url(" not in page
 
-    def test_they_have_a_heading_of_each_rank_in_turn(self, either):
-        ranks = [int(tag[1]) for tag, _ in _Tags(either).found if re.fullmatch(r"h\d", tag)]
+    def test_no_level_of_headings_is_skipped(self, page):
+        ranks = [int(tag[1]) for tag, _ in _Tags(page).tags if re.fullmatch(r"h\d", tag)]
         assert ranks[0] == 1 and ranks.count(1) == 1
         assert all(after - before <= 1 for before, after in pairwise(ranks))
 
-    def test_the_papers_claims_are_listed_as_they_were_promised(self, folder, content, paper):
-        found = json.loads((folder / "claims.json").read_text())
-        assert [claim["key"] for claim in found] == list(load_registration().claims)
-        for claim in found:
+    def test_claims_are_listed_as_registered(self, folder, paper_page, paper):
+        claims = json.loads((folder / "claims.json").read_text())
+        assert [claim["key"] for claim in claims] == list(load_registration().claims)
+        for claim in claims:
             assert {"claim", "verdict", "estimate", "interval", "runs"} <= set(claim)
-            assert claim["verdict"] == "undecided"  # on two maps nothing is decided
-            assert claim["claim"] in remove_escapes(content)
+            assert claim["verdict"] == "undecided"  # Two maps are too few for a decision.
+            assert claim["claim"] in remove_escapes(paper_page)
             p = {criterion["p"] for criterion in claim["criteria"]}
             assert claim["p"] == max(p) and (claim["p_adjusted"] or 1.0) >= claim["p"]
-            assert format_amount(claim["p"]) in remove_escapes(content)
-        assert all(claim["p_adjusted"] is not None for claim in found)
-        assert {claim["question"] for claim in found} == set(range(1, GOALS))
+            assert format_amount(claim["p"]) in remove_escapes(paper_page)
+        assert all(claim["p_adjusted"] is not None for claim in claims)
+        assert {claim["question"] for claim in claims} == set(range(1, GOALS))
         ratio = paper.claims.compare("rapf-shared", "rpf-shared").ratio
-        shared = next(claim for claim in found if claim["key"] == "nonconvex-final-shared")
+        shared = next(claim for claim in claims if claim["key"] == "nonconvex-final-shared")
         assert (shared["estimate"], shared["interval"]) == (ratio.estimate, [ratio.low, ratio.high])
 
-    def test_every_picture_is_there_and_said_in_words(self, folder, content):
-        images = _Tags(content).of("img")
+    def test_every_image_exists_and_has_a_description(self, folder, paper_page):
+        images = _Tags(paper_page).select("img")
         assert len(images) == 26
         for image in images:
             assert (folder / str(image["src"])).is_file()
             assert len(str(image["alt"])) > 20
             assert int(str(image["width"])) in (1050, 2148)
-        for link in _Tags(content).of("a", "source"):
+        for link in _Tags(paper_page).select("a", "source"):
             target = str(link.get("href") or link.get("srcset"))
             if not target.startswith("#"):
                 assert (folder / target).is_file(), target
@@ -490,17 +496,19 @@ class TestPages:
             for suffix in ("png", "svg", "pdf"):
                 assert (folder / "figures" / f"{name}.{suffix}").stat().st_size > 1000
 
-    def test_what_the_best_gains_reached_stands_beside_what_the_shared_ones_did(self, content, paper):
+    def test_results_of_the_best_gains_are_next_to_those_of_the_shared_gains(self, paper_page, paper):
         for number, case in ((4, "a"), (6, "b"), (8, "other")):
-            part = content.partition(f'id="figure-{number}"')[2].partition("</section>")[0]
+            part = paper_page.partition(f'id="figure-{number}"')[2].partition("</section>")[0]
             for variant in ("", "best", "limited"):
                 runs = paper.figures[variant]
-                finals = [runs[f"{case}/{law}"].history.mean_distance[-1] for law in ("rapf", "rpf")]
+                finals = [
+                    runs[f"{case}/{controller}"].history.mean_distance[-1] for controller in ("rapf", "rpf")
+                ]
                 assert "{:.3f} m, RPF with {:.3f} m".format(*finals) in remove_escapes(part)
             assert part.count("<img") == (4 if number == 4 else 3)
 
-    def test_the_protocol_tells_all_that_is_needed_to_do_it_again(self, content, paper):
-        said = remove_escapes(content)
+    def test_the_protocol_states_all_parameters(self, paper_page, paper):
+        text = remove_escapes(paper_page)
         for words in (
             f"{paper.runs} runs; 0 failed",
             *(
@@ -514,34 +522,34 @@ class TestPages:
             *("RAPF (k_rep 1, rho_0 2, k_att 3, no limit); RPF (k_rep 1, rho_0 2)", "attraction_limit 2"),
             *("equal within 2 %", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
         ):
-            assert words in said, words
-        assert "all non-convex ones except campus" not in said
+            assert words in text, words
+        assert "all non-convex ones except campus" not in text
 
-    def test_every_claim_and_goal_beyond_is_told(self, more, beyond):
-        said = remove_escapes(more)
-        ids = {attributes.get("id") for _, attributes in _Tags(more).found}
+    def test_the_page_contains_every_claim_and_goal(self, beyond_page, beyond):
+        text = remove_escapes(beyond_page)
+        ids = {attributes.get("id") for _, attributes in _Tags(beyond_page).tags}
         assert {f"controller-{name}" for name in CONTROLLERS} <= ids
-        assert more.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in more
-        found = judge_beyond_claims(beyond)
-        assert {claim.question for claim in found} == {GOALS, RIVALS, EXTENSIONS}
-        for claim in found:
-            assert claim.key in ids and claim.text in said
-        goals = [claim for claim in found if claim.key.startswith("goal-") and claim.key != "goal-unseen"]
-        assert all(describe_goal(goal) in said for goal in goals)
-        assert summarize_goals(goals) in said
-        assert all(describe_tuning(name, grid) in said for name, grid in beyond.gains.items())
-        assert "on 1 generated maps (seeds 101)" in said
+        assert beyond_page.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in beyond_page
+        claims = judge_beyond_claims(beyond)
+        assert {claim.question for claim in claims} == {GOALS, RIVALS, EXTENSIONS}
+        for claim in claims:
+            assert claim.key in ids and claim.text in text
+        goals = [claim for claim in claims if claim.key.startswith("goal-") and claim.key != "goal-unseen"]
+        assert all(describe_goal(goal) in text for goal in goals)
+        assert summarize_goals(goals) in text
+        assert all(describe_tuning(name, grid) in text for name, grid in beyond.gains.items())
+        assert "on 1 generated maps (seeds 101)" in text
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
-        said = remove_escapes(study_pages.build_beyond_page({}, quick))
-        assert "default gains, found by the full study" in said and "120 s on 4 generated maps" in said
+        text = remove_escapes(study_pages.build_beyond_page({}, quick))
+        assert "default gains, found by the full study" in text and "120 s on 4 generated maps" in text
 
-    def test_energy_has_its_unit(self, more, beyond):
+    def test_energies_have_a_unit(self, beyond_page, beyond):
         for row in rank_contenders(beyond):
-            assert format_amount(row.medians["work"], "J") in remove_escapes(more)
-        assert "in joules" in more and "before any limit" in more
+            assert format_amount(row.medians["work"], "J") in remove_escapes(beyond_page)
+        assert "in joules" in beyond_page and "before any limit" in beyond_page
 
-    def test_every_controller_has_a_row_of_what_it_bears(self, more, beyond):
-        table = more.partition('class="evidence heat"')[2].partition("</table>")[0]
+    def test_every_controller_has_a_row_of_degradations(self, beyond_page, beyond):
+        table = beyond_page.partition('class="evidence heat"')[2].partition("</table>")[0]
         known = {(each.controller, each.axis, each.value): each for each in beyond.degradations}
         assert table.count('<th scope="row">') == len(CONTROLLERS)
         for name in CONTROLLERS:
@@ -550,37 +558,38 @@ class TestPages:
             cells = [f"{known[name, *each].ratio.estimate:.2f}" for each in at]
             assert re.findall(r"<td.*?>(.*?)</td>", row) == [*cells, "1"]
         many = replace(TINY.beyond, conditions_maps=tuple("abcdefghijkl"))
-        told = study_pages.build_beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
+        page = study_pages.build_beyond_page({}, replace(beyond, plan=replace(TINY, beyond=many)))
         assert (
             "<small>"
-            in told.partition('class="evidence heat"')[2].partition("<tbody>")[2].partition("</table>")[0]
+            in page.partition('class="evidence heat"')[2].partition("<tbody>")[2].partition("</table>")[0]
         )
 
-    def test_it_says_what_ours_reached_on_maps_of_other_families(self, more, beyond):
+    def test_the_page_contains_the_results_on_maps_of_other_families(self, beyond_page, beyond):
         assert {scenario.map for scenario in beyond.unseen.instances} == {
             f"{kind}-301" for kind in planned.UNSEEN
         }
         assert np.isfinite(beyond.unseen.get_values("atlas", "gap")).all()
         heading = "On maps of other families"
         assert (
-            f"<caption>{heading}" in more
-            and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in more
+            f"<caption>{heading}" in beyond_page
+            and "blocks, rooms, caves, mazes (robocov generate), seeds 301" in beyond_page
         )
         without = replace(beyond, unseen=None)
         assert f"<caption>{heading}" not in study_pages.build_beyond_page({}, without)
         assert "goal-unseen" not in format_claims(judge_beyond_claims(without))
 
-    def test_the_same_runs_give_the_same_pages(self, study, content, more):
+    def test_equal_runs_give_equal_pages(self, study, paper_page, beyond_page):
         _, paper, beyond, images = study
-        found = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
+        claims = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
         assert (
-            study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=found) == content
+            study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=claims)
+            == paper_page
         )
-        assert study_pages.build_beyond_page(DRAWN, beyond) == more
+        assert study_pages.build_beyond_page(DRAWN, beyond) == beyond_page
 
     @pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("chromedriver")), reason="no browser")
     @pytest.mark.parametrize("width", [390, 1280])
-    def test_in_a_browser_nothing_sticks_out(self, folder, more, width):
+    def test_nothing_is_wider_than_the_browser(self, folder, beyond_page, width):
         from selenium import webdriver
         from selenium.webdriver.chrome.options import Options
         from selenium.webdriver.chrome.service import Service
@@ -611,9 +620,9 @@ class TestPages:
             assert browser.execute_script(canvases) > 0
             assert browser.get_log("browser") == []
             path = folder.parent / f"more-{width}.html"
-            path.write_text(more, encoding="utf-8")
+            path.write_text(beyond_page, encoding="utf-8")
             browser.get(path.as_uri())
-            # what is wider may be scrolled, each in a frame of its own
+            # Wider content is in frames that can be scrolled.
             out = browser.execute_script(
                 "const framed = '.scroll, .large, caption';"
                 "return [...document.querySelectorAll('main *')].filter(e => !e.closest(framed))"
@@ -635,9 +644,9 @@ class TestCommand:
         assert (answer["runs"], answer["claims"]) == (16, [])
         assert not (out / "claims.json").exists()
         assert len(list((out / "figures").glob("*.pdf"))) == 15
-        content = (out / "index.html").read_text(encoding="utf-8")
-        assert content.count("<img") == 15 and "Best gains" not in content
-        assert "Verdicts" not in content and "Only the figures were requested" in content
+        paper_page = (out / "index.html").read_text(encoding="utf-8")
+        assert paper_page.count("<img") == 15 and "Best gains" not in paper_page
+        assert "Verdicts" not in paper_page and "Only the figures were requested" in paper_page
 
     def test_beyond_only(self, study, tmp_path, monkeypatch, capsys):
         """With everything but the drawing of figures, which other tests do."""
@@ -649,18 +658,18 @@ class TestCommand:
         shutil.copytree(study[0], out)
         assert main(["paper", "--quick", "--beyond-only", "--out", str(out), "--json"]) == 0
         answer = json.loads(capsys.readouterr().out)
-        found = json.loads((out / "claims.json").read_text())
-        assert answer["claims"] == found and answer["runs"] == study[2].runs + 16
-        assert [claim["key"] for claim in found] == [claim.key for claim in judge_beyond_claims(study[2])]
+        claims = json.loads((out / "claims.json").read_text())
+        assert answer["claims"] == claims and answer["runs"] == study[2].runs + 16
+        assert [claim["key"] for claim in claims] == [claim.key for claim in judge_beyond_claims(study[2])]
         page = (out / "beyond.html").read_text(encoding="utf-8")
         front = (out / "index.html").read_text(encoding="utf-8")
         assert 'href="index.html"' in page and 'href="beyond.html"' in front
         assert "Without --beyond-only, the claims are tested, too" in front
-        for claim in found:
+        for claim in claims:
             assert f'href="beyond.html#{claim["key"]}"' in front and f'id="{claim["key"]}"' in page
 
 
-def test_other_folders_are_left_alone(tmp_path):
+def test_other_folders_are_not_used(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="expected an empty folder or a study of the paper"):
         open_folder(tmp_path, TINY)
@@ -669,7 +678,7 @@ def test_other_folders_are_left_alone(tmp_path):
         open_folder(tmp_path, TINY)
 
 
-def test_quick_and_full_do_not_mix(tmp_path):
+def test_quick_and_full_studies_do_not_share_a_folder(tmp_path):
     open_folder(tmp_path / "out", TINY)
     open_folder(tmp_path / "out", TINY)
     with pytest.raises(InputError, match="expected the full study, got the quick one; choose another --out"):
