@@ -76,7 +76,7 @@ def test_the_blocks_of_a_page_run_one_after_the_other(page: Path, folder: Path) 
         for slow, fast in _FASTER:
             code = code.replace(slow, fast)
         named = re.match(r"# ([\w.-]+)\n", code)
-        if kind == "text":
+        if kind in ("text", "bibtex"):
             continue
         if kind in ("json", "toml") or named:
             before = re.findall(r"`([\w-]+\.(?:json|toml|robocov))`", text[: found.start()])
