@@ -205,7 +205,8 @@ class Editor(EditorContext):
         self.toolbox.current = self.toolbox.by_name[name]
         self.typed = ""
         self.revision += 1
-        if shows_hint:
+        # Hints describe clicks and keys, which phones do not have.
+        if shows_hint and not self.is_compact:
             self.show_message(self.tool.hint)
 
     def carry_out(self, action: Callable[[], object]) -> None:

@@ -32,6 +32,11 @@ class WindowPart:
         self.ui = Ui(self.show_content, LIGHT)
         self.drawn_state: object = None
 
+    @property
+    def is_typing(self) -> bool:
+        """Whether typed text goes to a text field of this part."""
+        return self.ui.edit is not None
+
     def show_content(self, ui: Ui) -> None:
         """Show the widgets, and handle their input; called in every run of the page."""
 

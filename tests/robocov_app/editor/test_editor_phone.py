@@ -92,3 +92,9 @@ def test_every_button_of_the_page_has_a_command(phone: EditorDriver) -> None:
     assert set(tools) == set(phone.editor.toolbox.by_name)
     for name in (*others, "finish", "try", "delete", "save", "undo"):
         assert name in commands
+
+
+def test_phones_get_no_hints_about_keys(phone: EditorDriver) -> None:
+    phone.editor.show_message("")
+    run_page_command(phone, "tool:wall")
+    assert not phone.message

@@ -36,21 +36,12 @@ def read_page_controls(
         tool=editor.tool.name,
         lesson="",
         has_panel=editor.shows_panel,
-        is_typing=_is_typing(editor, parts),
+        is_typing=editor.dialogs.is_typing or any(part.is_typing for part in parts),
         scroll_box=_find_scroll_box(editor, size, layout),
         kind="editor",
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
     )
-
-
-def _is_typing(editor: Editor, parts: Sequence[WindowPart]) -> bool:
-    """Return whether typed text goes to a text field of a part or of the open dialog."""
-    pages = [part.ui for part in parts]
-    dialogs = editor.dialogs
-    if dialogs.ui is not None and dialogs.is_open:
-        pages.append(dialogs.ui)
-    return any(page.edit is not None for page in pages)
 
 
 def _find_scroll_box(editor: Editor, size: tuple[int, int], layout: Layout) -> Box | None:

@@ -39,6 +39,11 @@ class Dialogs:
         """Whether a dialog is open."""
         return self.current is not None
 
+    @property
+    def is_typing(self) -> bool:
+        """Whether typed text goes to a text field of the open dialog."""
+        return self.is_open and self.ui is not None and self.ui.edit is not None
+
     def ask(self, dialog: Dialog) -> None:
         """Open a dialog; it replaces the one that is open, if any."""
         self.current = dialog

@@ -54,7 +54,7 @@ class PageControls:
             tool=viewer.tool.name,
             lesson=self._describe_lesson(),
             has_panel=viewer.view.has_panel,
-            is_typing=self._is_typing(),
+            is_typing=self._dialogs.is_typing or any(part.is_typing for part in self._parts),
             scroll_box=self._find_scroll_box(size, layout),
         )
 
@@ -62,13 +62,6 @@ class PageControls:
         if self._lesson.shown is not None:
             return "shown"
         return "left" if self._lesson.is_waiting else ""
-
-    def _is_typing(self) -> bool:
-        """Return whether typed text goes to a text field of a part or of the open dialog."""
-        pages = [part.ui for part in self._parts]
-        if self._dialogs.ui is not None and self._dialogs.is_open:
-            pages.append(self._dialogs.ui)
-        return any(page.edit is not None for page in pages)
 
     def _find_scroll_box(self, size: tuple[int, int], layout: Layout) -> Box | None:
         """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""

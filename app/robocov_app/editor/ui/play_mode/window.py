@@ -159,5 +159,6 @@ def open_play_window(
         raise
     # Without this update, the first frame would have no panel.
     play_window.panel.update(FIRST_UPDATE_S)
-    viewer.show_message(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
+    way_back = "tap Editor to return" if editor.is_compact else "F5 or Esc returns to the editor"
+    viewer.show_message(f"trying “{editor.sketch.name}”: {way_back}")
     return play_window
