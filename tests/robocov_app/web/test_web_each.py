@@ -182,8 +182,11 @@ def test_a_window_that_dies_is_opened_again_by_its_page(tmp_path):
         ada = Visitor()
         with ada.page(link) as line:
             read_first_frame(line)
-            os.kill(list_children(link.process)[0], signal.SIGKILL)
+            pid = list_children(link.process)[0]
+            os.kill(pid, signal.SIGKILL)
             assert close_of(line)[0] == 1012
+        # The sockets of a process are closed shortly before it has ended.
+        wait_until(lambda: not is_alive(pid))
         with ada.page(link) as line:
             read_first_frame(line)
             press(line, "q", held=2)
