@@ -37,7 +37,7 @@ class GridPlanner:
     graph : LatticeGraph
         The edges between the nodes, and the distances along them.
     visibility : NodeVisibility
-        Lines of sight, and the nodes that are visible from a position.
+        The nodes at which paths from a position enter the lattice, and lines of sight.
     """
 
     known_map: DiscoveredMap
@@ -112,9 +112,9 @@ class GridPlanner:
         first_nodes = [np.empty(0, dtype=np.intp)]
         lengths = [np.empty(0)]
         for position in positions:
-            visible = self.visibility.get_visible_nodes(position)
-            first_nodes.append(visible)
-            lengths.append(compute_point_distances(self.map_window.nodes[visible], position))
+            entry_nodes = self.visibility.get_entry_nodes(position)
+            first_nodes.append(entry_nodes)
+            lengths.append(compute_point_distances(self.map_window.nodes[entry_nodes], position))
         return self.graph.search(np.concatenate(first_nodes), np.concatenate(lengths))
 
     def look_up_distances(self, position: Array, table: Array) -> Array:
@@ -134,9 +134,9 @@ class GridPlanner:
         (k,) array, m
             Infinite for nodes that cannot be reached.
         """
-        visible = self.visibility.get_visible_nodes(position)
-        offsets = compute_point_distances(self.map_window.nodes[visible], position)
-        return np.asarray((table[:, visible] + offsets).min(axis=1, initial=np.inf))
+        entry_nodes = self.visibility.get_entry_nodes(position)
+        offsets = compute_point_distances(self.map_window.nodes[entry_nodes], position)
+        return np.asarray((table[:, entry_nodes] + offsets).min(axis=1, initial=np.inf))
 
     def get_team_candidates(self, node: int) -> TeamCandidates:
         """Return the nodes that may become goals of a team whose robots can reach a node.

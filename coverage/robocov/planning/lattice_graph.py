@@ -62,7 +62,7 @@ class LatticeGraph:
 
     @cached_property
     def portal_cells(self) -> dict[tuple[int, int], IntArray]:
-        """Rows and columns of the cells of the portal from one node to another, (k, 2), by the two nodes."""
+        """Cells along each portal, (k, 2) rows and columns, by its first and last node."""
         cells = {}
         for first, last, path in zip(
             self.portals.first_nodes.tolist(),

@@ -1,4 +1,4 @@
-"""Lines of sight in a map window, and the nodes that are visible from a position."""
+"""The nodes at which paths from a position enter the lattice, and lines of sight to them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ NO_NODE = -1
 _MAX_CLOSE_NODES = 12
 """Maximum number of nodes close to a position that are considered."""
 _MAX_CACHED_POSITIONS = 1000
-"""Maximum number of positions whose visible nodes are cached."""
+"""Maximum number of positions whose entry nodes are cached."""
 
 
 @dataclass(eq=False)
 class NodeVisibility:
-    """Lines of sight in a map window, and the nodes that are visible from a position.
+    """Lines of sight between positions and the nodes of a map window.
 
-    Visible nodes are stored for the latest positions, because several robots need them several times.
+    The entry nodes of positions are cached, because several robots need them several times.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class NodeVisibility:
     """
 
     map_window: MapWindow
-    _visible_nodes: dict[bytes, IntArray] = field(default_factory=dict, init=False, repr=False)
+    _entry_nodes: dict[bytes, IntArray] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -85,7 +85,7 @@ class NodeVisibility:
         Returns
         -------
         (k,) int array
-            The nearest first. k is at most `_MAX_CLOSE_NODES`.
+            At most twelve, the nearest first.
         """
         return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_CLOSE_NODES)
 
@@ -107,8 +107,8 @@ class NodeVisibility:
         squared_distances = ((self.map_window.nodes - position) ** 2).sum(axis=1)
         return int(np.where(has_clearance, squared_distances, np.inf).argmin())
 
-    def find_visible_node(self, position: Array) -> int:
-        """Find the nearest node with clearance that is visible from a position.
+    def find_entry_node(self, position: Array) -> int:
+        """Find the node at which the shortest way from a position onto the lattice ends.
 
         Parameters
         ----------
@@ -117,13 +117,16 @@ class NodeVisibility:
         Returns
         -------
         int
-            If no node is visible, the nearest one with clearance. `NO_NODE` if no node has clearance.
+            The first of `get_entry_nodes`. `NO_NODE` if no node has clearance.
         """
-        visible = self.get_visible_nodes(position)
-        return int(visible[0]) if len(visible) else NO_NODE
+        entry_nodes = self.get_entry_nodes(position)
+        return int(entry_nodes[0]) if len(entry_nodes) else NO_NODE
 
-    def get_visible_nodes(self, position: Array) -> IntArray:
-        """Return the nodes with clearance that are close to a position and visible from it.
+    def get_entry_nodes(self, position: Array) -> IntArray:
+        """Return the nodes at which a path from a position can enter the lattice.
+
+        These are the nodes with clearance that are close to the position and visible from it. If none is
+        visible, it is the nearest one with clearance.
 
         Parameters
         ----------
@@ -132,16 +135,15 @@ class NodeVisibility:
         Returns
         -------
         (k,) int array
-            The nearest first. If no node is visible, only the nearest one with clearance. Empty if no node
-            has clearance.
+            The nearest first. Empty if no node has clearance.
         """
         key = position.tobytes()
-        if key not in self._visible_nodes:
-            if len(self._visible_nodes) >= _MAX_CACHED_POSITIONS:
-                self._visible_nodes.clear()
+        if key not in self._entry_nodes:
+            if len(self._entry_nodes) >= _MAX_CACHED_POSITIONS:
+                self._entry_nodes.clear()
             close_nodes = self.find_close_nodes(position, self.map_window.has_clearance)
             ends = self.map_window.nodes[close_nodes]
             is_visible = self.find_clear_lines(position, ends, self.map_window.is_blocked)
-            # A robot in a cell that counts as wall is actually next to the wall, and sees no node.
-            self._visible_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
-        return self._visible_nodes[key]
+            # A robot whose cell is marked as a wall actually stands next to the wall, and sees no node.
+            self._entry_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
+        return self._entry_nodes[key]

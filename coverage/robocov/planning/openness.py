@@ -114,33 +114,13 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
         link_counts_up=np.zeros((block_rows + 1, block_columns + 1)),
         link_counts_right=np.zeros((block_rows + 1, block_columns + 1)),
     )
-    for i in range(block_rows):
-        for j in range(block_columns):
-            counts = _count_block(cells, i, j, block_side)
-            blocks.unknown_counts[i, j] = counts[0]
-            blocks.free_side_counts[i, j] = counts[1]
-            blocks.wall_side_counts[i, j] = counts[2]
-            blocks.link_counts_up[i, j] = counts[3]
-            blocks.link_counts_right[i, j] = counts[4]
-    return blocks
-
-
-@kernel
-def _count_block(cells: NDArray[np.uint8], i: int, j: int, block_side: int) -> tuple[int, int, int, int, int]:
-    """Count the unknown cells of block (i, j), and their sides in the order of `_BlockGrid`."""
-    rows, columns = cells.shape
-    end_row = min((i + 1) * block_side, rows)
-    end_column = min((j + 1) * block_side, columns)
-    unknown_count = 0
-    free_side_count = 0
-    wall_side_count = 0
-    link_count_up = 0
-    link_count_right = 0
-    for row in range(i * block_side, end_row):
-        for column in range(j * block_side, end_column):
+    for row in range(rows):
+        i = row // block_side
+        for column in range(columns):
             if cells[row, column] != UNKNOWN:
                 continue
-            unknown_count += 1
+            j = column // block_side
+            blocks.unknown_counts[i, j] += 1.0
             for up, right in _SIDE_STEPS:
                 neighbor_row = row + up
                 neighbor_column = column + right
@@ -148,13 +128,15 @@ def _count_block(cells: NDArray[np.uint8], i: int, j: int, block_side: int) -> t
                     continue
                 state = cells[neighbor_row, neighbor_column]
                 if state == FREE:
-                    free_side_count += 1
+                    blocks.free_side_counts[i, j] += 1.0
                 elif state == UNKNOWN:
-                    link_count_up += neighbor_row == end_row
-                    link_count_right += neighbor_column == end_column
-                elif state != _OUTSIDE:
-                    wall_side_count += 1
-    return unknown_count, free_side_count, wall_side_count, link_count_up, link_count_right
+                    if neighbor_row // block_side > i:
+                        blocks.link_counts_up[i, j] += 1.0
+                    elif neighbor_column // block_side > j:
+                        blocks.link_counts_right[i, j] += 1.0
+                elif state != _OUTSIDE:  # a wall or a presumed wall
+                    blocks.wall_side_counts[i, j] += 1.0
+    return blocks
 
 
 @kernel

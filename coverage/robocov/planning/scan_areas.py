@@ -1,4 +1,4 @@
-"""The rectangles of cells outside which scans cannot change a map."""
+"""Bounding boxes, in cells, of the areas that scans can change."""
 
 from __future__ import annotations
 
@@ -11,56 +11,56 @@ from robocov.planning.raster import Raster
 
 
 class ScanAreas(NamedTuple):
-    """Rectangles of cells, one for each scan. A scan changes no cell outside its rectangle.
+    """Bounding boxes of the cells that each of k scans can change.
 
     Examples
     --------
     >>> from robocov.observation.region import Region
-    >>> region = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0]]))
+    >>> region = Region(np.array([[0.0, 0.0], [12.0, 0.0], [12.0, 4.0], [0.0, 4.0]]))
     >>> raster = Raster(region, cell_size=1.0)
-    >>> areas = ScanAreas.build(np.array([[1.5, 1.5], [6.5, 1.5]]), np.array([0.6, 0.6]), raster)
+    >>> areas = ScanAreas.build(np.array([[5.5, 1.5]]), np.array([1.0]), raster)
     >>> areas.mark(raster).sum(axis=0)
-    array([4, 4, 4, 4, 4, 4, 4, 4])
+    array([0, 0, 4, 4, 4, 4, 4, 4, 4, 0, 0, 0])
     """
 
     first_rows: IntArray
-    """(k,)"""
+    """(k,) First row of each box."""
     last_rows: IntArray
-    """(k,) Included in the rectangle."""
+    """(k,) Last row, inclusive."""
     first_columns: IntArray
-    """(k,)"""
+    """(k,) First column."""
     last_columns: IntArray
-    """(k,) Included in the rectangle."""
+    """(k,) Last column, inclusive."""
 
     @classmethod
     def build(cls, positions: Array, ranges: Array, raster: Raster) -> ScanAreas:
-        """Build the rectangles of scans.
+        """Build the bounding boxes of scans.
 
         Parameters
         ----------
         positions : (k, 2) array, m
             Positions from which the scans were taken.
         ranges : (k,) array, m
-            Length of the longest ray of each scan.
+            Radius around each position within which the scan changes cells.
         raster : Raster
 
         Returns
         -------
         ScanAreas
         """
-        # Rays end in the cell behind the obstacle that they hit. One more cell is for rounding.
+        # Rays end in the cell behind the obstacle that they hit, plus one cell for rounding errors. Boxes end
+        # at the border of the raster.
         reach = ranges[:, None] + 2.0 * raster.cell_size
         first_rows, first_columns = raster.find_cells(positions - reach)
         last_rows, last_columns = raster.find_cells(positions + reach)
         return cls(first_rows, last_rows, first_columns, last_columns)
 
-    def overlap(self, others: ScanAreas) -> BoolArray:
-        """Find the rectangles that overlap at least one of the others.
+    def overlaps_any(self, others: ScanAreas) -> BoolArray:
+        """Return whether each box overlaps at least one of m others.
 
         Parameters
         ----------
         others : ScanAreas
-            m rectangles.
 
         Returns
         -------
@@ -75,7 +75,7 @@ class ScanAreas(NamedTuple):
         return np.asarray((rows_overlap & columns_overlap).any(axis=1))
 
     def mark(self, raster: Raster) -> BoolArray:
-        """Return a mask of the cells that are in at least one rectangle, (rows, columns)."""
+        """Return a mask of the cells that are in at least one box, (rows, columns)."""
         is_inside = np.zeros(raster.shape, dtype=bool)
         for first_row, last_row, first_column, last_column in zip(*self, strict=True):
             is_inside[first_row : last_row + 1, first_column : last_column + 1] = True

@@ -177,8 +177,8 @@ class ScanLog:
     The map is updated only when it is needed, by `update_map`, because many scans may arrive in between. Some
     earlier maps are stored as checkpoints. When scans of earlier rounds arrive, each later checkpoint is
     repaired: the cells near these scans are taken from the checkpoint before it, and all scans near them are
-    added again. What happens to a cell does not depend on other cells; the map is therefore that of all
-    scans, bit for bit.
+    added again. What happens to a cell does not depend on other cells, so the result is bit-identical to
+    adding all scans in order.
 
     Attributes
     ----------
@@ -296,7 +296,7 @@ class ScanLog:
         Returns
         -------
         ScanLog
-            It has the same map object as before if no cell has changed.
+            It keeps the same map object if no cell has changed.
         """
         if not self.pending_scans:
             return self
@@ -314,52 +314,50 @@ class ScanLog:
         return [scan for round_scans in rounds for scan in round_scans if scan is not None]
 
     def _repair_checkpoints(self) -> tuple[Checkpoint, ...]:
-        """Return the checkpoints with the pending scans."""
-        repaired = [self.checkpoints[0]]
-        for stale in self.checkpoints[1:]:
-            round_count = stale.round_count
+        """Return the checkpoints with the pending scans added."""
+        previous = self.checkpoints[0]
+        repaired = [previous]
+        for checkpoint in self.checkpoints[1:]:
+            round_count = checkpoint.round_count
             late_scans = [scan for scan in self.pending_scans if scan.round_number < round_count]
-            if not late_scans:
-                repaired.append(stale)
-                continue
-            scans = self._list_scans(repaired[-1].round_count, round_count)
-            known_map = self._repair_map(stale.known_map, late_scans, repaired[-1].known_map, scans)
-            repaired.append(Checkpoint(round_count, known_map))
+            if late_scans:
+                known_map = self._repair_map(checkpoint, late_scans, previous)
+                previous = Checkpoint(round_count, known_map)
+            else:
+                previous = checkpoint
+            repaired.append(previous)
         return tuple(repaired)
 
     def _repair_map(
-        self,
-        stale_map: DiscoveredMap,
-        late_scans: list[NumberedScan],
-        earlier_map: DiscoveredMap,
-        scans: list[NumberedScan],
+        self, checkpoint: Checkpoint, late_scans: list[NumberedScan], previous: Checkpoint
     ) -> DiscoveredMap:
-        """Return an earlier map with the given scans, from a map of these scans without the late ones.
+        """Return the map of a checkpoint with late scans added.
+
+        Only the cells near the late scans are computed again, from the previous checkpoint.
 
         Parameters
         ----------
-        stale_map : DiscoveredMap
-            Its cells are right where no late scan can change them.
+        checkpoint : Checkpoint
         late_scans : list of NumberedScan
-            Scans that are missing in the stale map, not only those of the given scans.
-        earlier_map : DiscoveredMap
-            The map before the given scans.
-        scans : list of NumberedScan
+            Scans that its map lacks. The map of the previous checkpoint contains those of its own rounds.
+        previous : Checkpoint
+            Checkpoint before it, which has been repaired.
 
         Returns
         -------
         DiscoveredMap
         """
         late_areas = self._find_areas(late_scans)
-        is_stale = late_areas.mark(stale_map.raster)
-        if scans:
-            is_near = self._find_areas(scans).overlap(late_areas)
-            scans = [scan for scan, near in zip(scans, is_near, strict=True) if near]
-        repeated_map = self._add_scans(earlier_map, scans)
-        return stale_map.replace_cells(is_stale, repeated_map)
+        nearby_scans = self._list_scans(previous.round_count, checkpoint.round_count)
+        if nearby_scans:
+            is_near = self._find_areas(nearby_scans).overlaps_any(late_areas)
+            nearby_scans = [scan for scan, near in zip(nearby_scans, is_near, strict=True) if near]
+        repeated_map = self._add_scans(previous.known_map, nearby_scans)
+        stale_map = checkpoint.known_map
+        return stale_map.replace_cells(late_areas.mark(stale_map.raster), repeated_map)
 
     def _find_areas(self, scans: list[NumberedScan]) -> ScanAreas:
-        """Return the areas outside which scans change nothing."""
+        """Return the bounding boxes of the areas that scans can change."""
         max_distances = np.array([scan.distances for scan in scans]).max(axis=1)
         ranges = np.maximum(max_distances * self._distance_step, self.robot_radius or 0.0)
         positions = np.array([scan.position for scan in scans])

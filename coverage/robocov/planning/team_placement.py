@@ -108,7 +108,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
     the robots move, and their paths do not cross. Since robots also leave these paths to look around, they
     exchange goals only if that saves the fraction `MinSavings.swap` of the sum.
     """
-    own_node = planner.visibility.find_visible_node(team.positions[0])
+    own_node = planner.visibility.find_entry_node(team.positions[0])
     if own_node == NO_NODE:
         return team.previous_goals
     # Candidates are the nodes that may become goals, and targets the nodes that count in the cost.

@@ -57,7 +57,7 @@ def test_a_route_leads_through_the_door() -> None:
 def test_a_crack_is_no_passage(door: slice, is_passage: bool) -> None:
     """No robot fits through some holes, for example in a wall that has not been seen completely."""
     map_window = build_map_window(build_wall_with_door(door), max_nodes=600)
-    node = NodeVisibility(map_window).find_visible_node(np.array([1.0, 1.0]))
+    node = NodeVisibility(map_window).find_entry_node(np.array([1.0, 1.0]))
     is_beyond = map_window.has_clearance & (map_window.nodes[:, 0] > 3.5)
     assert np.isfinite(LatticeGraph(map_window).get_distances(node)[is_beyond]).any() == is_passage
     last = find_route_in(map_window, np.array([1.0, 1.0]), np.array([5.0, 1.0]))[-1]

@@ -45,7 +45,7 @@ def test_weights_of_nodes_are_multiplied_by_the_density() -> None:
     plain = compute_node_weights(planner.map_window)
     dense = compute_node_weights(planner.map_window, density)
     assert (dense >= plain).all()
-    node = planner.visibility.find_visible_node(np.array([6.0, 2.0]))
+    node = planner.visibility.find_entry_node(np.array([6.0, 2.0]))
     np.testing.assert_allclose(
         dense[node] / plain[node], density.evaluate(planner.map_window.nodes[[node]])[0]
     )
@@ -143,7 +143,7 @@ def test_the_own_goal_minimizes_the_cost() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.visibility.find_visible_node(np.array([0.7, 0.7]))
+    first_node = planner.visibility.find_entry_node(np.array([0.7, 0.7]))
     no_goal = np.full(2, np.nan)
     own = find_own_goal(planner, weights, others, first_node, no_goal, 0.0)
     own = find_own_goal(planner, weights, others, own.node, no_goal, 0.0)
@@ -158,7 +158,7 @@ def test_the_previous_goal_is_kept_if_the_new_one_saves_little() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.visibility.find_visible_node(np.array([2.0, 2.0]))
+    first_node = planner.visibility.find_entry_node(np.array([2.0, 2.0]))
     own = find_own_goal(planner, weights, others, first_node, np.full(2, np.nan), 0.0)
     close = own.goal + [0.05, -0.02]
     kept = find_own_goal(planner, weights, others, own.node, close, 0.01)
@@ -172,7 +172,7 @@ def test_a_previous_goal_outside_the_parabolas_is_never_kept() -> None:
     planner = build_planner()
     weights = compute_node_weights(planner.map_window)
     others = np.array([[6.0, 2.0]])
-    first_node = planner.visibility.find_visible_node(np.array([2.0, 2.0]))
+    first_node = planner.visibility.find_entry_node(np.array([2.0, 2.0]))
     own = find_own_goal(planner, weights, others, first_node, np.full(2, np.nan), 0.0)
     node = planner.map_window.nodes[own.node]
     for shift in ([1.05 * planner.map_window.spacing, 0.0], [0.0, -1.05 * planner.map_window.spacing]):
@@ -217,7 +217,7 @@ def test_the_candidate_closest_to_a_previous_goal_is_on_the_same_side_of_a_wall(
     planner = build_planner(WALL_BESIDE_CANDIDATES)
     goals = np.array([[4.35, 0.7], [4.8, 0.7]])
     team = TeamSituation(goals, goals, np.zeros(2, dtype=bool), NO_POSITIONS)
-    candidates, distances = planner.get_team_candidates(planner.visibility.find_visible_node(goals[0]))
+    candidates, distances = planner.get_team_candidates(planner.visibility.find_entry_node(goals[0]))
     chosen = team_placement._choose_previous_candidates(planner, candidates, distances, team)
     left, right = planner.map_window.nodes[candidates[chosen]]
     assert left[0] < 4.4 < right[0]

@@ -462,7 +462,7 @@ class Atlas(BaseController):
         assert state.basis is not None and state.team_goals is not None
         planner = state.basis.planner
         team_goals = state.team_goals.goals
-        first_node = planner.visibility.find_visible_node(team_goals[0])
+        first_node = planner.visibility.find_entry_node(team_goals[0])
         if first_node == NO_NODE:
             return None
         is_mobile = ~cooperation.is_fixed
@@ -494,7 +494,7 @@ class Atlas(BaseController):
         if is_away_from_goal and not is_heading_for_viewpoint:
             return OwnMotion(own.goal)
         viewpoint = None
-        node = planner.visibility.find_visible_node(position)
+        node = planner.visibility.find_entry_node(position)
         # The goal of a lone robot hardly depends on unknown space, so it needs no viewpoints.
         has_others = len(state.basis.robots) > 1
         if node != NO_NODE and self.stake < 1.0 and has_others:

@@ -121,7 +121,7 @@ def _assign_vertices(situation: Situation, vertices: Array) -> Array:
     if not len(vertices):
         return goals
     planner = situation.planner
-    nodes = [planner.visibility.find_visible_node(vertex) for vertex in vertices]
+    nodes = [planner.visibility.find_entry_node(vertex) for vertex in vertices]
     distances = np.array(
         [planner.compute_distances_from(position[None])[nodes] for position in situation.positions]
     )
@@ -139,7 +139,7 @@ def _find_reachable_blocks(situation: Situation, window: Window) -> BoolArray:
     is_near_wall = window.crop(planner.map_window.is_near_wall[:row_count, :column_count], fill=True)
     has_clearance = ~is_near_wall.reshape(window.block_shape).any(axis=(1, 3))
     labels, _ = ndimage.label(has_clearance, np.ones((3, 3)))
-    own_nodes = [planner.visibility.find_visible_node(position) for position in situation.positions]
+    own_nodes = [planner.visibility.find_entry_node(position) for position in situation.positions]
     rows, columns = raster.find_cells(planner.map_window.nodes[own_nodes])
     own_labels = labels[rows // window.stride, columns // window.stride]
     return np.asarray(has_clearance & np.isin(labels, own_labels) & (labels > 0))
