@@ -36,6 +36,7 @@ DIALOG_SIZE = (900, 600)
 METERS_PER_PIXEL = 0.025
 """Scale of the floor plan in the import dialog."""
 BLUE = (74, 111, 165)
+PALETTE_SIZE = 256
 EXACT_COLORS = 64
 """Number of the most frequent colors that screenshots contain exactly."""
 
@@ -140,9 +141,9 @@ def save_screenshot(window: ViewerWindow | EditorWindow, file: Path) -> None:
 
 
 def reduce_colors(pixels: NDArray[np.uint8]) -> Image.Image:
-    """Reduce an image to 256 colors: the most frequent ones exactly, and others that resemble the rest.
+    """Reduce an image to 256 colors: the most frequent ones exactly, and an approximation of the rest.
 
-    Large areas keep their colors, and so do small ones, such as arrows.
+    Large areas keep their colors exactly, and small ones, such as arrows, approximately.
 
     Parameters
     ----------
@@ -158,9 +159,11 @@ def reduce_colors(pixels: NDArray[np.uint8]) -> Image.Image:
     order = np.argsort(-counts)
     exact = colors[order[:EXACT_COLORS]]
     rare = Image.fromarray(colors[order[EXACT_COLORS:]][None])
-    similar = rare.quantize(256 - EXACT_COLORS, method=Image.Quantize.MAXCOVERAGE).getpalette()
-    assert similar is not None
-    palette = np.concatenate([exact, np.reshape(similar, (-1, 3))])[:256]
+    approximate_count = PALETTE_SIZE - EXACT_COLORS
+    values = rare.quantize(approximate_count, method=Image.Quantize.MAXCOVERAGE).getpalette()
+    assert values is not None
+    approximate = np.reshape(values, (-1, 3))[:approximate_count]
+    palette = np.concatenate([exact, approximate])
     offsets = colors[:, None].astype(int) - palette
     nearest = (offsets**2).sum(axis=2).argmin(axis=1).astype(np.uint8)
     image = Image.fromarray(nearest[indices].reshape(pixels.shape[:2]), "P")

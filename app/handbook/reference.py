@@ -101,7 +101,7 @@ STUDY_MEANINGS = {
     "sampling.samples": "Number of samples of each controller's gains",
     "sampling.seed": "Seed of the samples (default: 0)",
 }
-"""Meanings of the keys of study files; those of other parameters of the robots are their names and units."""
+"""Meanings of the keys of study files. Other parameters of the robots are described by name and unit."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -247,14 +247,14 @@ def build_formats_page() -> str:
         "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys. A list means that each value is tried. "
     )
     text += f'"{NO_LIMIT}" means no limit.\n\n'
-    meanings = read_study_meanings()
+    meanings = build_study_meanings()
     rows = []
     for key, value in list_study_keys().items():
         rows.append((f"`{key}`", escape_cell(meanings[key]), escape_cell(value)))
     return text + build_table(("key", "meaning", "value"), rows)
 
 
-def read_study_meanings() -> dict[str, str]:
+def build_study_meanings() -> dict[str, str]:
     """Return the meaning of each key of study files."""
     meanings = dict(STUDY_MEANINGS)
     for name in TEAM_PARAMETERS:
@@ -322,7 +322,7 @@ def build_metrics_page() -> str:
 def read_attribute_docs(kind: type) -> dict[str, str]:
     """Return the descriptions of attributes by name, from the section Attributes of a class docstring."""
     _, _, section = inspect.getdoc(kind).partition("Attributes\n----------\n")  # type: ignore[union-attr]
-    pattern = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*\n)*)", re.M)
+    pattern = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*(?:\n|$))*)", re.M)
     return {name: " ".join(description.split()) for name, description in pattern.findall(section)}
 
 

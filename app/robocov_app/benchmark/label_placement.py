@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
 
 Frame: TypeAlias = tuple[float, float, float, float]
 """Left, bottom, right and top edge of the area in which labels may be placed, px."""
@@ -18,13 +18,13 @@ _LABEL_DISTANCES_PX = (8.0, 24.0, 48.0, 80.0)
 _LABEL_ROWS = np.arange(-10.0, 10.25, 0.25)
 """Heights at which a label may be placed, in lines above its mark."""
 _HEIGHT_COST = 0.1
-"""Cost of one pixel of height above or below the mark, which prefers labels right next to their marks."""
+"""Cost per pixel of height above or below the mark, so that labels level with their marks win."""
 _OVERLAP_COST = 10.0
-"""Cost of one square pixel of a label that is hidden, in pixels of distance from the mark."""
+"""Cost per square pixel that a label shares with marks or other labels, in pixels of distance."""
 _OUTSIDE_COST = 1000.0
-"""Cost of one square pixel of a label outside the frame, which would be cut off or cover the axes."""
+"""Cost per square pixel of a label outside the frame, which would be cut off or cover the axes."""
 _MAX_ROUNDS = 6
-"""Maximum number of times that each label is moved."""
+"""Maximum number of passes over all labels."""
 
 
 def place_labels(marks: Array, labels: Sequence[str], frame: Frame) -> Array:
@@ -46,30 +46,45 @@ def place_labels(marks: Array, labels: Sequence[str], frame: Frame) -> Array:
     """
     half_sizes = compute_half_sizes(labels)
     mark_boxes = np.hstack([marks - MARK_HALF_SIZE_PX, marks + MARK_HALF_SIZE_PX])
-    boxes = []
+    candidates = []
     costs = []
     for mark, half_size in zip(marks, half_sizes, strict=True):
         centers = mark + _list_offsets(half_size)
-        candidates = np.hstack([centers - half_size, centers + half_size])
-        areas_inside = _compute_overlaps(candidates, np.array([frame]))[:, 0]
-        outside_areas = 4.0 * half_size.prod() - areas_inside
-        hidden_areas = _compute_overlaps(candidates, mark_boxes).sum(axis=1)
-        distances = np.linalg.norm(compute_nearest_points(mark, centers, half_size) - mark, axis=1)
-        distances += _HEIGHT_COST * np.abs(centers[:, 1] - mark[1])
-        boxes.append(candidates)
-        costs.append(distances + _OUTSIDE_COST * outside_areas + _OVERLAP_COST * hidden_areas)
-    order = np.argsort(-marks[:, 1], kind="stable")  # From top to bottom, so that few lines to labels cross.
-    placed: dict[int, Array] = {}
+        candidates.append(np.hstack([centers - half_size, centers + half_size]))
+        costs.append(_compute_costs(mark, centers, half_size, mark_boxes, frame))
+    # From top to bottom, so that few lines to labels cross.
+    order = np.argsort(-marks[:, 1], kind="stable")
+    chosen = _choose_candidates(candidates, costs, order)
+    placed = [boxes[k] for boxes, k in zip(candidates, chosen, strict=True)]
+    return np.array([0.5 * (box[:2] + box[2:]) for box in placed])
+
+
+def _compute_costs(mark: Array, centers: Array, half_size: Array, mark_boxes: Array, frame: Frame) -> Array:
+    """Return the cost of placing the label of a mark at each of k centers, without other labels, (k,)."""
+    boxes = np.hstack([centers - half_size, centers + half_size])
+    label_area = 4.0 * half_size.prod()
+    outside_areas = label_area - _compute_overlaps(boxes, np.array([frame]))[:, 0]
+    covered_areas = _compute_overlaps(boxes, mark_boxes).sum(axis=1)
+    distances = np.linalg.norm(compute_nearest_points(mark, centers, half_size) - mark, axis=1)
+    heights = np.abs(centers[:, 1] - mark[1])
+    costs: Array = distances + _HEIGHT_COST * heights
+    costs += _OUTSIDE_COST * outside_areas + _OVERLAP_COST * covered_areas
+    return costs
+
+
+def _choose_candidates(candidates: Sequence[Array], costs: Sequence[Array], order: IntArray) -> IntArray:
+    """Choose a box for each of n labels, and choose again until no label moves; (n,) indices of boxes."""
+    chosen = np.full(len(candidates), -1, dtype=np.intp)
     for _ in range(_MAX_ROUNDS):
-        previous = dict(placed)
+        previous = chosen.copy()
         for k in order:
-            others = [box for j, box in placed.items() if j != k]
-            overlaps = _compute_overlaps(boxes[k], np.reshape(others, (-1, 4))).sum(axis=1)
-            best = int(np.argmin(np.round(costs[k] + _OVERLAP_COST * overlaps, 6)))
-            placed[k] = boxes[k][best]
-        if all(k in previous and np.array_equal(placed[k], previous[k]) for k in order):
+            others = [candidates[j][chosen[j]] for j in order if j != k and chosen[j] >= 0]
+            overlaps = _compute_overlaps(candidates[k], np.reshape(others, (-1, 4))).sum(axis=1)
+            # Costs that differ only by rounding are equal on all platforms: the first candidate wins.
+            chosen[k] = np.argmin(np.round(costs[k] + _OVERLAP_COST * overlaps, 6))
+        if np.array_equal(chosen, previous):
             break
-    return np.array([0.5 * (placed[k][:2] + placed[k][2:]) for k in range(len(marks))])
+    return chosen
 
 
 def compute_half_sizes(labels: Sequence[str]) -> Array:
@@ -89,6 +104,7 @@ def _list_offsets(half_size: Array) -> Array:
         height = row * LINE_HEIGHT_PX
         for distance in _LABEL_DISTANCES_PX:
             offsets += [(half_size[0] + distance, height), (-half_size[0] - distance, height)]
+        # Farther away, a label may also be centered above or below its mark.
         if abs(row) > 1.0:
             offsets.append((0.0, height))
     return np.array(offsets)

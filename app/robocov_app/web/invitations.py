@@ -1,4 +1,4 @@
-"""Invitations to a served window: its link, and a QR code from which a phone opens it."""
+"""Invitations to a served window: its link, and a QR code that opens it on a phone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from robocov_app.web.access import find_network_address
 
 
 def build_invitation(host: str, link: str) -> dict[str, str]:
-    """Build the invitation that the pages in control can show on a projector.
+    """Build the invitation that the controlling page can show on a projector.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def build_invitation(host: str, link: str) -> dict[str, str]:
     -------
     dict
         ``link``, and ``qr_code`` as a data URI, which is empty if segno is not installed. The dictionary is
-        empty if only this computer reaches the server.
+        empty if only this computer can reach the server.
     """
     if not link or _is_loopback(find_network_address(host)):
         return {}
@@ -34,7 +34,7 @@ def build_qr_code(link: str) -> str:
         import segno
     except ImportError:
         return ""
-    # Black on white in both themes, with the margin of the standard, so that every camera reads it.
+    # Black on white in both themes, with the standard quiet zone, so that every camera can read it.
     return segno.make_qr(link, error="m").svg_data_uri(border=4, dark="#000", light="#fff")
 
 
@@ -43,5 +43,5 @@ def _is_loopback(address: str) -> bool:
         return True
     try:
         return ipaddress.ip_address(address).is_loopback
-    except ValueError:  # the name of a computer
+    except ValueError:  # a host name
         return False

@@ -107,7 +107,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
 
 
 async def wait_until_open(process: SpawnProcess, output: Connection, folder: Path) -> WindowProcess:
-    """Wait until a window's process has printed the link of its window.
+    """Wait until a window's process has printed its link.
 
     Parameters
     ----------
@@ -163,7 +163,9 @@ def _run_window(command: WindowCommand, options: Any, pipe: Connection) -> None:
         try:
             command(options)
         except RobocovError as error:
-            pipe.send(str(error))
+            # After the window has opened, the server no longer reads.
+            with suppress(OSError):
+                pipe.send(str(error))
 
 
 def _receive_line(receiver: Connection) -> str:
