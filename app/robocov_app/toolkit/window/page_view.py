@@ -1,4 +1,4 @@
-"""How a browser page shows a window: its appearance there, the page's own buttons, and the map alone."""
+"""The view of a window in a browser page: its appearance, the state of the page's buttons, and its map."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -44,7 +44,9 @@ class WindowControls:
     is_compact : bool
         Whether the window leaves its buttons to the page.
     is_playing : bool
+        Whether time passes.
     can_undo : bool
+        Whether there is an edit to undo.
     tool : str
         Name of the tool in use.
     lesson : str

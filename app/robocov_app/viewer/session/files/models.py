@@ -203,6 +203,7 @@ class SessionModel(_Model, title="robocov session"):
 def build_session_schema() -> dict[str, Any]:
     """Return the JSON schema of session files."""
     schema = SessionModel.model_json_schema()
+    # The fields of the session itself, at the root, are described in place.
     for definition in schema["$defs"].values():
         _describe_fields(definition)
         _correct_defaults(definition)
@@ -210,7 +211,7 @@ def build_session_schema() -> dict[str, Any]:
 
 
 def _describe_fields(definition: dict[str, Any]) -> None:
-    """Keep the summary of a docstring as description, and describe fields as its section Attributes does."""
+    """Move the descriptions in the section Attributes of a docstring to the fields of its schema."""
     summary, _, sections = definition.get("description", "").partition("\n\n")
     definition["description"] = summary
     fields = definition.get("properties", {})
@@ -222,12 +223,12 @@ def _describe_fields(definition: dict[str, Any]) -> None:
 
 
 def _format_meaning(text: str) -> str:
-    """Format the description of an attribute for JSON, in which None is null."""
+    """Format the description of an attribute for JSON, in which None is called null."""
     return " ".join(text.split()).removesuffix(".").replace("None", "null")
 
 
 def _correct_defaults(definition: dict[str, Any]) -> None:
-    """Write defaults as files do: null for no limit; and omit those that the type of the field describes."""
+    """Replace infinite defaults with null, as in files, and remove objects, whose types list their defaults."""
     for field_schema in definition.get("properties", {}).values():
         default = field_schema.get("default")
         if default == math.inf:
