@@ -228,7 +228,7 @@ def _format_meaning(text: str) -> str:
 
 
 def _correct_defaults(definition: dict[str, Any]) -> None:
-    """Replace infinite defaults with null, as in files, and remove objects, whose types list their defaults."""
+    """Replace infinite defaults with null, as in files; remove objects, whose types list their defaults."""
     for field_schema in definition.get("properties", {}).values():
         default = field_schema.get("default")
         if default == math.inf:
