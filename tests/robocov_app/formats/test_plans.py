@@ -1,5 +1,6 @@
 """Plans on paper: the page around them, thin strokes, colors, and what transparency stands for."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -110,12 +111,24 @@ def test_an_opening_distinguishes_widths_by_a_cell(width: int) -> None:
     assert not remove_thin_strokes(solid, width + 1).any()
 
 
-def test_an_opening_does_not_depend_on_strips(monkeypatch: pytest.MonkeyPatch) -> None:
-    solid = np.random.default_rng(1).random((200, 60)) > 0.15
+def test_an_opening_does_not_depend_on_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    solid = np.random.default_rng(1).random((70, 60)) > 0.15
     whole = [remove_thin_strokes(solid, width) for width in (2, 3, 6)]
-    monkeypatch.setattr("robocov_app.formats.geometry.cells.strokes._STRIP_CELLS", 60 * 20)
-    strips = [remove_thin_strokes(solid, width) for width in (2, 3, 6)]
-    assert all((one == other).all() for one, other in zip(whole, strips, strict=True))
+    monkeypatch.setattr("robocov_app.formats.geometry.cells.strokes._TILE_CELLS", 20)
+    tiled = [remove_thin_strokes(solid, width) for width in (2, 3, 6)]
+    assert all((one == other).all() for one, other in zip(whole, tiled, strict=True))
+
+
+@pytest.mark.parametrize("shape", [(30_000, 24), (24, 30_000), (1200, 3000)])
+def test_an_opening_by_a_wide_disc_needs_little_memory(shape: tuple[int, int]) -> None:
+    solid = np.ones(shape, dtype=bool)
+    tracemalloc.start()
+    try:
+        remove_thin_strokes(solid, 150)
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < 250_000_000
 
 
 def draw_colored_room() -> Image.Image:

@@ -9,11 +9,11 @@ from scipy import ndimage
 from robocov.arrays import BoolArray
 
 MAX_STROKE_PIXELS = 200
-"""Wider shapes are not strokes. The overlap of the strips grows with this width."""
+"""Wider shapes are not strokes. The overlap of the tiles grows with this width."""
 _CORNER_DISTANCE = 0.3
 """Distance, in widths, between a square corner and its opening by a disc, with some margin."""
-_STRIP_CELLS = 1_000_000
-"""Number of cells processed at once, to limit the memory."""
+_TILE_CELLS = 1000
+"""Rows and columns that are processed at once, to limit the memory."""
 _SQUARE = np.ones((2, 2), dtype=bool)
 
 
@@ -36,40 +36,47 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
     if width <= 1:
         return solid.copy()
     kept = np.empty_like(solid)
-    # Strips overlap by as much as the result of a cell depends on its surroundings.
+    # Tiles overlap by as much as the result of a cell depends on its surroundings.
     halo = 3 * width
-    rows = max(_STRIP_CELLS // solid.shape[1], halo)
-    for top in range(0, len(solid), rows):
-        low = max(top - halo, 0)
-        high = min(top + rows + halo, len(solid))
-        opened = _open(solid[low:high], width, above=top == 0, below=high == len(solid))
-        kept[top : top + rows] = opened[top - low : top - low + rows]
+    size = max(_TILE_CELLS, halo)
+    for top in range(0, solid.shape[0], size):
+        for left in range(0, solid.shape[1], size):
+            rows = slice(top, min(top + size, solid.shape[0]))
+            columns = slice(left, min(left + size, solid.shape[1]))
+            opened = _open(_take_window(solid, rows, columns, halo), width)
+            kept[rows, columns] = opened[halo:-halo, halo:-halo]
     return kept
 
 
-def _open(solid: BoolArray, width: int, *, above: bool, below: bool) -> BoolArray:
-    """Open a strip of a raster by a disc.
+def _take_window(solid: BoolArray, rows: slice, columns: slice, halo: int) -> BoolArray:
+    """Return a tile of a raster with its surroundings.
 
-    `above` and `below` say whether the strip contains the first and the last row of the image.
+    Beyond the edge of the image nothing is solid, so that a frame along the edge is thin, too.
     """
-    # Beyond the edge of the image nothing is solid, so that a frame along the edge is thin, too.
-    margin_above = width if above else 0
-    margin_below = width if below else 0
-    padded = np.pad(solid, ((margin_above, margin_below), (width, width)))
+    low_row = max(rows.start - halo, 0)
+    low_column = max(columns.start - halo, 0)
+    part = solid[low_row : rows.stop + halo, low_column : columns.stop + halo]
+    window = np.zeros((rows.stop - rows.start + 2 * halo, columns.stop - columns.start + 2 * halo), dtype=bool)
+    row = low_row - (rows.start - halo)
+    column = low_column - (columns.start - halo)
+    window[row : row + part.shape[0], column : column + part.shape[1]] = part
+    return window
+
+
+def _open(solid: BoolArray, width: int) -> BoolArray:
+    """Open a window of a raster by a disc. Cells closer than three widths to its sides may be wrong."""
     # A disc of even width is centered on a corner of cells. It is composed of a disc around a cell and a
     # square of 2 x 2 cells.
     is_even = width % 2 == 0
-    core = padded
+    core = solid
     if is_even:
-        core = ndimage.binary_erosion(padded, _SQUARE)
+        core = ndimage.binary_erosion(solid, _SQUARE)
     radius = (width - is_even - 1) / 2
     core = _compute_distance(core) > radius
     opened = _compute_distance(~core) <= radius
     if is_even:
         opened = ndimage.binary_dilation(opened, _SQUARE)
-    opened = (_compute_distance(~opened) <= math.ceil(_CORNER_DISTANCE * width)) & padded
-    rows = slice(margin_above, len(padded) - margin_below)
-    return np.asarray(opened[rows, width : padded.shape[1] - width])
+    return (_compute_distance(~opened) <= math.ceil(_CORNER_DISTANCE * width)) & solid
 
 
 def _compute_distance(cells: BoolArray) -> NDArray[np.float64]:
