@@ -14,6 +14,8 @@ _CORNER_DISTANCE = 0.3
 """Distance, in widths, between a square corner and its opening by a disc, with some margin."""
 _TILE_CELLS = 1000
 """Rows and columns that are processed at once, to limit the memory."""
+_MARGIN_CELLS = 2
+"""Cells around a window that are not solid."""
 _SQUARE = np.ones((2, 2), dtype=bool)
 
 
@@ -43,40 +45,36 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
         for left in range(0, solid.shape[1], size):
             rows = slice(top, min(top + size, solid.shape[0]))
             columns = slice(left, min(left + size, solid.shape[1]))
-            opened = _open(_take_window(solid, rows, columns, halo), width)
-            kept[rows, columns] = opened[halo:-halo, halo:-halo]
+            low_row = max(top - halo, 0)
+            low_column = max(left - halo, 0)
+            window = solid[low_row : rows.stop + halo, low_column : columns.stop + halo]
+            opened = _open(window, width)
+            inner_rows = slice(top - low_row, rows.stop - low_row)
+            inner_columns = slice(left - low_column, columns.stop - low_column)
+            kept[rows, columns] = opened[inner_rows, inner_columns]
     return kept
 
 
-def _take_window(solid: BoolArray, rows: slice, columns: slice, halo: int) -> BoolArray:
-    """Return a tile of a raster with its surroundings.
-
-    Beyond the edge of the image nothing is solid, so that a frame along the edge is thin, too.
-    """
-    low_row = max(rows.start - halo, 0)
-    low_column = max(columns.start - halo, 0)
-    part = solid[low_row : rows.stop + halo, low_column : columns.stop + halo]
-    window = np.zeros((rows.stop - rows.start + 2 * halo, columns.stop - columns.start + 2 * halo), dtype=bool)
-    row = low_row - (rows.start - halo)
-    column = low_column - (columns.start - halo)
-    window[row : row + part.shape[0], column : column + part.shape[1]] = part
-    return window
-
-
 def _open(solid: BoolArray, width: int) -> BoolArray:
-    """Open a window of a raster by a disc. Cells closer than three widths to its sides may be wrong."""
+    """Open a window of a raster by a disc.
+
+    Beyond the window nothing is solid, so that a frame along the edge of an image is thin, too.
+    """
+    padded = np.pad(solid, _MARGIN_CELLS)
     # A disc of even width is centered on a corner of cells. It is composed of a disc around a cell and a
     # square of 2 x 2 cells.
     is_even = width % 2 == 0
-    core = solid
+    core = padded
     if is_even:
-        core = ndimage.binary_erosion(solid, _SQUARE)
+        core = ndimage.binary_erosion(padded, _SQUARE)
     radius = (width - is_even - 1) / 2
     core = _compute_distance(core) > radius
     opened = _compute_distance(~core) <= radius
     if is_even:
         opened = ndimage.binary_dilation(opened, _SQUARE)
-    return (_compute_distance(~opened) <= math.ceil(_CORNER_DISTANCE * width)) & solid
+    opened = (_compute_distance(~opened) <= math.ceil(_CORNER_DISTANCE * width)) & padded
+    inner = slice(_MARGIN_CELLS, -_MARGIN_CELLS)
+    return opened[inner, inner]
 
 
 def _compute_distance(cells: BoolArray) -> NDArray[np.float64]:
