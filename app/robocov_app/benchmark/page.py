@@ -137,7 +137,6 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results contain no run of the suite, so there is nothing to compare")
-    rated_tracks = {name: tracks[name] for name in tracks if name in suite.RATED_TRACKS}
     page = load_template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
@@ -145,7 +144,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
         styles=entries.styles,
-        overview=_build_overview(labels, rated_tracks or tracks),
+        overviews=_build_overviews(labels, tracks),
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
@@ -170,11 +169,28 @@ def _build_sort_key(rating: Rating) -> tuple[bool, float]:
     return not rating.is_complete, -rating.score
 
 
-def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
-    """Build the table of scores and gaps on all tracks.
+def _build_overviews(
+    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]
+) -> list[tuple[str, str, PageTable]]:
+    """Build the identifier, heading and table of each ranking for which there are runs.
 
-    Entries that have all runs of all tracks on the page come first, ranked by mean score. The other entries
-    have no rank.
+    If all tracks are in no ranking, the only table compares the results on these tracks.
+    """
+    overviews = []
+    for ranking, heading in suite.RANKINGS.items():
+        ranked_tracks = {name: tracks[name] for name in suite.RANKED_TRACKS[ranking] if name in tracks}
+        if ranked_tracks:
+            overviews.append((f"overview-{ranking}", heading, _build_overview(labels, ranked_tracks)))
+    if not overviews:
+        overviews.append(("overview-other", "Overview", _build_overview(labels, tracks)))
+    return overviews
+
+
+def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
+    """Build the table of scores and gaps on some tracks.
+
+    Entries that have all runs of all these tracks come first, ranked by mean score. The other entries have no
+    rank.
     """
     by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
@@ -469,4 +485,4 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         for reason, runs in runs_by_reason.items():
             rows.append((label, str(len(runs)), reason, runs[0]))
     head = ("Controller", "Runs", "What happened", "First run")
-    return PageTable("Runs to look into", head, rows, text_columns=frozenset({2, 3}))
+    return PageTable("Suspicious runs by controller and reason", head, rows, text_columns=frozenset({2, 3}))

@@ -109,8 +109,8 @@ class Track:
         Options of the study that differ from those of the ideal track.
     failures : tuple of (int, float)
         Index of each robot that fails, and the time of its failure, s.
-    is_rated : bool
-        Whether the track is part of a complete entry, and counts in the overview of the results.
+    ranking : str
+        The ranking in which the track counts: a key of `RANKINGS`, or empty.
     """
 
     summary: str
@@ -120,7 +120,7 @@ class Track:
     duration: float = DEFAULT_DURATION_S
     changes: Mapping[str, Any] = field(default_factory=dict)
     failures: tuple[tuple[int, float], ...] = ()
-    is_rated: bool = True
+    ranking: str = "core"
 
     @property
     def survivors(self) -> int:
@@ -146,37 +146,41 @@ TRACKS: Mapping[str, Track] = {
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),
     "plans-small": Track(
-        "large plans, unlimited communication; not rated", _PLANS[0], robots=3, duration=240.0, is_rated=False
+        "large plans, unlimited communication", _PLANS[0], robots=3, duration=240.0, ranking="plans"
     ),
     "plans-medium": Track(
-        "large plans, communication range of 12 m; not rated",
+        "large plans, communication range of 12 m",
         _PLANS[1],
         robots=12,
         duration=180.0,
         changes={"communication_range": 12.0},
-        is_rated=False,
+        ranking="plans",
     ),
     "plans-large": Track(
-        "large plans, communication range of 6 m; not rated",
+        "large plans, communication range of 6 m",
         _PLANS[2],
         robots=24,
         duration=150.0,
         changes={"communication_range": 6.0},
-        is_rated=False,
+        ranking="plans",
     ),
     "plans-crowd": Track(
-        "large plans, communication range of 3 m; not rated",
+        "large plans, communication range of 3 m",
         _PLANS[3],
         robots=50,
         duration=120.0,
         changes={"communication_range": 3.0},
-        is_rated=False,
+        ranking="plans",
     ),
-    "tuning": Track("like ideal, for choosing gains; not rated", OTHER_FAMILIES["tuning"], is_rated=False),
+    "tuning": Track("like ideal, for choosing gains; in no ranking", OTHER_FAMILIES["tuning"], ranking=""),
 }
-"""All tracks by name; only `RATED_TRACKS` count."""
-RATED_TRACKS = tuple(name for name, track in TRACKS.items() if track.is_rated)
-"""Names of the tracks of a complete entry."""
+"""All tracks by name."""
+RANKINGS: Mapping[str, str] = {"core": "Overview", "plans": "Overview of large plans"}
+"""Headings of the rankings by name. Each ranks the controllers that have all runs of its tracks."""
+RANKED_TRACKS: Mapping[str, tuple[str, ...]] = {
+    ranking: tuple(name for name, track in TRACKS.items() if track.ranking == ranking) for ranking in RANKINGS
+}
+"""Names of the tracks of each ranking."""
 QUICK_TRACKS = ("ideal", "short-range")
 """Tracks of ``--quick``, with the first map of each family and the first seed."""
 
@@ -273,7 +277,8 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
     Parameters
     ----------
     tracks : sequence of str
-        Names of tracks. If empty, `RATED_TRACKS` or, with `quick`, `QUICK_TRACKS`.
+        Names of tracks, or of rankings for all of their tracks. If empty, the tracks of the ranking ``core``
+        or, with `quick`, `QUICK_TRACKS`.
     maps : sequence of str
         Names of maps. If empty, all maps of each track.
     quick : bool
@@ -289,14 +294,13 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
     ParameterError
         If a track or map is unknown, or if none of the maps is on any of the tracks.
     """
-    for name in tracks:
-        if name not in TRACKS:
-            raise ParameterError(f"--track: {describe_unknown_name('track', name, TRACKS)}")
+    track_names = list(QUICK_TRACKS if quick else RANKED_TRACKS["core"])
+    if tracks:
+        track_names = _expand_rankings(tracks)
     for name in maps:
         build_map(name)
-    default_tracks = QUICK_TRACKS if quick else RATED_TRACKS
     selection = {}
-    for name in tracks or default_tracks:
+    for name in track_names:
         track_maps = TRACKS[name].maps
         if maps:
             track_maps = tuple(map_name for map_name in track_maps if map_name in maps)
@@ -305,9 +309,20 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
         if track_maps:
             selection[name] = track_maps
     if not selection:
-        expected = ", ".join(tracks or default_tracks)
+        expected = ", ".join(track_names)
         raise ParameterError(f"--maps: expected a map of {expected}, got {', '.join(maps)}")
     return selection
+
+
+def _expand_rankings(names: Sequence[str]) -> list[str]:
+    """Return the names of tracks, where a name of a ranking stands for all of its tracks."""
+    tracks: list[str] = []
+    for name in names:
+        if name not in TRACKS and name not in RANKED_TRACKS:
+            known_names = [*TRACKS, *RANKED_TRACKS]
+            raise ParameterError(f"--track: {describe_unknown_name('track', name, known_names)}")
+        tracks += RANKED_TRACKS.get(name, (name,))
+    return list(dict.fromkeys(tracks))
 
 
 def _select_one_per_family(maps: Sequence[str]) -> tuple[str, ...]:

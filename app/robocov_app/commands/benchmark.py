@@ -63,7 +63,7 @@ class Arguments(JsonOption):
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
     """Gains that differ from their defaults."""
     track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()
-    """Only these tracks; `robocov benchmark suite` lists them."""
+    """Only these tracks, or all of a ranking (core, plans); `robocov benchmark suite` lists them."""
     maps: Annotated[tuple[str, ...], tyro.conf.arg(metavar="MAP ...")] = ()
     """Only these maps; `robocov benchmark suite` lists them."""
     quick: bool = False
@@ -183,7 +183,7 @@ def _print_suite(options: Arguments) -> int:
 
     if options.json:
         tracks = {
-            name: {"maps": track.maps, "seeds": track.seeds, "rated": track.is_rated}
+            name: {"maps": track.maps, "seeds": track.seeds, "ranking": track.ranking}
             for name, track in suite.TRACKS.items()
         }
         print_answer(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK_TRACKS})
@@ -191,8 +191,16 @@ def _print_suite(options: Arguments) -> int:
     rows = []
     for name, track in suite.TRACKS.items():
         runs = len(track.maps) * len(track.seeds)
-        rows.append((name, str(len(track.maps)), str(runs), str(track.robots), track.summary))
-    columns = [("Track", BOLD), ("Maps", RIGHT), ("Runs", RIGHT), ("Robots", RIGHT), ("", {})]
+        ranking = track.ranking or "–"
+        rows.append((name, ranking, str(len(track.maps)), str(runs), str(track.robots), track.summary))
+    columns = [
+        ("Track", BOLD),
+        ("Ranking", {}),
+        ("Maps", RIGHT),
+        ("Runs", RIGHT),
+        ("Robots", RIGHT),
+        ("", {}),
+    ]
     title = f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK_TRACKS)}"
     print_table(columns, rows, title=title)
     echo()

@@ -101,7 +101,7 @@ def test_runs_are_rated_verified_and_shown_on_a_page(
 
 
 def test_bundled_results_are_complete() -> None:
-    """Each has all runs of the rated tracks, with gaps that agree with its costs."""
+    """Each has all runs of the core tracks, with gaps that agree with its costs."""
     results = load_bundled_results()
     assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
     runs = set()
@@ -114,8 +114,8 @@ def test_bundled_results_are_complete() -> None:
         if controller != "oracle":
             assert result["entry"]["label"] == load_controller_class(controller).label
         rows = {(row["track"], row["map"], row["seed"]) for row in result["rows"]}
-        assert {row for row in rows if row[0] in suite.RATED_TRACKS} == runs
-        # On a track that is not rated, an entry has either all runs or none.
+        assert {row for row in rows if row[0] in suite.RANKED_TRACKS["core"]} == runs
+        # On each other track, an entry has either all runs or none.
         for track in {row[0] for row in rows - runs}:
             assert {row[1] for row in rows if row[0] == track} == set(suite.TRACKS[track].maps)
         for row in result["rows"]:
@@ -252,13 +252,23 @@ def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: 
 
 
 @pytest.mark.parametrize("track", ["tuning", "plans-small"])
-def test_runs_on_a_track_that_is_not_rated_do_not_change_the_overview(track: str) -> None:
+def test_runs_on_other_tracks_do_not_change_the_overview(track: str) -> None:
     results = load_bundled_results()
     rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
     row = {**rapf["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
     more = {**rapf, "rows": [*rapf["rows"], row]}
     with_more = [more if result is rapf else result for result in results]
     assert build_tables(with_more).overview == build_tables(results).overview
+
+
+def test_large_plans_have_a_ranking_of_their_own() -> None:
+    results = load_bundled_results()
+    page = build_page(results, "Test")
+    overview = page.partition('id="overview-plans"')[2].partition("</section>")[0]
+    assert "Overview of large plans" in overview
+    first_row = re.findall(r"<tr>(.*?)</tr>", overview.partition("<tbody>")[2])[0]
+    cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", first_row)
+    assert (cells[1], cells[3]) == ("1", "24")
 
 
 class PageTables(NamedTuple):
@@ -501,7 +511,7 @@ def test_the_page_in_a_browser(browser: Browser, tmp_path: Path, monkeypatch: py
     assert browser.find("h1").text == "A <test> of names"
     labels = [cell.text for cell in browser.find_all("#ideal tbody th")][:3]
     assert labels == ["RAPF", "LLOYD", "ATLAS"]
-    assert [cell.text for cell in browser.find_all("#overview tbody th")] == labels
+    assert [cell.text for cell in browser.find_all("#overview-core tbody th")] == labels
     gaps = [
         float(cell.text.split()[0])
         for cell in browser.find_all("#ideal .scroll:first-of-type tbody td:nth-child(5)")

@@ -52,7 +52,11 @@ PLAN_ROWS = [
 ]
 """Controllers and tracks with runs on large plans."""
 ROWS = [
-    *((controller, track) for track in suite.RATED_TRACKS for controller in ("atlas", "atlas-shared")),
+    *(
+        (controller, track)
+        for track in suite.RANKED_TRACKS["core"]
+        for controller in ("atlas", "atlas-shared")
+    ),
     *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
     *((controller, "ideal") for controller in ("local-search", "exemplar")),
     *PLAN_ROWS,
