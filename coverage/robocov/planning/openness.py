@@ -114,13 +114,28 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
         link_counts_up=np.zeros((block_rows + 1, block_columns + 1)),
         link_counts_right=np.zeros((block_rows + 1, block_columns + 1)),
     )
-    for row in range(rows):
-        i = row // block_side
-        for column in range(columns):
+    for i in range(block_rows):
+        for j in range(block_columns):
+            _count_sides(cells, block_side, i, j, blocks)
+    return blocks
+
+
+@kernel
+def _count_sides(cells: NDArray[np.uint8], block_side: int, i: int, j: int, blocks: _BlockGrid) -> None:
+    """Count the unknown cells of a block, and their sides, in the arrays of `blocks`."""
+    rows, columns = cells.shape
+    end_row = min((i + 1) * block_side, rows)
+    end_column = min((j + 1) * block_side, columns)
+    unknown_count = 0
+    free_side_count = 0
+    wall_side_count = 0
+    link_count_up = 0
+    link_count_right = 0
+    for row in range(i * block_side, end_row):
+        for column in range(j * block_side, end_column):
             if cells[row, column] != UNKNOWN:
                 continue
-            j = column // block_side
-            blocks.unknown_counts[i, j] += 1.0
+            unknown_count += 1
             for up, right in _SIDE_STEPS:
                 neighbor_row = row + up
                 neighbor_column = column + right
@@ -128,15 +143,19 @@ def _build_blocks(cells: NDArray[np.uint8], block_side: int) -> _BlockGrid:
                     continue
                 state = cells[neighbor_row, neighbor_column]
                 if state == FREE:
-                    blocks.free_side_counts[i, j] += 1.0
+                    free_side_count += 1
                 elif state == UNKNOWN:
-                    if neighbor_row // block_side > i:
-                        blocks.link_counts_up[i, j] += 1.0
-                    elif neighbor_column // block_side > j:
-                        blocks.link_counts_right[i, j] += 1.0
+                    if neighbor_row == end_row:
+                        link_count_up += 1
+                    elif neighbor_column == end_column:
+                        link_count_right += 1
                 elif state != _OUTSIDE:  # a wall or a presumed wall
-                    blocks.wall_side_counts[i, j] += 1.0
-    return blocks
+                    wall_side_count += 1
+    blocks.unknown_counts[i, j] = unknown_count
+    blocks.free_side_counts[i, j] = free_side_count
+    blocks.wall_side_counts[i, j] = wall_side_count
+    blocks.link_counts_up[i, j] = link_count_up
+    blocks.link_counts_right[i, j] = link_count_right
 
 
 @kernel
