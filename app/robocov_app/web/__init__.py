@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
-from multiprocessing import parent_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,17 +63,21 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     from robocov_app.web.access import CONTROL_LABEL
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
+    from robocov_app.web.window_process import WindowAddress, get_address_receiver
 
-    # With --each, a visitor's window runs in a child process, and pages connect through its parent's server.
-    is_relayed = parent_process() is not None
+    # With --each, pages connect through the server of all visitors, which needs the address of the window.
+    receive_address = get_address_receiver()
+    is_relayed = receive_address is not None
     with (
         WebDisplay(options.host, options.port, folder, is_relayed=is_relayed) as display,
         confine_files(folder),
         ending_on_signals(),
     ):
-        echo(f"{CONTROL_LABEL}{display.link}", flush=True)
-        echo(f"Watch it:           {display.watch_link}", flush=True)
-        if not is_relayed:
+        if receive_address is not None:
+            receive_address(WindowAddress(display.port, display.token))
+        else:
+            echo(f"{CONTROL_LABEL}{display.link}", flush=True)
+            echo(f"Watch it:           {display.watch_link}", flush=True)
             echo("Press Ctrl+C to stop.", flush=True)
         window.remote = display
         window.hide_folder(folder)

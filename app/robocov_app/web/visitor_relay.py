@@ -37,12 +37,12 @@ async def relay_messages(connection: ServerConnection, window: WindowProcess, pa
     from websockets.asyncio.client import connect
     from websockets.exceptions import WebSocketException
 
-    query = urlencode({"token": window.token, "page": page_id})
+    query = urlencode({"token": window.address.token, "page": page_id})
     code = None
     reason = "The window has ended."
     with suppress(OSError, WebSocketException):
         async with connect(
-            f"ws://127.0.0.1:{window.port}/socket?{query}",
+            f"ws://127.0.0.1:{window.address.port}/socket?{query}",
             max_size=MAX_FRAME_BYTES,
             max_queue=MAX_QUEUED_FRAMES,
             write_limit=WRITE_LIMIT_BYTES,

@@ -318,9 +318,9 @@ class VisitorServer:
         async with self._openings:
             if self._is_ending:
                 raise InputError("the server is ending")
-            process, output = start_process(self._command, self._options, folder)
+            process, receiver = start_process(self._command, self._options, folder)
             self._processes.append(process)
-            return await wait_until_open(process, output, folder)
+            return await wait_until_open(process, receiver, folder)
 
     # Places.
 

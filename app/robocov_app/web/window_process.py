@@ -7,21 +7,19 @@ import multiprocessing
 import os
 from _thread import interrupt_main
 from collections.abc import Callable
-from contextlib import redirect_stdout, suppress
+from contextlib import suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
-from io import TextIOBase
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from threading import Thread
 from time import monotonic, time
-from typing import Any
-from urllib.parse import urlsplit
+from typing import Any, TypeAlias
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.terminal.interruption import block_interrupts, unblock_interrupts
-from robocov_app.web.access import CONTROL_LABEL, get_token
 
 OPENING_TIMEOUT_S = 120.0
 ENDING_TIMEOUT_S = 5.0
@@ -30,6 +28,51 @@ _CHECK_INTERVAL_S = 0.02
 
 WindowCommand = Callable[[Any], int]
 """A command of robocov that shows a window, called with its options."""
+
+
+@dataclass(frozen=True)
+class WindowAddress:
+    """The address of an open window, sent by its process.
+
+    Attributes
+    ----------
+    port : int
+        Port of the process's own server, which accepts local connections only.
+    token : str
+        Access token of that server.
+    """
+
+    port: int
+    token: str
+
+
+@dataclass(frozen=True)
+class OpeningFailure:
+    """The reason why a window did not open, sent by its process.
+
+    Attributes
+    ----------
+    message : str
+    """
+
+    message: str
+
+
+OpeningResult: TypeAlias = WindowAddress | OpeningFailure
+AddressReceiver: TypeAlias = Callable[[WindowAddress], object]
+
+_address_receiver: ContextVar[AddressReceiver | None] = ContextVar("address_receiver", default=None)
+
+
+def get_address_receiver() -> AddressReceiver | None:
+    """Return the function that sends the address of this process's window to the server of all visitors.
+
+    Returns
+    -------
+    callable or None
+        None if this process does not run the window of a visitor.
+    """
+    return _address_receiver.get()
 
 
 @dataclass(eq=False)
@@ -41,18 +84,14 @@ class WindowProcess:
     process : SpawnProcess
     folder : Path
         Folder for the visitor's files.
-    port : int
-        Port of the process's own server, which accepts local connections only.
-    token : str
-        Access token of that server.
+    address : WindowAddress
     opened_at : float
         Time at which it was assigned to its visitor, s since the epoch.
     """
 
     process: SpawnProcess
     folder: Path
-    port: int
-    token: str
+    address: WindowAddress
     opened_at: float = field(default_factory=time)
 
     @property
@@ -89,8 +128,8 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     Returns
     -------
     process : SpawnProcess
-    output : Connection
-        Receives the standard output of the process.
+    receiver : Connection
+        Receives an `OpeningResult`.
     """
     own_options = replace(options, each=False, host="127.0.0.1", port=0, folder=folder)
     context = multiprocessing.get_context("spawn")
@@ -106,14 +145,14 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     return process, receiver
 
 
-async def wait_until_open(process: SpawnProcess, output: Connection, folder: Path) -> WindowProcess:
-    """Wait until a window's process has printed its link.
+async def wait_until_open(process: SpawnProcess, receiver: Connection, folder: Path) -> WindowProcess:
+    """Wait until a window's process has sent the address of its window.
 
     Parameters
     ----------
     process : SpawnProcess
-    output : Connection
-        Standard output of the process; closed afterwards.
+    receiver : Connection
+        Receives the result; closed afterwards.
     folder : Path
 
     Returns
@@ -125,31 +164,17 @@ async def wait_until_open(process: SpawnProcess, output: Connection, folder: Pat
     InputError
         If the window does not open, with the message of its process. The folder is removed if it is empty.
     """
-    with output:
-        line = await asyncio.to_thread(_receive_line, output)
-    if line.startswith(CONTROL_LABEL):
-        link = line.removeprefix(CONTROL_LABEL).strip()
-        return WindowProcess(process, folder, urlsplit(link).port or 0, get_token(link))
+    with receiver:
+        result = await asyncio.to_thread(_receive_result, receiver)
+    if isinstance(result, WindowAddress):
+        return WindowProcess(process, folder, result)
     process.terminate()
     with suppress(OSError):
         folder.rmdir()
-    raise InputError(line)
+    raise InputError(result.message)
 
 
-class _PipeOutput(TextIOBase):
-    """Stream that sends the standard output of a window's process to the server."""
-
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-
-    def write(self, text: str, /) -> int:
-        """Send text; it is lost if the server no longer reads."""
-        with suppress(OSError):
-            self._pipe.send(text)
-        return len(text)
-
-
-def _run_window(command: WindowCommand, options: Any, pipe: Connection) -> None:
+def _run_window(command: WindowCommand, options: Any, sender: Connection) -> None:
     """Show a window until it is closed or the server's process ends; runs in the window's process."""
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -158,19 +183,24 @@ def _run_window(command: WindowCommand, options: Any, pipe: Connection) -> None:
         parent.join()
         interrupt_main()
 
+    def send(result: OpeningResult) -> None:
+        # After the window has opened, the server no longer reads.
+        with suppress(OSError):
+            sender.send(result)
+
     Thread(target=end_with_parent, daemon=True).start()
-    with suppress(KeyboardInterrupt), redirect_stdout(_PipeOutput(pipe)):
+    _address_receiver.set(send)
+    with suppress(KeyboardInterrupt):
         try:
             command(options)
         except RobocovError as error:
-            # After the window has opened, the server no longer reads.
-            with suppress(OSError):
-                pipe.send(str(error))
+            send(OpeningFailure(str(error)))
 
 
-def _receive_line(receiver: Connection) -> str:
-    """Return the first line that a window's process prints, or an error message if there is none."""
+def _receive_result(receiver: Connection) -> OpeningResult:
+    """Return the result that a window's process sends; an error if it sends none in time."""
     with suppress(EOFError, OSError):
         if receiver.poll(OPENING_TIMEOUT_S):
-            return str(receiver.recv())
-    return "the window did not open"
+            result: OpeningResult = receiver.recv()
+            return result
+    return OpeningFailure("the window did not open")
