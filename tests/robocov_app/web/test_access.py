@@ -19,7 +19,8 @@ def test_the_server_answers_at_the_address_of_its_link(host: str) -> None:
         pytest.skip(f"this machine cannot listen at {host}")
     with server:
         link = urlsplit(build_link(host, server.getsockname()[1], token="secret"))
-        assert link.hostname is not None and link.port is not None
+        assert link.hostname is not None
+        assert link.port is not None
         socket.create_connection((link.hostname, link.port), timeout=5).close()
     assert link.query == "token=secret"
 
