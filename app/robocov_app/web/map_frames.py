@@ -13,6 +13,7 @@ from robocov_app.web.frames import Frame
 from robocov_app.web.pages import MapSize
 
 if TYPE_CHECKING:
+    from robocov_app.toolkit.window.page_view import MapDrawing
     from robocov_app.toolkit.window.window import BaseWindow
 
 MAP_FRAME_INTERVAL_S = 1 / 15
@@ -31,7 +32,7 @@ class MapFrames:
     requested_sizes : frozenset of MapSize
         Sizes of the pages that show the map.
     frames : dict of MapSize to Frame
-        The newest picture of each size; empty while all pages have to show the window itself.
+        The newest picture of each size; empty if all pages have to show the window itself.
     """
 
     def __init__(self) -> None:
@@ -65,18 +66,21 @@ class MapFrames:
         self._drawn_window = window_frame
         self._drawn_sizes = sizes
         frames: dict[MapSize, Frame] = {}
-        for size in sizes:
-            picture: Surface | None = None
-            if window.map_pictures is not None:
-                picture = window.map_pictures.draw((size.width, size.height), size.scale)
-            if picture is None:
-                continue
-            previous = self.frames.get(size)
-            frame = Frame.from_surface(picture, create_number())
-            is_same = previous is not None and np.array_equal(previous.pixels, frame.pixels)
-            frames[size] = previous if previous is not None and is_same else frame
+        if window.map_pictures is not None:
+            for size in sizes:
+                frame = Frame.from_surface(_draw_picture(window.map_pictures, size), create_number())
+                previous = self.frames.get(size)
+                is_same = previous is not None and np.array_equal(previous.pixels, frame.pixels)
+                frames[size] = previous if previous is not None and is_same else frame
         duration = monotonic() - start_time
         self._next_time = start_time + max(MAP_FRAME_INTERVAL_S, duration / MAX_TIME_FRACTION)
         has_changed = frames != self.frames
         self.frames = frames
         return has_changed
+
+
+def _draw_picture(pictures: MapDrawing, size: MapSize) -> Surface:
+    """Draw the map in a size, or what covers it, for the page that controls the window."""
+    if size.shows_cover and pictures.is_covered:
+        return pictures.draw_cover((size.width, size.height), size.scale)
+    return pictures.draw((size.width, size.height), size.scale)

@@ -44,11 +44,14 @@ class MapSize(NamedTuple):
     width, height : int, px
     scale : float
         Size of texts and symbols.
+    shows_cover : bool
+        Whether the page shows a dialog that covers the map, because its user controls the window.
     """
 
     width: int
     height: int
     scale: float
+    shows_cover: bool = False
 
 
 class TooManyPagesError(RobocovError):
@@ -155,6 +158,7 @@ class Pages:
         self.controlling: Page | None = None
         self.participants: list[dict[str, Any]] = []
         self._on_control_change = on_control_change
+        self._window_settings: PageChanged | None = None  # of the page that the window has fitted last
         self._pages: list[Page] = []
 
     def __iter__(self) -> Iterator[Page]:
@@ -268,13 +272,18 @@ class Pages:
 
     def update_map_sizes(self) -> None:
         """Choose in which size each page shows the map; None for pages that show the window."""
-        window = self.display_settings
+        self._window_settings = self.display_settings or self._window_settings
+        window = self._window_settings
         sizes: list[MapSize] = []
         for page in self._pages:
             page.map_size = None
             if window is None or page.settings is None or page.settings is window:
                 continue
-            if _needs_own_picture(page.settings, window):
+            if not _needs_own_picture(page.settings, window):
+                continue
+            if page is self.controlling:
+                page.map_size = _compute_map_size(page.settings)._replace(shows_cover=True)
+            else:
                 page.map_size = _choose_map_size(page.settings, sizes)
 
     def wake(self) -> None:
@@ -344,12 +353,18 @@ def _needs_own_picture(settings: PageChanged, window: PageChanged) -> bool:
 
 def _choose_map_size(settings: PageChanged, sizes: list[MapSize]) -> MapSize:
     """Return the size of the map for a page; add it to `sizes` unless these are `MAX_MAP_SIZES` already."""
-    shrinkage = min(1.0, sqrt(MAX_MAP_PIXELS / (settings.width * settings.height)))
-    width = round(shrinkage * settings.width)
-    height = round(shrinkage * settings.height)
-    size = MapSize(width, height, shrinkage * settings.ratio)
+    size = _compute_map_size(settings)
     if size not in sizes and len(sizes) >= MAX_MAP_SIZES:
-        return min(sizes, key=lambda other: abs(log(other.width / other.height * height / width)))
+        aspect_ratio = size.width / size.height
+        return min(sizes, key=lambda other: abs(log(other.width / other.height / aspect_ratio)))
     if size not in sizes:
         sizes.append(size)
     return size
+
+
+def _compute_map_size(settings: PageChanged) -> MapSize:
+    """Return the size of a page, reduced to `MAX_MAP_PIXELS`."""
+    shrinkage = min(1.0, sqrt(MAX_MAP_PIXELS / (settings.width * settings.height)))
+    width = round(shrinkage * settings.width)
+    height = round(shrinkage * settings.height)
+    return MapSize(width, height, shrinkage * settings.ratio)

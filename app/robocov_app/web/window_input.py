@@ -27,6 +27,8 @@ MAX_WAITING_MESSAGES = 5000
 """If more messages are waiting, the server stops reading until the window has caught up."""
 _MIN_WAIT_S = 0.001
 """Lets other threads run even if the window would not wait."""
+_DIALOG_MARGINS_PX = 16.0
+"""Width to the left and right of dialogs on a phone, together, at scale 1."""
 
 
 class WindowInput:
@@ -43,7 +45,7 @@ class WindowInput:
     def __init__(self, clipboard: Clipboard) -> None:
         self._messages: deque[InputMessage | Uploaded] = deque()
         self._page: PageChanged | None = None
-        self._fitted_page: PageChanged | None = None
+        self._fitted: tuple[PageChanged, MapSize | None] | None = None
         self._map_size: MapSize | None = None
         self._is_small = False
         self._translator = EventTranslator(clipboard)
@@ -81,8 +83,8 @@ class WindowInput:
     def post(self, window: BaseWindow) -> None:
         """Fit the window to the page, and post the received messages as pygame events."""
         page = self._page
-        if page is not None and page is not self._fitted_page:
-            self._fitted_page = page
+        if page is not None and self._fitted != (page, self._map_size):
+            self._fitted = (page, self._map_size)
             self._fit(window, page)
         has_posted = False
         while self._messages:
@@ -131,5 +133,13 @@ class WindowInput:
             shows_panel=shows_panel,
             is_compact=page.is_compact,
             is_motion_reduced=page.reduced_motion,
+            max_dialog_width=self._find_max_dialog_width(),
         )
         window.set_appearance(appearance)
+
+    def _find_max_dialog_width(self) -> float | None:
+        """Return the width of the phone that controls the window, px at scale 1; None if none does."""
+        size = self._map_size
+        if size is None:
+            return None
+        return size.width / size.scale - _DIALOG_MARGINS_PX

@@ -4,6 +4,8 @@ import pygame
 import pytest
 from driven_window import Driver, get_position
 
+from robocov_app.toolkit.window.page_view import PageAppearance
+
 PHONE = (400, 700)
 SCALE = 1.5
 
@@ -93,9 +95,55 @@ def test_a_message_is_shown_in_a_picture(driver: Driver) -> None:
     assert pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB") != before
 
 
-def test_help_and_dialogs_are_shown_as_in_the_window(driver: Driver) -> None:
-    driver.press_key("f1")
-    assert driver.window.map_pictures.draw(PHONE, SCALE) is None
-    assert driver.window.map_pictures.find_window_pixel(PHONE, (30, 40)) == (30, 40)
-    driver.press_key("f1")
-    assert driver.window.map_pictures.draw(PHONE, SCALE) is not None
+@pytest.mark.parametrize("command", ["help", "palette", "share", "layers"])
+def test_a_picture_shows_the_map_while_something_covers_it_in_the_window(
+    driver: Driver, command: str
+) -> None:
+    pictures = driver.window.map_pictures
+    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB")
+    assert not driver.window.controls.is_covered
+    driver.window.do(command)
+    driver.run_frames(2)
+    assert driver.window.controls.is_covered
+    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB") == before
+    driver.window.do("cancel")
+    driver.run_frames(2)
+
+
+def test_the_menu_of_layers_is_used_in_a_picture(driver: Driver) -> None:
+    window = driver.window
+    window.do("layers")
+    driver.run_frames(2)
+    window.map_pictures.draw_cover(PHONE, SCALE)
+    menu = window.layer_bar.menu_box
+    row = next(box for chip, box in window.layer_bar.rows if chip.command == "layer:grid")
+    factor = PHONE[0] / menu.width
+    left = (row.centerx - menu.left) * factor
+    target_top = round(0.1 * PHONE[1])
+    pixel = (left, target_top + (row.centery - menu.top) * factor)
+    x, y = window.map_pictures.find_window_pixel(PHONE, pixel)
+    had_grid = "grid" in driver.viewer.view.layers
+    driver.click(round(x), round(y))
+    assert ("grid" in driver.viewer.view.layers) != had_grid
+
+
+def test_dialogs_and_menus_are_not_wider_than_the_phone_that_controls_the_window(driver: Driver) -> None:
+    window = driver.window
+    appearance = PageAppearance(
+        scale=1.0,
+        theme="light",
+        shows_panel=None,
+        is_compact=False,
+        is_motion_reduced=True,
+        max_dialog_width=374.0,
+    )
+    window.set_appearance(appearance)
+    window.do("palette")
+    driver.run_frames(2)
+    assert window.dialogs.box is not None
+    assert window.dialogs.box.width <= 374
+    window.do("cancel")
+    window.dialogs.close()
+    window.do("layers")
+    driver.run_frames(2)
+    assert window.layer_bar.menu_box.width <= 374

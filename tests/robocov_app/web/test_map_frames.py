@@ -18,7 +18,7 @@ MAP_OFFSET_PX = 1000
 
 
 class FakeWindow:
-    """A window with a map of one color, which a dialog can cover."""
+    """A window with a red map, which a green dialog can cover."""
 
     replacement = None
     controls = None
@@ -27,24 +27,27 @@ class FakeWindow:
     def __init__(self):
         self.screen = pygame.Surface(WINDOW_SIZE_PX, 0, 32)
         self.map_pictures = self
-        self.has_dialog = False
-        self.red = 0
+        self.is_covered = False
+        self.shade = 0
 
     def set_appearance(self, appearance):
         self.is_motion_reduced = appearance.is_motion_reduced
 
     def draw(self, size, scale):
-        if self.has_dialog:
-            return None
-        picture = pygame.Surface(size, 0, 32)
-        picture.fill((self.red, 0, 0))
-        return picture
+        return fill_picture(size, (self.shade, 0, 0))
+
+    def draw_cover(self, size, scale):
+        return fill_picture(size, (0, self.shade, 0))
 
     def find_window_pixel(self, size, pixel):
-        if self.has_dialog:
-            return pixel
         x, y = pixel
         return x + MAP_OFFSET_PX, y
+
+
+def fill_picture(size, color):
+    picture = pygame.Surface(size, 0, 32)
+    picture.fill(color)
+    return picture
 
 
 @pytest.fixture
@@ -82,23 +85,41 @@ def has_size(picture, size):
     return picture.shape == (height, width)
 
 
-def test_a_watching_phone_shows_the_map_until_a_dialog_covers_it(display, window, teacher, viewer):
-    projector = teacher
-    phone = viewer
-    connect_projector_and_phone(display, window, projector, phone)
-    receive_frames_until(phone, lambda picture: has_size(picture, PHONE_SIZE_PX))
-    window.red = 7
-    window.screen.fill((1, 2, 3))
+def change_window(display, window, shade, *, is_covered=False):
+    """Change the map and the window, and send both."""
+    window.shade = shade
+    window.is_covered = is_covered
+    window.screen.fill((1, 2, shade))
     display.send(window.screen)
     time.sleep(0.1)  # Maps are drawn at most 15 times a second.
     display.receive(window)
     display.send(window.screen)
+
+
+def test_a_watching_phone_shows_the_map_even_while_a_dialog_covers_it(display, window, teacher, viewer):
+    projector = teacher
+    phone = viewer
+    connect_projector_and_phone(display, window, projector, phone)
+    receive_frames_until(phone, lambda picture: has_size(picture, PHONE_SIZE_PX))
+    change_window(display, window, 7)
     receive_frames_until(phone, lambda picture: picture[0, 0] == 7 << 16)
     assert has_size(projector.receive_frame(), WINDOW_SIZE_PX)
-    window.has_dialog = True
-    window.screen.fill((4, 5, 6))
-    run_window_until(display, window, lambda: not display.shared.delivery.maps.frames)
-    receive_frames_until(phone, lambda picture: has_size(picture, WINDOW_SIZE_PX))
+    change_window(display, window, 9, is_covered=True)
+    receive_frames_until(phone, lambda picture: picture[0, 0] == 9 << 16)
+    assert has_size(phone.picture, PHONE_SIZE_PX)
+
+
+def test_a_controlling_phone_shows_the_dialog_alone(display, window, teacher, viewer):
+    maps = display.shared.delivery.maps
+    with open_display(headless=True):
+        connect_projector_and_phone(display, window, teacher, viewer)
+        teacher.pass_control(2)
+        run_window_until(display, window, lambda: any(size.shows_cover for size in maps.frames))
+        change_window(display, window, 7)
+        receive_frames_until(viewer, lambda picture: picture[0, 0] == 7 << 16)
+        change_window(display, window, 9, is_covered=True)
+        receive_frames_until(viewer, lambda picture: picture[0, 0] == 9 << 8)
+        assert has_size(viewer.picture, PHONE_SIZE_PX)
 
 
 def test_the_pointer_of_a_controlling_phone_is_at_the_same_point_of_the_map(display, window, teacher, viewer):

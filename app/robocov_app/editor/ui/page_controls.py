@@ -41,6 +41,8 @@ def read_page_controls(
         kind="editor",
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
+        is_covered=editor.dialogs.is_open,
+        map_box=layout.arena,
     )
 
 

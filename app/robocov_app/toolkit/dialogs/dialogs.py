@@ -26,11 +26,14 @@ class Dialogs:
         The dialog that is open.
     ui : Ui or None
         Page with the widgets of the open dialog; None until it is drawn or receives an event.
+    max_width : float or None
+        Maximum width of dialogs at scale 1, px; None for their usual width.
     """
 
     def __init__(self) -> None:
         self.current: Dialog | None = None
         self.ui: Ui | None = None
+        self.max_width: float | None = None
         self._ignored_letter = ""
         self._is_drawn = False
 
@@ -38,6 +41,13 @@ class Dialogs:
     def is_open(self) -> bool:
         """Whether a dialog is open."""
         return self.current is not None
+
+    @property
+    def box(self) -> Rect | None:
+        """The box of the open dialog, px; None if there is none, or if it has not been drawn."""
+        if self.ui is None or not self.is_open or not self._is_drawn:
+            return None
+        return self.ui.box
 
     @property
     def is_typing(self) -> bool:
@@ -143,6 +153,8 @@ class Dialogs:
         if dialog.has_veil:
             draw_veil(screen, theme)
         width = min(dialog.width * scale, screen.get_width() - _SCREEN_MARGIN_PX * scale)
+        if self.max_width is not None:
+            width = min(width, self.max_width * scale)
         for _ in range(2):  # The height is known only after the content has run.
             ui.box = Rect(0, 0, round(width), min(round(ui.y * scale), screen.get_height()))
             dialog.place(ui.box, screen.get_rect(), scale)

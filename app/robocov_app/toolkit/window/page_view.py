@@ -24,6 +24,8 @@ class PageAppearance:
         Whether the buttons of the bar and of the rail are left to the page of a phone.
     is_motion_reduced : bool
         Whether the user's system asks for reduced motion.
+    max_dialog_width : float or None
+        Maximum width of dialogs at scale 1, px, so that a phone can show them; None for their usual width.
     """
 
     scale: float
@@ -31,6 +33,7 @@ class PageAppearance:
     shows_panel: bool | None
     is_compact: bool
     is_motion_reduced: bool
+    max_dialog_width: float | None = None
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,10 @@ class WindowControls:
         Whether a drawing of the editor is unfinished.
     can_delete : bool
         Whether something is selected in the editor.
+    is_covered : bool
+        Whether a dialog, a menu or the help page covers the map.
+    map_box : Box or None
+        Part of the window that shows the map and no controls.
     """
 
     theme: str
@@ -77,12 +84,18 @@ class WindowControls:
     kind: str = "viewer"
     is_drawing: bool = False
     can_delete: bool = False
+    is_covered: bool = False
+    map_box: Box | None = None
 
 
 class MapDrawing(Protocol):
     """Draws the map of a window without its controls, for small screens."""
 
-    def draw(self, size: tuple[int, int], scale: float) -> Surface | None:
+    @property
+    def is_covered(self) -> bool:
+        """Whether a dialog, a menu or the help page covers the map in the window."""
+
+    def draw(self, size: tuple[int, int], scale: float) -> Surface:
         """Draw the map.
 
         Parameters
@@ -93,19 +106,30 @@ class MapDrawing(Protocol):
 
         Returns
         -------
-        pygame.Surface or None
-            None if the window itself must be seen now, because it shows a dialog, for example.
+        pygame.Surface
         """
 
-    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return the pixel of the window that shows the same point of the map.
+    def draw_cover(self, size: tuple[int, int], scale: float) -> Surface:
+        """Draw what covers the map, for the user who controls the window on a small screen.
 
         Parameters
         ----------
         size : (width, height), px
-            Size of a picture that `draw` has returned.
+        scale : float
+            Size of texts and symbols.
+
+        Returns
+        -------
+        pygame.Surface
+        """
+
+    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the window that shows the same as a pixel of the newest picture of a size.
+
+        Parameters
+        ----------
+        size : (width, height), px
         pixel : (x, y)
-            Pixel of that picture.
 
         Returns
         -------

@@ -67,6 +67,10 @@ class LayerBar(BasicFocusGroup):
         Chips of the bar that were drawn last, with their boxes.
     rows : list of (Chip, Rect)
         Presets and layers of the open menu, with their boxes.
+    menu_box : Rect
+        Box of the menu when it was drawn last, px.
+    max_menu_width : float or None
+        Maximum width of the menu at scale 1, px; None if it may be as wide as the arena.
     """
 
     def __init__(self, view: ViewState, commands: CommandTable, run_command: Callable[[str], object]) -> None:
@@ -77,7 +81,8 @@ class LayerBar(BasicFocusGroup):
         self._view = view
         self._commands = commands
         self._run_command = run_command
-        self._menu_box = Rect(0, 0, 0, 0)
+        self.menu_box = Rect(0, 0, 0, 0)
+        self.max_menu_width: float | None = None
         self._hovered = ""
         self._offered: set[str] = set()  # layers with a chip: visible now, or hidden one by one
         self._visible: set[str] = set()  # layers that were visible when the bar was drawn last
@@ -130,12 +135,12 @@ class LayerBar(BasicFocusGroup):
 
     def is_over(self, pixel: Pixel) -> bool:
         """Return whether a pixel is on a chip or on the open menu."""
-        is_on_menu = self.is_open and self._menu_box.collidepoint(pixel)
+        is_on_menu = self.is_open and self.menu_box.collidepoint(pixel)
         return is_on_menu or self._find_chip(pixel) is not None
 
     def _find_chip(self, pixel: Pixel) -> Chip | None:
         rows = self.rows if self.is_open else []
-        if self.is_open and self._menu_box.collidepoint(pixel):
+        if self.is_open and self.menu_box.collidepoint(pixel):
             chips = rows
         else:
             chips = self.chips
@@ -247,6 +252,8 @@ class LayerBar(BasicFocusGroup):
         by_name = {layer.name: layer for layer in layers}
         scale = canvas.scale
         left, top, width, _ = arena
+        if self.max_menu_width is not None:
+            width = min(width, round(self.max_menu_width * scale))
         padding = round(_MENU_PADDING_PX * scale)
         menu_width = width - 2 * padding - 2 * round(_MARGIN_PX * scale)
         max_columns = max(int(menu_width / (_MIN_MENU_COLUMN_PX * scale)), 1)
@@ -264,7 +271,7 @@ class LayerBar(BasicFocusGroup):
             len(columns) * column_width + 2 * padding,
             round(chip_row + max(heights) * scale) + 2 * padding,
         )
-        self._menu_box = box
+        self.menu_box = box
         draw_card(canvas.surface, box, canvas.theme, scale)
         self._draw_presets(canvas, box.left + padding, box.top + padding)
         for index, column in enumerate(columns):

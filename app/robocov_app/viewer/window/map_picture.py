@@ -1,4 +1,4 @@
-"""The window without its buttons, drawn in the size of the screen of somebody who watches."""
+"""The window without its buttons, drawn in the size of the screen of a phone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import pygame
 
 from robocov_app.look.theme import get_theme
+from robocov_app.toolkit.window.cover_picture import CoverPicture
 from robocov_app.toolkit.window.layout import build_layout, is_inside
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
@@ -153,7 +154,7 @@ class MapPicture:
 
 
 class MapPictures:
-    """Pictures of a window without its buttons in several sizes, for those who watch.
+    """Pictures of a window without its buttons in several sizes, for phones.
 
     Parameters
     ----------
@@ -161,20 +162,33 @@ class MapPictures:
         The viewer.
     sources : PictureSources
         Parts of the window that the pictures show.
-    is_covered : callable
-        Returns whether something else is shown in front of the map.
+    screen : callable
+        Returns the surface of the window.
+    find_cover : callable
+        Returns the box of the window that covers the map, such as that of a dialog; None if nothing does.
     """
 
-    def __init__(self, viewer: Presenter, sources: PictureSources, is_covered: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        viewer: Presenter,
+        sources: PictureSources,
+        screen: Callable[[], pygame.Surface],
+        find_cover: Callable[[], pygame.Rect | None],
+    ) -> None:
         self._viewer = viewer
         self._sources = sources
-        self._is_covered = is_covered
+        self._screen = screen
+        self._find_cover = find_cover
         self._pictures: dict[tuple[int, int], MapPicture] = {}
+        self._cover = CoverPicture()
 
-    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface | None:
-        """Draw the panes without the buttons; None while a page or a dialog is open. See `MapDrawing`."""
-        if self._is_covered():
-            return None
+    @property
+    def is_covered(self) -> bool:
+        """Whether a dialog, a menu or the help page covers the map. See `MapDrawing`."""
+        return self._find_cover() is not None
+
+    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface:
+        """Draw the panes without the buttons. See `MapDrawing`."""
         picture = self._pictures.get(size)
         if picture is None:
             if len(self._pictures) >= MAX_MAP_PICTURES:
@@ -183,9 +197,18 @@ class MapPictures:
             self._pictures[size] = picture
         return picture.draw(size, scale)
 
+    def draw_cover(self, size: tuple[int, int], scale: float) -> pygame.Surface:
+        """Draw the dialog, the menu or the help page that covers the map. See `MapDrawing`."""
+        canvas = self._sources.canvas
+        screen = self._screen()
+        box = self._find_cover() or screen.get_rect()
+        return self._cover.draw(screen, box, size, scale / canvas.layout.scale, canvas.theme)
+
     def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
         """Return the pixel of the window that shows the same as a pixel of the picture. See `MapDrawing`."""
+        if self.is_covered:
+            return self._cover.find_window_pixel(size, pixel)
         picture = self._pictures.get(size)
-        if picture is None or self._is_covered():
+        if picture is None:
             return pixel
         return picture.find_window_pixel(pixel)

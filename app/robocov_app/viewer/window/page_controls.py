@@ -6,7 +6,7 @@ from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.toolkit.window.page_view import WindowControls
 from robocov_app.toolkit.window_part import WindowPart
-from robocov_app.viewer.canvas.layer_bar import LayerBar
+from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX, LayerBar
 from robocov_app.viewer.lessons.guide import LessonGuide
 from robocov_app.viewer.presenter import Presenter
 
@@ -56,6 +56,7 @@ class PageControls:
             has_panel=viewer.view.has_panel,
             is_typing=self._dialogs.is_typing or any(part.is_typing for part in self._parts),
             scroll_box=self._find_scroll_box(size, layout),
+            map_box=_find_map_box(layout),
         )
 
     def _describe_lesson(self) -> str:
@@ -70,3 +71,10 @@ class PageControls:
         if layout.has_panel:
             return layout.panel
         return None
+
+
+def _find_map_box(layout: Layout) -> Box:
+    """Return the part of the arena below the chips of the layers."""
+    left, top, width, height = layout.arena
+    chips_height = min(round(BAR_HEIGHT_PX * layout.scale), height)
+    return Box(left, top + chips_height, width, height - chips_height)

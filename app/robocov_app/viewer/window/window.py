@@ -1,6 +1,7 @@
 """The viewer's window, which handles events, advances time and draws frames."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pygame
@@ -158,7 +159,7 @@ class ViewerWindow(CommandWindow):
         self._runner = SessionRunner(viewer)
         self._status = StatusDisplay(viewer, self.lesson, self.hint, can_suggest=not is_unattended)
         sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
-        self.map_pictures = MapPictures(viewer, sources, lambda: self.is_help_open or self.dialogs.is_open)
+        self.map_pictures = MapPictures(viewer, sources, lambda: self.screen, self._find_cover)
         self._inspector = RobotInspector(viewer, self.panel)
         self._page_controls = PageControls(viewer, self.lesson, self.layer_bar, self.dialogs, self.parts)
         self._arrangement = Arrangement(viewer, self.lesson, self.canvas, self.chart, self.parts)
@@ -253,12 +254,23 @@ class ViewerWindow(CommandWindow):
             view.has_panel = appearance.shows_panel
         view.is_compact = appearance.is_compact
         view.is_motion_reduced = appearance.is_motion_reduced
+        self.dialogs.max_width = appearance.max_dialog_width
+        self.layer_bar.max_menu_width = appearance.max_dialog_width
         self.viewer.revision += 1
 
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        return self._page_controls.read(self.screen.get_size(), self.layout)
+        controls = self._page_controls.read(self.screen.get_size(), self.layout)
+        return replace(controls, is_covered=self.map_pictures.is_covered)
+
+    def _find_cover(self) -> pygame.Rect | None:
+        """Return the box of the dialog, menu or help page that covers the map; None if nothing does."""
+        if self.dialogs.is_open:
+            return self.dialogs.box or self.screen.get_rect()
+        if self.is_help_open:
+            return self.screen.get_rect()
+        return self.layer_bar.menu_box if self.layer_bar.is_open else None
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window, or leave the lesson in its place."""
