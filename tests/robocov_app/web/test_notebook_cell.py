@@ -1,4 +1,4 @@
-"""`robocov.show` in a notebook's cell that is executed for real, and in a browser that shows the cell."""
+"""Windows in the cells of notebooks: executed cells, and cells in a browser."""
 
 import functools
 import http.server
@@ -24,15 +24,23 @@ pytestmark = [
 ]
 
 
+SHOW_WINDOW = """\
+import robocov as rc
+rooms = rc.load_map('rooms')
+window = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0)).show()
+window"""
+FETCH_WINDOW = """\
+import urllib.request
+print(urllib.request.urlopen(window.link).status)
+window.close()"""
+
+
 def test_a_cell_shows_the_window(tmp_path, monkeypatch):
     import nbformat
     from nbclient import NotebookClient
 
     monkeypatch.chdir(tmp_path)
-    code = "import robocov as rc\nrooms = rc.load_map('rooms')\nwindow = "
-    code += "rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0)).show()\nwindow"
-    fetch = "import urllib.request\nprint(urllib.request.urlopen(window.link).status)\nwindow.close()"
-    cells = [nbformat.v4.new_code_cell(each) for each in (code, fetch)]
+    cells = [nbformat.v4.new_code_cell(code) for code in (SHOW_WINDOW, FETCH_WINDOW)]
     notebook = nbformat.v4.new_notebook(cells=cells)
     NotebookClient(notebook, timeout=120).execute()
     frame = notebook.cells[0].outputs[-1]["data"]["text/html"]
@@ -41,7 +49,7 @@ def test_a_cell_shows_the_window(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and its driver")
-def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
+def test_the_cell_works_in_a_page_of_another_site(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     window = robocov.show(robocov.load_map("trap"), robots=3)
     (tmp_path / "cell.html").write_text(window._repr_html_())
@@ -54,9 +62,9 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
         browser.driver.get(f"http://localhost:{site.server_address[1]}/cell.html")
         browser.driver.switch_to.frame(0)
         browser.wait_until(lambda: browser.run_script("return canvas.width") > 500)
-        pictures = "const seen = canvas.toDataURL(); return seen"
-        before = browser.run_script(pictures)
-        browser.wait_until(lambda: browser.run_script(pictures) != before)
+        read_picture = "return canvas.toDataURL()"
+        first_picture = browser.run_script(read_picture)
+        browser.wait_until(lambda: browser.run_script(read_picture) != first_picture)
     finally:
         browser.driver.quit()
         site.shutdown()
@@ -64,35 +72,42 @@ def test_the_cell_is_live_also_in_a_page_of_another_site(tmp_path, monkeypatch):
         window.close()
 
 
-def test_a_simulation_goes_on_in_the_window(monkeypatch):
-    def open_called_session(call, height):
-        return Session.open(load_session(Path(call[1]))).timeline.panes[0].simulation
+def test_the_window_continues_a_simulation(monkeypatch):
+    def load_shown_simulation(arguments, height):
+        session_file = Path(arguments[1])
+        return Session.open(load_session(session_file)).timeline.panes[0].simulation
 
-    monkeypatch.setattr("robocov_app.notebook.LiveWindow", open_called_session)
+    monkeypatch.setattr("robocov_app.notebook.LiveWindow", load_shown_simulation)
     rooms = robocov.load_map("rooms")
     simulation = robocov.Simulation(rooms, robocov.Rapf(k_rep=0.4), rooms.start().sample(3, seed=1))
     simulation.run(1.0)
-    found = simulation.show()
-    assert np.array_equal(found.positions, simulation.positions)
-    assert np.array_equal(found.velocities, simulation.velocities)
-    assert found.controller.k_rep == 0.4
+    shown = simulation.show()
+    assert np.array_equal(shown.positions, simulation.positions)
+    assert np.array_equal(shown.velocities, simulation.velocities)
+    assert shown.controller.k_rep == 0.4
+
+
+def test_without_the_web_extra_a_replay_continues_a_simulation(monkeypatch):
     monkeypatch.setattr("robocov_app.notebook.find_spec", lambda _: None)
+    rooms = robocov.load_map("rooms")
+    simulation = robocov.Simulation(rooms, robocov.Rapf(), rooms.start().sample(3, seed=1))
+    simulation.run(1.0)
     assert simulation.show().time[-1] == pytest.approx(61.0)
 
 
-def test_what_is_wrong_is_told(tmp_path, monkeypatch):
+def test_an_unknown_map_is_rejected(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(robocov.RobocovError, match="nowhere"):
         robocov.show("nowhere")
 
 
-def test_without_the_extra_it_is_a_replay(monkeypatch):
+def test_without_the_web_extra_a_map_is_shown_as_a_replay(monkeypatch):
     monkeypatch.setattr("robocov_app.notebook.find_spec", lambda _: None)
     record = show("square", robots=2)
     assert record.time[-1] == pytest.approx(60.0)
 
 
-def test_behind_a_hub_the_cell_asks_the_hub(monkeypatch):
+def test_the_link_in_a_cell_leads_through_a_jupyter_hub(monkeypatch):
     window = notebook_window.LiveWindow.__new__(notebook_window.LiveWindow)
     window.link = "http://127.0.0.1:4567/?token=abc"
     window.height = 500
