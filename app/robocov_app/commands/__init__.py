@@ -45,7 +45,7 @@ COMMANDS = {
         "paper", "reproduce the paper's figures, and test its claims on many maps", uses_kernels=True
     ),
     "edit": Subcommand("edit", "draw, check and try maps in the editor"),
-    "check": Subcommand("maps.check", "validate maps: area, free area, components, narrowest gap"),
+    "check": Subcommand("maps.check", "validate maps: free area, components, unreachable area, gaps"),
     "maps": Subcommand("maps.bundled", "list the bundled maps"),
     "generate": Subcommand("maps.generate", "generate random maps: obstacles, towns, rooms, mazes, caves"),
     "controllers": Subcommand("controllers", "list the controllers and their gains"),

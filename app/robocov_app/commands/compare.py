@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
@@ -12,19 +12,6 @@ from robocov_app.commands.options import RunOptions
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED
 from robocov_app.terminal.output import BOLD, RIGHT, list_files, print_answer, print_table
-
-_COLUMNS = {
-    "": "{label}",
-    "mean distance": "{mean_distance_m:.3f} m",
-    "mean time": "{mean_time_s:.3f} s",
-    "above lowest": "{above_best:.1%}",
-    "cost": "{cost_m3:.2f} m³",
-    "settled": "{settled}",
-    "contacts": "{contacts}",
-    "clearance": "{min_clearance_m:z.3f} m",
-    "path length": "{mean_path_length_m:.2f} m",
-}
-"""Titles of the table's columns, with the formats of their cells; the column of names has no title."""
 
 
 @dataclass
@@ -47,6 +34,7 @@ class Arguments(RunOptions):
 def command(options: Arguments) -> int:
     """Run `robocov compare`, and return its exit status."""
     from robocov.mapfile import load_map
+    from robocov.scenario import format_comparison
     from robocov_app.commands.gain_options import select_gains
     from robocov_app.render.density_text import list_density_lines
     from robocov_app.runs.artifacts import build_comparison_rows, execute_comparison
@@ -66,7 +54,8 @@ def command(options: Arguments) -> int:
     runs, is_interrupted = execute_comparison(scenarios, out, settings)
     rows = build_comparison_rows(runs)
     if not options.json:
-        _print_rows(rows)
+        titles, cells = format_comparison([row["label"] for row in rows], rows)
+        print_table([(title, RIGHT if title else BOLD) for title in titles], cells)
     notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
     ending = "saved in"
     if is_interrupted:
@@ -83,17 +72,3 @@ def _check_names(names: Sequence[str]) -> None:
         raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
         raise ParameterError(f"--controllers: {' '.join(names)}: duplicate value")
-
-
-def _print_rows(rows: Sequence[dict[str, Any]]) -> None:
-    """Print the table of a comparison, with the mean time only if all runs have one."""
-    columns = dict(_COLUMNS)
-    if not all("mean_time_s" in row for row in rows):
-        del columns["mean time"]
-    cells = []
-    for row in rows:
-        settled = "not yet"
-        if row["settled_at_s"] is not None:
-            settled = f"{row['settled_at_s']:.1f} s"
-        cells.append([cell_format.format(**row, settled=settled) for cell_format in columns.values()])
-    print_table([(title, RIGHT if title else BOLD) for title in columns], cells)

@@ -19,6 +19,7 @@ from robocov.environment import (
     PolygonObstacle,
     Ring,
     WallObstacle,
+    compute_center_areas,
     compute_swept_area,
     find_narrowest_gap,
     find_overlaps,
@@ -31,6 +32,8 @@ _SECONDS_PER_SQUARED_VERTEX = 6.1e-8
 """Measured time to set up a `robocov.cost.CoverageCost`, divided by the square of the number of vertices."""
 _MAX_EQUAL_DISTANCE_M = 1e-6
 """Distance below which two vertices are probably meant to be the same."""
+_EDGES_PER_QUARTER = 32
+"""Edges per quarter circle around corners when the area of the centers of robots is computed."""
 _INTERIORS_INTERSECT = "T********"
 """DE-9IM pattern of two shapes whose interiors have points in common."""
 
@@ -71,6 +74,11 @@ class MapReport:
         Number of obstacles.
     components : tuple of float, m²
         Areas of the connected components of the free space, the largest first.
+    radius : float, m
+        Radius of the robots.
+    unreachable_area : float, m²
+        Free area that no robot can reach from the largest area in which robots can move: sealed rooms, and
+        everything behind gaps that are narrower than a robot.
     narrowest_gap : Gap or None
         Narrowest passage of the free space; see `robocov.environment.find_narrowest_gap`.
     starts : tuple of StartReport
@@ -95,6 +103,8 @@ class MapReport:
     vertex_count: int
     obstacle_count: int
     components: tuple[float, ...]
+    radius: float
+    unreachable_area: float
     narrowest_gap: Gap | None
     starts: tuple[StartReport, ...]
     warnings: tuple[str, ...]
@@ -124,6 +134,8 @@ class MapReport:
             "vertices": self.vertex_count,
             "obstacles": self.obstacle_count,
             "components_m2": list(self.components),
+            "radius_m": self.radius,
+            "unreachable_area_m2": self.unreachable_area,
             "narrowest_gap_m": None if gap is None else gap.width,
             "narrowest_gap_between": None if gap is None else [list(point) for point in gap.between],
             "starts": {start.name: {"kind": start.kind, "capacity": start.capacity} for start in self.starts},
@@ -168,6 +180,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         vertex_count=count_vertices(environment),
         obstacle_count=len(environment.obstacles),
         components=tuple(float(component.area) for component in environment.free.geoms),
+        radius=radius,
+        unreachable_area=compute_unreachable_area(environment, radius),
         narrowest_gap=gap,
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(_find_warnings(environment, gap, radius)),
@@ -175,6 +189,31 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         density_range=None if density is None else (density.min_value, _find_maximum(density)),
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
     )
+
+
+def compute_unreachable_area(environment: Environment, radius: float) -> float:
+    """Compute the free area that no robot can reach from the largest area in which robots can move.
+
+    Parameters
+    ----------
+    environment : Environment
+        A valid map.
+    radius : float, m
+        Radius of the robots.
+
+    Returns
+    -------
+    float, m²
+        All of the free area if no robot fits anywhere.
+    """
+    closed = environment.close_gaps(radius)
+    components = np.array(closed.free.geoms)
+    center_areas = compute_center_areas(environment.free, closed.free, radius, _EDGES_PER_QUARTER)
+    has_robot = ~shapely.is_empty(center_areas)
+    reachable_areas = shapely.area(components[has_robot])
+    # The thin bars that close gaps take up a few square micrometers.
+    unreachable_area = shapely.area(components).sum() - reachable_areas.max(initial=0.0)
+    return float(unreachable_area)
 
 
 def _build_start_report(environment: Environment, name: str, radius: float) -> StartReport:

@@ -5,7 +5,7 @@
 - `comparison`: several controllers in the same scenario
 """
 
-from robocov.scenario.comparison import Comparison, compare
+from robocov.scenario.comparison import Comparison, compare, format_comparison
 from robocov.scenario.scenario import MAX_RECORD_ROWS, Scenario, run
 
-__all__ = ["MAX_RECORD_ROWS", "Comparison", "Scenario", "compare", "run"]
+__all__ = ["MAX_RECORD_ROWS", "Comparison", "Scenario", "compare", "format_comparison", "run"]

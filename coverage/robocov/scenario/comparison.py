@@ -22,13 +22,17 @@ from robocov.scenario.scenario import Scenario
 DEFAULT_CONTROLLERS = ("rapf", "rpf", "lloyd")
 """The controllers of the paper."""
 _COLUMNS = {
-    "mean_distance_m": "mean distance (m)",
-    "above_best": "above lowest",
-    "settled_at_s": "settled at (s)",
-    "contacts": "contacts",
-    "mean_path_length_m": "path length (m)",
+    "": "{label}",
+    "mean distance": "{mean_distance_m:.3f} m",
+    "mean time": "{mean_time_s:.3f} s",
+    "above lowest": "{above_best:.1%}",
+    "cost": "{cost_m3:.2f} m³",
+    "settled": "{settled}",
+    "contacts": "{contacts}",
+    "clearance": "{min_clearance_m:z.3f} m",
+    "path length": "{mean_path_length_m:.2f} m",
 }
-"""Keys of the columns of the printed table, with their headers."""
+"""Titles of the printed table's columns, with the formats of their cells; the first column has no title."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +76,9 @@ class Comparison(Drawable):
         Returns
         -------
         list of dict
-            One row for each controller. Lengths are in meters and times in seconds, as the keys say.
-            ``above_best`` is the relative difference between the final mean distance and the lowest one.
+            One row for each controller. The units are part of the keys. ``above_best`` is the relative
+            difference between the final mean distance and the lowest one. ``mean_time_s`` is missing if all
+            robots have the same speed.
         """
         lowest = min(summary["mean_distance_m"] for summary in self.summaries.values())
         rows = []
@@ -83,12 +88,15 @@ class Comparison(Drawable):
                 "controller": label,
                 "mean_distance_m": summary["mean_distance_m"],
                 "above_best": summary["mean_distance_m"] / lowest - 1.0,
+                "cost_m3": summary["cost_m3"],
                 "uncovered_area_m2": summary["uncovered_area_m2"],
                 "settled_at_s": summary["settled_at_s"],
                 "contacts": summary["contacts"],
                 "min_clearance_m": summary["min_clearance_m"],
                 "mean_path_length_m": sum(lengths) / len(lengths),
             }
+            if "mean_time_s" in summary:
+                row["mean_time_s"] = summary["mean_time_s"]
             rows.append(row)
         return rows
 
@@ -103,25 +111,48 @@ class Comparison(Drawable):
         return pandas.DataFrame(self.table()).set_index("controller")
 
     def __repr__(self) -> str:
-        rows = [["controller", *_COLUMNS.values()]]
-        for row in self.table():
-            settled = row["settled_at_s"]
-            cells = [
-                row["controller"],
-                f"{row['mean_distance_m']:.3f}",
-                f"{row['above_best']:.1%}",
-                "-" if settled is None else f"{settled:.1f}",
-                str(row["contacts"]),
-                f"{row['mean_path_length_m']:.1f}",
-            ]
-            rows.append(cells)
-        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+        results = self.table()
+        titles, rows = format_comparison([row["controller"] for row in results], results)
+        cells = [titles, *rows]
+        widths = [max(len(cell) for cell in column) for column in zip(*cells, strict=True)]
         lines = []
-        for label, *values in rows:
+        for label, *values in cells:
             aligned = [label.ljust(widths[0])]
             aligned += [value.rjust(width) for value, width in zip(values, widths[1:], strict=True)]
             lines.append("  ".join(aligned))
         return "\n".join(lines)
+
+
+def format_comparison(
+    labels: Sequence[str], results: Sequence[Mapping[str, Any]]
+) -> tuple[list[str], list[list[str]]]:
+    """Format the results of several runs as a table of text.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Label of each run's controller.
+    results : sequence of mapping
+        Results of each run, with the keys of `Comparison.table`.
+
+    Returns
+    -------
+    titles : list of str
+        Titles of the columns. The first one, of the labels, is empty.
+    rows : list of list of str
+        Cells of each run. The mean time is left out unless all runs have one.
+    """
+    columns = dict(_COLUMNS)
+    if not all("mean_time_s" in row for row in results):
+        del columns["mean time"]
+    rows = []
+    for label, row in zip(labels, results, strict=True):
+        settled = "not yet"
+        if row["settled_at_s"] is not None:
+            settled = f"{row['settled_at_s']:.1f} s"
+        values = {**row, "label": label, "settled": settled}
+        rows.append([cell_format.format(**values) for cell_format in columns.values()])
+    return list(columns), rows
 
 
 def compare(

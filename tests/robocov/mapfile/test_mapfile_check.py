@@ -190,3 +190,14 @@ def test_the_range_of_overlapping_peaks_ends_at_their_largest_value():
     single = Gaussians(overlapping.peaks[:1], 0.5)
     report = check_map(Environment("single", ring, density=single))
     assert report.density_range == pytest.approx((0.5, 2.5), abs=1e-5)
+
+
+def test_the_unreachable_area_depends_on_the_radius() -> None:
+    environment = build_room(build_block(4, 0, 1, 2.9), build_block(4, 3.05, 1, 2.95))
+    free_area = environment.free_area
+    assert check_map(environment, radius=0.07).unreachable_area == 0.0
+    report = check_map(environment, radius=0.1)
+    assert len(report.components) == 1
+    assert report.unreachable_area == pytest.approx(4 * 6, abs=0.08)
+    assert check_map(environment, radius=4.0).unreachable_area == pytest.approx(free_area)
+    assert report.to_dict()["unreachable_area_m2"] == report.unreachable_area

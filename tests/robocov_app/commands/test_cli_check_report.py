@@ -27,6 +27,7 @@ def test_a_report_has_every_figure(hall: Environment) -> None:
         "free area": "100 m² (100.0%)",
         "obstacles": "0, with 4 vertices (boundary included)",
         "components": "1 (100 m²)",
+        "unreachable": "none, for robots of radius 0.1 m",
         "narrowest gap": "none",
         "start corner": "disc, space for about 23 robots",
     }
@@ -65,3 +66,10 @@ def test_only_the_largest_components_are_listed(hall: Environment) -> None:
         if line.startswith("  components")
     )
     assert line.endswith("7 (12.5 m², 10 m², 10 m², 10 m², 10 m², ...)")
+
+
+def test_space_behind_a_narrow_gap_is_unreachable(hall: Environment) -> None:
+    wall = WallObstacle(((8.0, 0.1), (8.0, 10.0)), 0.2)
+    rows = read_report(replace(hall, obstacles=(wall,)))
+    assert rows["components"].startswith("1 (")
+    assert rows["unreachable"] == "19.02 m² (19.4% of the free area), for robots of radius 0.1 m"

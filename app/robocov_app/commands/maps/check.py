@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from robocov.errors import InputError, MapError, format_count, format_path
+from robocov.defaults import DEFAULT_RADIUS_M
+from robocov.errors import InputError, MapError, format_count, format_path, require_number
 from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.commands.options import JsonOption
@@ -19,13 +20,18 @@ from robocov_app.terminal.output import create_console, echo, print_answer
 
 _MAX_LISTED_COMPONENTS = 5
 """Maximum number of components whose areas are printed."""
+_MIN_UNREACHABLE_FRACTION = 1e-9
+"""Smaller unreachable areas, as fractions of the free area, are rounding errors."""
+_MIN_RADIUS_M = 1e-3
+_MAX_RADIUS_M = 1e3
+"""Limits of the radius of a robot, as in a team."""
 _INVALID = 2
 """Exit status if a map is not valid."""
 
 
 @dataclass
 class Arguments(JsonOption):
-    """Validate maps, and print area, free area, vertices, components and the narrowest gap of each.
+    """Validate maps, and print area, free area, components, unreachable area and narrowest gap of each.
 
     The exit status is 2 if one of them is not a valid map. Errors are reported with line and column, as in
     mine.json:14:9. Warnings, such as a gap narrower than a robot, do not make a map invalid.
@@ -40,6 +46,11 @@ class Arguments(JsonOption):
     """Paths of map files, or names of bundled maps."""
     watch: bool = False
     """Check again at each save."""
+    radius: float = DEFAULT_RADIUS_M
+    """Radius of a robot, m. Free space behind narrower gaps is unreachable."""
+
+    def __post_init__(self) -> None:
+        require_number("--radius", self.radius, _MIN_RADIUS_M, _MAX_RADIUS_M, "m")
 
 
 def command(options: Arguments) -> int:
@@ -51,7 +62,7 @@ def command(options: Arguments) -> int:
         return 0
     rows = []
     for name in options.files:
-        outcome = _check(name)
+        outcome = _check(name, options.radius)
         rows.append(_build_row(name, outcome))
         if not options.json:
             _print_outcome(name, outcome)
@@ -61,10 +72,10 @@ def command(options: Arguments) -> int:
     return 0
 
 
-def _check(name: str) -> MapReport | InputError:
+def _check(name: str, radius: float) -> MapReport | InputError:
     """Return the report on a valid map, or the error that makes it invalid."""
     try:
-        return check_map(load_map(name))
+        return check_map(load_map(name), radius)
     except InputError as error:
         return error
 
@@ -89,7 +100,7 @@ def _watch(options: Arguments) -> None:
     outcomes: dict[str, MapReport | InputError] = {}
     valid_reports: dict[str, MapReport] = {}
     for changed_paths in watch_files(list(names)):
-        new_outcomes = {names[path]: _check(names[path]) for path in changed_paths}
+        new_outcomes = {names[path]: _check(names[path], options.radius) for path in changed_paths}
         outcomes.update(new_outcomes)
         if options.json:
             for name, outcome in new_outcomes.items():
@@ -236,6 +247,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         "free area": f"{_format_area(report.free_area)} ({report.free_fraction:.1%})",
         "obstacles": f"{report.obstacle_count}, with {report.vertex_count} vertices (boundary included)",
         "components": f"{len(report.components)} ({', '.join(areas)})",
+        "unreachable": _format_unreachable_area(report),
         "narrowest gap": _format_narrowest_gap(report),
     }
     if report.density is not None and report.density_range is not None:
@@ -244,6 +256,15 @@ def _format_rows(report: MapReport) -> dict[str, str]:
     for start in report.starts:
         rows[f"start {start.name}"] = f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"
     return rows
+
+
+def _format_unreachable_area(report: MapReport) -> str:
+    """Return the area that no robot can reach, and the radius of the robots, as text."""
+    fraction = report.unreachable_area / report.free_area
+    if fraction < _MIN_UNREACHABLE_FRACTION:
+        return f"none, for robots of radius {report.radius:g} m"
+    area = _format_area(report.unreachable_area)
+    return f"{area} ({fraction:.1%} of the free area), for robots of radius {report.radius:g} m"
 
 
 def _format_area(area: float) -> str:
