@@ -169,7 +169,8 @@ class Reader:
 
     def _wait_for_answer(self, seconds: float) -> dict[str, Any] | None:
         """Return the next answer, or None if the process ends or takes longer."""
-        assert self._process is not None and self._process.stdout is not None
+        assert self._process is not None
+        assert self._process.stdout is not None
         stream = self._process.stdout.fileno()
         deadline = time.monotonic() + seconds
         while b"\n" not in self._pending:

@@ -11,9 +11,9 @@ SHORT = ("--duration", "1.0", "--lattice", "16", "--size", "480x320")
 COMMAND = (sys.executable, "-m", "robocov_app")
 
 
-def read_complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int = 2) -> str:
+def read_error(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 2) -> str:
     """Call the command with an error, and return its error message, which has to be one line."""
-    assert main(list(words)) == status
+    assert main(list(arguments)) == status
     output = capsys.readouterr()
     assert output.out == ""
     lines = output.err.strip().splitlines()
@@ -22,8 +22,14 @@ def read_complaint(capsys: pytest.CaptureFixture[str], *words: str, status: int 
     return lines[0].removeprefix("robocov: error: ")
 
 
-def answer(capsys: pytest.CaptureFixture[str], *words: str) -> dict:
-    assert main([*words, "--json"]) == 0
+def read_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    """Call the command with ``--json``, and return its parsed output."""
+    assert main([*arguments, "--json"]) == 0
     output = capsys.readouterr()
     assert output.err == ""
     return json.loads(output.out)
+
+
+# Former names
+read_complaint = read_error
+answer = read_json

@@ -250,5 +250,6 @@ def changes(draw, sketch):
     try:
         return draw(st.sampled_from(edits))()
     except MapError as error:
-        assert "\n" not in str(error) and str(error)
+        assert "\n" not in str(error)
+        assert str(error)
         return None

@@ -199,7 +199,8 @@ class Page(HTMLParser):
         self.elements.append((tag, dict(attributes)))
 
     def handle_endtag(self, tag: str) -> None:
-        assert self.open and self.open[-1] == tag, (tag, self.open)
+        assert self.open, tag
+        assert self.open[-1] == tag, (tag, self.open)
         self.open.pop()
 
     def handle_data(self, data: str) -> None:

@@ -1,10 +1,12 @@
+import contextlib
+import io
 import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, read_complaint
+from called import SHORT, read_error, read_json
 from drawn_run import ROOMS, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +17,7 @@ from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.cli import COMMANDS, main
 
 
-def test_overview_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_overview_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
     for name, command in COMMANDS.items():
@@ -24,24 +26,24 @@ def test_overview_names_every_command(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_explains_itself_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_of_every_command_has_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([name, "-h"]) == 0
     out = capsys.readouterr().out
     assert f"usage: robocov {name}" in out
     assert f"Example: robocov {name}" in out
-    assert not re.findall(r"None|\d\.\d{6}", out), "no value that somebody would type"
+    assert not re.findall(r"None|\d\.\d{6}", out), "defaults are values that a user could type"
     positional = out.partition("positional arguments")[2].partition("╰")[0]
-    needed = re.findall(r"^│ \w[^│]*│(?:\n│  [^│]*│)*", positional, re.M)
-    assert not any("(default:" in each for each in needed), "what may be left out stands in brackets"
+    required = re.findall(r"^│ \w[^│]*│(?:\n│  [^│]*│)*", positional, re.M)
+    assert not any("(default:" in argument for argument in required), "optional arguments are in brackets"
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"robocov {robocov.__version__}\n"
 
 
 def test_maps_lists_every_bundled_map(capsys: pytest.CaptureFixture[str]) -> None:
-    rows = answer(capsys, "maps")["maps"]
+    rows = read_json(capsys, "maps")["maps"]
     assert [row["name"] for row in rows] == list(list_bundled_maps())
     for row in rows:
         assert row["starts"] == list(load_map(row["name"]).starts)
@@ -50,16 +52,17 @@ def test_maps_lists_every_bundled_map(capsys: pytest.CaptureFixture[str]) -> Non
     assert all(name in out for name in list_bundled_maps())
 
 
-def test_controllers_lists_gains_with_units_and_recommends_some(
+def test_controllers_lists_gains_with_units_and_recommendations(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    rows = {row["name"]: row for row in answer(capsys, "controllers")["controllers"]}
+    rows = {row["name"]: row for row in read_json(capsys, "controllers")["controllers"]}
     assert [name for name, row in rows.items() if row["flagship"]] == ["rapf"]
     assert [name for name, row in rows.items() if row["recommended"]] == ["atlas", "atlas-shared"]
-    for name, kind in CONTROLLERS.items():
-        assert [gain["name"] for gain in rows[name]["gains"]] == list(get_gains(kind))
+    for name, controller in CONTROLLERS.items():
+        assert [gain["name"] for gain in rows[name]["gains"]] == list(get_gains(controller))
     assert rows["rapf"]["gains"][0]["unit"] == "N m³"
-    assert (rows["rapf"]["information"], rows["geodesic-lloyd"]["information"]) == ("own", "whole map")
+    assert rows["rapf"]["information"] == "own"
+    assert rows["geodesic-lloyd"]["information"] == "whole map"
     assert main(["controllers"]) == 0
     out = capsys.readouterr().out
     assert "Geodesic Lloyd   (informed: whole map)" in out
@@ -68,50 +71,50 @@ def test_controllers_lists_gains_with_units_and_recommends_some(
     assert "atlas   Atlas   (recommended)" in out
 
 
-def test_controllers_lists_only_the_given_ones(capsys: pytest.CaptureFixture[str]) -> None:
-    rows = answer(capsys, "controllers", "lloyd", "rapf")["controllers"]
+def test_controllers_lists_the_named_ones_only(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = read_json(capsys, "controllers", "lloyd", "rapf")["controllers"]
     assert [row["name"] for row in rows] == ["lloyd", "rapf"]
     assert main(["controllers", "loyd"]) == 2
     assert "unknown controller 'loyd': did you mean 'lloyd'?" in capsys.readouterr().err
 
 
-def test_schema_is_a_json_schema(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_map_schema_is_a_valid_json_schema(capsys: pytest.CaptureFixture[str]) -> None:
     import jsonschema
 
     assert main(["schema"]) == 0
     jsonschema.Draft202012Validator.check_schema(json.loads(capsys.readouterr().out))
 
 
-def test_check_measures_maps_and_reports_each_bad_one(
+def test_check_measures_maps_and_reports_each_invalid_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    row = answer(capsys, "check", "square")["maps"][0]
+    row = read_json(capsys, "check", "square")["maps"][0]
     assert row["valid"]
     assert row["area_m2"] == row["free_area_m2"] == 100.0
     assert row["components_m2"] == [100.0]
-    bad = tmp_path / "bad.json"
-    bad.write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundary": [[0, 0], [1, 1]]}')
-    assert main(["check", "square", str(bad), "--json"]) == 2
+    invalid = tmp_path / "invalid.json"
+    invalid.write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundary": [[0, 0], [1, 1]]}')
+    assert main(["check", "square", str(invalid), "--json"]) == 2
     rows = json.loads(capsys.readouterr().out)["maps"]
     assert [row["valid"] for row in rows] == [True, False]
-    assert rows[1]["error"].startswith(f"{bad}:1:66: boundary")
+    assert rows[1]["error"].startswith(f"{invalid}:1:66: boundary")
     assert (rows[1]["line"], rows[1]["column"]) == (1, 66)
-    assert main(["check", "square", str(bad)]) == 2
-    said = capsys.readouterr()
-    assert "narrowest gap" in said.out
-    assert f"robocov: error: {bad}:1:66: boundary" in said.err
+    assert main(["check", "square", str(invalid)]) == 2
+    printed = capsys.readouterr()
+    assert "narrowest gap" in printed.out
+    assert f"robocov: error: {invalid}:1:66: boundary" in printed.err
 
 
-def test_cost_of_a_robot_in_the_middle_of_a_square(
+def test_the_cost_of_a_robot_at_the_center_of_a_square_is_exact(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     positions = tmp_path / "robots.json"
     positions.write_text("[[5, 5]]")
     sites = tmp_path / "sites.npz"
-    row = answer(
+    row = read_json(
         capsys, "cost", "square", "--positions", str(positions), "--lattice", "64", "--sites", str(sites)
     )
-    # the mean distance to the center of a unit square is (sqrt 2 + asinh 1) / 6
+    # The mean distance to the center of a unit square is (sqrt 2 + asinh 1) / 6.
     assert row["mean_distance_m"] == pytest.approx(10 * (np.sqrt(2) + np.arcsinh(1)) / 6, rel=1e-3)
     assert row["cost_m3"] == pytest.approx(100 * row["mean_distance_m"])
     with np.load(sites) as saved:
@@ -120,20 +123,20 @@ def test_cost_of_a_robot_in_the_middle_of_a_square(
         assert (saved["owner"] == 0).all()
 
 
-def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_import_replaces_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan = tmp_path / "plan.json"
     plan.write_text(
-        json.dumps({"id": "ours", "verts": [[0, 0], [6, 0], [6, 4], [3, 4], [3, 7], [0, 7], [0, 0]]})
+        json.dumps({"id": "flat", "verts": [[0, 0], [6, 0], [6, 4], [3, 4], [3, 7], [0, 7], [0, 0]]})
     )
     out = tmp_path / "flat.json"
-    row = answer(capsys, "import", str(plan), "-o", str(out))
+    row = read_json(capsys, "import", str(plan), "-o", str(out))
     assert row["area_kept_m2"] == pytest.approx(33.0)
     assert load_map(out).free_area == pytest.approx(33.0)
-    assert "already exists" in read_complaint(capsys, "import", str(plan), "-o", str(out))
+    assert "already exists" in read_error(capsys, "import", str(plan), "-o", str(out))
 
 
 @pytest.mark.parametrize(
-    ("words", "part"),
+    ("command", "message"),
     [
         ("frobnicate", "unknown command 'frobnicate'"),
         ("rum rooms", "did you mean 'run'?"),
@@ -203,16 +206,20 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("import /no/plan.json -o /tmp/x.json", "/no/plan.json"),
     ],
 )
-def test_wrong_input_gets_one_clear_line(
-    words: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_invalid_commands_print_one_line_and_write_nothing(
+    command: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert part in read_complaint(capsys, *words.split())
-    assert list(tmp_path.iterdir()) == [], "nothing may be left behind by what was refused"
+    assert message in read_error(capsys, *command.split())
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
-    ("content", "part"),
+    ("content", "message"),
     [
         (b"{}", "expected a list of [x, y] in meters"),
         (b"[]", "expected a list of [x, y] in meters"),
@@ -227,16 +234,16 @@ def test_wrong_input_gets_one_clear_line(
         (b"[[50, 50]]", "50"),
     ],
 )
-def test_wrong_positions_are_refused(
-    content: bytes, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_invalid_files_of_positions_are_rejected(
+    content: bytes, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "robots.json"
     file.write_bytes(content)
-    assert part in read_complaint(capsys, "cost", "square", "--positions", str(file))
+    assert message in read_error(capsys, "cost", "square", "--positions", str(file))
 
 
 # fmt: off
-_WORD = st.one_of(
+ARGUMENTS = st.one_of(
     st.sampled_from(
         ["rooms", "square", "--", "-", "--robots", "--set", "--seed", "--dt", "--size", "--out", "--json",
             "--lattice", "--start", "k_rep=1", "k_rep=", "=1", "rapf", "nan", "1e400", "-1", "0", "3",
@@ -249,27 +256,25 @@ _WORD = st.one_of(
 
 @settings(max_examples=40)
 @given(
-    command=st.sampled_from(["run", "compare", "check", "cost", "import"]), words=st.lists(_WORD, max_size=6)
+    command=st.sampled_from(["run", "compare", "check", "cost", "import"]),
+    arguments=st.lists(ARGUMENTS, max_size=6),
 )
-def test_any_words_end_in_an_answer_or_one_line(
-    command: str, words: list[str], tmp_path_factory: pytest.TempPathFactory
+def test_random_arguments_give_a_result_or_one_line(
+    command: str, arguments: list[str], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """What cannot be parsed is refused; what can is stopped by a folder that is in use."""
-    import contextlib
-    import io
-
-    if {"-h", "--help"} & set(words):
+    """Commands whose arguments are valid stop because their output folder is in use."""
+    if {"-h", "--help"} & set(arguments):
         return
-    taken = tmp_path_factory.getbasetemp() / "taken"
-    taken.mkdir(exist_ok=True)
-    (taken / "full").touch()
-    last = {"run": ["--out", str(taken)], "compare": ["--out", str(taken)], "import": ["-o", str(taken)]}.get(
-        command, []
-    )
+    used_folder = tmp_path_factory.getbasetemp() / "used"
+    used_folder.mkdir(exist_ok=True)
+    (used_folder / "file").touch()
+    output_options = {"run": ["--out"], "compare": ["--out"], "import": ["-o"]}
+    if command in output_options:
+        arguments = [*arguments, *output_options[command], str(used_folder)]
     out = io.StringIO()
     err = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        status = main([command, *words, *last])
+        status = main([command, *arguments])
     assert status in (0, 2), err.getvalue()
     if status == 2 and command != "check":
         assert out.getvalue() == ""
@@ -277,18 +282,18 @@ def test_any_words_end_in_an_answer_or_one_line(
         assert err.getvalue().startswith("robocov: error: ")
 
 
-def test_an_out_that_cannot_be_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_output_folder_in_a_file_is_rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("")
-    line = read_complaint(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
-    assert line.startswith(f"{file / 'x'}: cannot be written: Not a directory")
+    message = read_error(capsys, "run", "square", *SHORT, "--out", str(file / "x"))
+    assert message.startswith(f"{file / 'x'}: cannot be written: Not a directory")
 
 
 LONG = "x" * 300
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("command", "message"),
     [
         (f"report run --out {LONG}", f"{LONG}: cannot be "),
         (f"report {LONG}", f"{LONG}: "),
@@ -310,12 +315,13 @@ LONG = "x" * 300
     ],
     ids=range(11),
 )
-def test_odd_command_lines_end_in_one_short_line(
-    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_unusual_arguments_print_one_short_line(
+    command: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "run").mkdir()
     record_walk(ROOMS, 2).save(tmp_path / "run")
-    said = read_complaint(capsys, *words.split())
-    assert said.startswith(message) and len(said) < 1100
+    error = read_error(capsys, *command.split())
+    assert error.startswith(message)
+    assert len(error) < 1100

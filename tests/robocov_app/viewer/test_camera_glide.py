@@ -22,7 +22,8 @@ def test_the_point_under_the_pointer_stays_there() -> None:
         assert camera.to_pixels(point) == pytest.approx([100.0, 40.0])
         zooms.append(camera.zoom)
     assert glide.is_over
-    assert zooms == sorted(zooms) and zooms[-1] == end.zoom
+    assert zooms == sorted(zooms)
+    assert zooms[-1] == end.zoom
 
 
 def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:

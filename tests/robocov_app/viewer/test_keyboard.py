@@ -16,7 +16,8 @@ def list_visited(driver: Driver, key: str = "tab") -> list[tuple[int, str]]:
     for _ in range(MAX_STOPS):
         driver.press_key(key)
         group = driver.window.focus.group
-        assert group is not None and group.focus is not None
+        assert group is not None
+        assert group.focus is not None
         number = driver.window._list_focus_groups().index(group)
         if (number, group.focus) in visited:
             break

@@ -1,5 +1,6 @@
-"""A gain that is a word, through all that knows gains: commands, studies, tables, reports, the window."""
+"""Gains with a few named values, in commands, studies, tables, reports and the window."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -50,35 +51,37 @@ def study(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_the_command_line_takes_words_and_the_record_keeps_them(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_uses_and_records_the_chosen_value(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = ["--duration", "0.2", "--lattice", "8", "--set", "target=median", "k_rep=1", "--out", str(out)]
-    assert main(["run", "square", *words]) == 0
+    options = ["--duration", "0.2", "--lattice", "8", "--set", "target=median", "k_rep=1", "--out", str(out)]
+    assert main(["run", "square", *options]) == 0
     run = json.loads((out / "run.json").read_text())
     assert run["controller"]["gains"]["target"] == "median"
     assert Record.load(out).gains["target"] == "median"
-    capsys.readouterr()
+
+
+def test_the_list_of_controllers_contains_the_choices(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["controllers", "--json"]) == 0
-    rapf = next(row for row in json.loads(capsys.readouterr().out)["controllers"] if row["name"] == "rapf")
-    told = next(gain for gain in rapf["gains"] if gain["name"] == "target")
-    assert told["words"] == ["centroid", "sensing", "median"] and told["default"] == "centroid"
-    assert "low" not in told
+    controllers = json.loads(capsys.readouterr().out)["controllers"]
+    rapf = next(controller for controller in controllers if controller["name"] == "rapf")
+    target = next(gain for gain in rapf["gains"] if gain["name"] == "target")
+    assert target["words"] == ["centroid", "sensing", "median"]
+    assert target["default"] == "centroid"
+    assert "low" not in target
     assert main(["controllers"]) == 0
     assert "centroid | sensing | median" in capsys.readouterr().out
 
 
-def test_a_study_takes_lists_of_words(study: Path) -> None:
-    read = read_study(study)
-    tried = [(choice["target"], choice["k_rep"]) for choice in read.get_gains("rapf").choices]
-    assert tried == [("centroid", 0.3), ("centroid", 1.0), ("median", 0.3), ("median", 1.0)]
-    (lloyd,) = read.get_gains("lloyd").choices
+def test_a_study_tries_all_listed_choices(study: Path) -> None:
+    loaded = read_study(study)
+    rapf = [(choice["target"], choice["k_rep"]) for choice in loaded.get_gains("rapf").choices]
+    assert rapf == [("centroid", 0.3), ("centroid", 1.0), ("median", 0.3), ("median", 1.0)]
+    (lloyd,) = loaded.get_gains("lloyd").choices
     assert (lloyd["target"], lloyd["height"]) == ("sensing", 0.5)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("line", "message"),
     [
         (
             'target = ["centroid", "mediam"]',
@@ -96,23 +99,24 @@ def test_a_study_takes_lists_of_words(study: Path) -> None:
         ('target = "null"', r"gains\.rapf\.target: unknown choice 'null'"),
     ],
 )
-def test_a_study_with_a_wrong_word_is_told_where(study: Path, wrong: str, message: str) -> None:
-    study.write_text(STUDY.replace('target = ["centroid", "median"]', wrong))
+def test_an_invalid_choice_in_a_study_is_located(study: Path, line: str, message: str) -> None:
+    study.write_text(STUDY.replace('target = ["centroid", "median"]', line))
     with pytest.raises(InputError, match=message):
         read_study(study)
 
 
-def test_words_go_with_samples_of_ranges() -> None:
+def test_each_choice_is_combined_with_all_samples_of_ranges() -> None:
     from robocov.controllers import Rapf
 
-    wanted = {"target": ["centroid", "median"], "k_rep": Range(0.1, 1.0)}
-    gains = build_gains(Rapf, wanted, Sampling(samples=4))
+    values = {"target": ["centroid", "median"], "k_rep": Range(0.1, 1.0)}
+    gains = build_gains(Rapf, values, Sampling(samples=4))
     assert [choice["target"] for choice in gains.choices] == ["centroid"] * 4 + ["median"] * 4
 
 
 @pytest.fixture(scope="module")
 def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("words") / "out"
+    """Sweep two values of a choice; return the folder of the results."""
+    folder = tmp_path_factory.mktemp("choices") / "out"
     gains = {"rapf": {"target": ["centroid", "median"]}}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
@@ -121,56 +125,58 @@ def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_tables_hold_words(swept_folder: Path, tmp_path: Path) -> None:
+def test_tables_of_results_contain_the_choices(swept_folder: Path, tmp_path: Path) -> None:
     rows = list(read_results(swept_folder).rows())
     assert {row["target"] for row in rows} == {"centroid", "median", None}
     assert {type(row["k_rep"]) for row in rows} == {float}
-    # a table without its study does not say what its columns hold
+    # A table without its study has no types of columns.
     (tmp_path / "results.csv").write_bytes((swept_folder / "results.csv").read_bytes())
     assert list(read_results(tmp_path).rows()) == rows
 
 
-def test_a_report_tells_words(swept_folder: Path) -> None:
+def test_a_report_compares_the_choices(swept_folder: Path) -> None:
     result = load_result(swept_folder)
     assert find_varying_gains(result) == {"target": ["rapf"]}
     plots = build_parameter_plots(result, "k")
     assert [plot.title for plot in plots] == ["target"]
-    assert "medians at centroid:" in plots[0].svg and "median:" in plots[0].svg
-    assert (
-        format_gains([("target", "median"), ("height", 0.5)], {"height": "m"})
-        == "target median, height 0.5 m"
-    )
+    assert "medians at centroid:" in plots[0].svg
+    assert "median:" in plots[0].svg
 
 
-def test_values_of_words_are_told_where_they_are_many() -> None:
-    runs = [
-        build_run(gains=(("target", word), ("k", 0.1 * k)))
-        for k in range(1, 8)
-        for word in ("centroid", "median")
-    ]
+def test_choices_are_formatted_without_a_unit() -> None:
+    gains = [("target", "median"), ("height", 0.5)]
+    assert format_gains(gains, {"height": "m"}) == "target median, height 0.5 m"
+
+
+def test_the_table_of_controllers_lists_choices_and_ranges() -> None:
+    gains = itertools.product(("centroid", "median"), 0.1 * np.arange(1, 8))
+    runs = [build_run(gains=(("target", target), ("k", k))) for target, k in gains]
     result = build_result(runs)
     (row,) = build_controllers_table(result).rows
     assert row[2] == "target centroid or median, k 0.1 to 0.7"
 
 
-def test_words_have_even_places_and_no_line_between_them() -> None:
-    places = np.repeat([0.0, 1.0, 2.0], 4)
-    values = np.arange(12.0)
-    words = ("centroid", "sensing", "median")
-    row = GainResults("RAPF", choose_controller_styles(["rapf"])["rapf"], places, values)
-    axes = plot_gains([row], "target", (420, 290), "cost", words).axes[0]
-    assert [tick.get_text() for tick in axes.get_xticklabels()] == list(words)
+def test_a_plot_of_choices_has_named_ticks_and_no_lines_between_medians() -> None:
+    indices = np.repeat([0.0, 1.0, 2.0], 4)
+    costs = np.arange(12.0)
+    choices = ("centroid", "sensing", "median")
+    results = GainResults("RAPF", choose_controller_styles(["rapf"])["rapf"], indices, costs)
+    axes = plot_gains([results], "target", (420, 290), "cost", choices).axes[0]
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == list(choices)
     _, medians = axes.lines
     assert medians.get_linestyle() == "None"
     assert medians.get_ydata().tolist() == [1.5, 5.5, 9.5]
-    values = np.arange(4.0).reshape(2, 2)
-    gain_grid = GainGrid("target", "k", ["centroid", "median"], [0.3, None], values)
-    grid = plot_gain_grid(gain_grid, (420, 290))
-    assert [tick.get_text() for tick in grid.axes[0].get_xticklabels()] == ["centroid", "median"]
-    assert [tick.get_text() for tick in grid.axes[0].get_yticklabels()] == ["0.3", "none"]
 
 
-def test_laws_of_the_window_say_words() -> None:
+def test_a_grid_of_gains_has_named_ticks() -> None:
+    costs = np.arange(4.0).reshape(2, 2)
+    grid = GainGrid("target", "k", ["centroid", "median"], [0.3, None], costs)
+    axes = plot_gain_grid(grid, (420, 290)).axes[0]
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["centroid", "median"]
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["0.3", "none"]
+
+
+def test_controllers_of_the_window_are_described_with_their_choices() -> None:
     before = ControllerChoice("rapf")
     after = ControllerChoice("rapf", {"target": "median", "attraction_limit": None})
     assert after.describe_changes(before) == "attraction_limit = no limit, target = median"
@@ -179,10 +185,18 @@ def test_laws_of_the_window_say_words() -> None:
         before.with_gain("target", "mediam")
 
 
-def test_in_the_window_words_are_buttons_lists_and_commands(tmp_path: Path) -> None:
+def test_choices_are_made_by_buttons_menus_and_commands(tmp_path: Path) -> None:
     with open_viewer(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
-        get_value = lambda name: driver.session.timeline.panes[0].controller.get_value(name)  # noqa: E731
-        assert get_value("cells") == "distance" and driver.get_widget("button", "cells:distance").value
+
+        def get_value(name: str) -> object:
+            return driver.session.timeline.panes[0].controller.get_value(name)
+
+        def run_command(text: str) -> None:
+            driver.viewer.attempt(lambda: driver.window.commands.run_text(text))
+            driver.settle()
+
+        assert get_value("cells") == "distance"
+        assert driver.get_widget("button", "cells:distance").value
         driver.push_button("cells:time")
         assert get_value("cells") == "time"
         assert driver.session.timeline.events[-1].text.endswith("cells = time")
@@ -190,31 +204,31 @@ def test_in_the_window_words_are_buttons_lists_and_commands(tmp_path: Path) -> N
         assert not driver.get_widget("button", "cells:distance").value
         driver.choose_option("target", "median")
         assert get_value("target") == "median"
-        driver.viewer.attempt(lambda: driver.window.commands.run_text("target sens"))
-        driver.settle()
+        run_command("target sens")
         assert get_value("target") == "sensing"
-        driver.viewer.attempt(lambda: driver.window.commands.run_text("target 3"))
-        assert driver.viewer.has_error_message and "one of centroid, sensing, median" in driver.viewer.message
+        run_command("target 3")
+        assert driver.viewer.has_error_message
+        assert "one of centroid, sensing, median" in driver.viewer.message
         driver.push_button("reset:target")
         assert get_value("target") == "centroid"
 
 
-def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
+def test_choices_that_do_not_fit_side_by_side_are_a_menu(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "from dataclasses import dataclass\n"
         "import robocov as rc\n"
         "@dataclass(frozen=True)\n"
         "class Mine:\n"
-        "    way: str = rc.choice('clockwise', ('clockwise', 'anticlockwise', 'whichever is near'), 'how')\n"
+        "    turn: str = rc.choice('clockwise', ('clockwise', 'anticlockwise', 'whichever is near'), 'how')\n"
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
     with open_viewer(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
-        for word in ("anticlockwise", "whichever is near", "clockwise"):
-            driver.choose_option("way", word)
-            assert driver.session.timeline.panes[0].controller.get_value("way") == word
-            assert driver.get_widget("menu", "way").text == word
+        for choice in ("anticlockwise", "whichever is near", "clockwise"):
+            driver.choose_option("turn", choice)
+            assert driver.session.timeline.panes[0].controller.get_value("turn") == choice
+            assert driver.get_widget("menu", "turn").text == choice
 
 
-def test_a_session_shows_the_value_of_a_gain_with_a_former_spelling() -> None:
+def test_the_former_spelling_of_a_gain_is_read() -> None:
     assert ControllerChoice("poduri", {"neighbours": 5.0}).get_value("neighbors") == 5.0
