@@ -4,7 +4,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 MAX_SHUTDOWN_S = 20.0
@@ -17,15 +17,22 @@ class Link(str):
 
 
 @contextmanager
-def serve_window(command: str, *arguments: str, port: int = 0, **process_options: object) -> Iterator[Link]:
+def serve_window(
+    command: str,
+    *arguments: str,
+    port: int = 0,
+    environment: Mapping[str, str] | None = None,
+    **process_options: object,
+) -> Iterator[Link]:
     """Serve a window until the context ends, and yield its link.
 
-    Port 0 stands for any free port. Further options are passed to `subprocess.Popen`.
+    Port 0 stands for any free port. `environment` adds variables to those of this process. Further options
+    are passed to `subprocess.Popen`.
     """
     process = subprocess.Popen(
         [sys.executable, "-m", "robocov_app", command, *arguments, "--serve", "--port", str(port)],
         stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": ""},
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "ROBOCOV_SETTINGS": "", **(environment or {})},
         text=True,
         **process_options,
     )

@@ -1,8 +1,12 @@
 """What a page shows over the window, such as a request for control, covers none of its controls."""
 
+from types import SimpleNamespace
+
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
 from served_window import serve_window
+
+from robocov_app.toolkit.window.command_window import CommandWindow
 
 pytest.importorskip("websockets")
 
@@ -68,3 +72,12 @@ def test_a_request_for_control_is_shown_over_the_map(browser, tmp_path):
                 is_beside = list_right <= left or right <= list_left
                 assert is_beside or list_bottom <= top or bottom <= list_top, "it does not cover the list"
         assert browser.read_console() == []
+
+
+@pytest.mark.parametrize(("share_link", "has_hint"), [("http://127.0.0.1:1/", False), ("", True)])
+def test_the_hint_of_the_status_line_is_not_where_a_shared_page_shows_the_list(share_link, has_hint):
+    window = CommandWindow.__new__(CommandWindow)
+    window.remote = SimpleNamespace(share_link=share_link)
+    assert window.has_status_hint == has_hint
+    window.remote = None
+    assert window.has_status_hint

@@ -58,6 +58,16 @@ def describe_map(editor: Editor) -> str:
     return "   ·   ".join(facts)
 
 
+def measure_legend_height(editor: Editor, scale: float) -> int:
+    """Return the height of the legend above the map, px.
+
+    Further rows are drawn over the map, so that it does not move when entries come and go.
+    """
+    if "legend" not in editor.shown:
+        return 0
+    return round((LEGEND_MARGIN_PX + legend_strip.ROW_HEIGHT_PX) * scale)
+
+
 class EditorCanvas:
     """Draws the map of an editor, and converts between pixels and positions.
 
@@ -108,10 +118,7 @@ class EditorCanvas:
         """Return the box between legend and status strip: left, top, width, height in the arena, px."""
         _, _, width, height = self.layout.arena
         scale = self.layout.scale
-        legend_height = 0
-        if "legend" in self.editor.shown:
-            # Further rows are drawn over the map, so that it does not move when entries come and go.
-            legend_height = round((LEGEND_MARGIN_PX + legend_strip.ROW_HEIGHT_PX) * scale)
+        legend_height = measure_legend_height(self.editor, scale)
         view_height = max(height - legend_height - round(scale_bar.STRIP_HEIGHT_PX * scale), 1)
         return 0.0, float(legend_height), float(width), float(view_height)
 

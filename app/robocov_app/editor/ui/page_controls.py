@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from robocov_app.editor.canvas.canvas import measure_legend_height
 from robocov_app.editor.editor import Editor
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.toolkit.window.page_view import WindowControls
@@ -42,7 +43,7 @@ def read_page_controls(
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
         is_covered=editor.dialogs.is_open,
-        map_box=layout.arena,
+        map_box=_find_map_box(editor, layout),
     )
 
 
@@ -53,3 +54,10 @@ def _find_scroll_box(editor: Editor, size: tuple[int, int], layout: Layout) -> B
     if layout.has_panel:
         return layout.panel
     return None
+
+
+def _find_map_box(editor: Editor, layout: Layout) -> Box:
+    """Return the part of the arena below the legend."""
+    left, top, width, height = layout.arena
+    legend_height = min(measure_legend_height(editor, layout.scale), height)
+    return Box(left, top + legend_height, width, height - legend_height)

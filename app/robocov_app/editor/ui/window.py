@@ -248,6 +248,7 @@ class EditorWindow(CommandWindow):
         self.scale = appearance.scale
         self.editor.theme = appearance.theme
         self.editor.is_compact = appearance.is_compact
+        self.dialogs.set_appearance(appearance)
         if appearance.shows_panel is not None:
             self.editor.shows_panel = appearance.shows_panel
         self.editor.revision += 1
@@ -316,7 +317,8 @@ class EditorWindow(CommandWindow):
         self.canvas.draw(self.screen)
         if layout.status.height:
             status = list_status(editor, self.frame_rate, self.canvas.team)
-            draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=STATUS_HINT)
+            hint = STATUS_HINT if self.has_status_hint else ""
+            draw_status(self.screen, layout.status, theme, layout.scale, facts=status, hint=hint)
         if layout.has_panel:
             self.panel.draw(self.screen)
         self.sheet_handle.draw(self.screen, layout, theme)

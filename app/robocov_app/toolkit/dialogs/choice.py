@@ -99,8 +99,12 @@ class Choice(Dialog):
         self.highlighted = min(self.highlighted, max(len(options) - 1, 0))
         self._show_options(ui, options)
         ui.row(height=22, below=0)
-        count = f"{len(options)} in all · " if len(options) > VISIBLE_OPTIONS else ""
-        ui.label(count + self.hint, style="unit", align="center")
+        facts: list[str] = []
+        if len(options) > VISIBLE_OPTIONS:
+            facts.append(f"{len(options)} in all")
+        if self.has_key_hints:
+            facts.append(self.hint)
+        ui.label(" · ".join(facts), style="unit", align="center")
 
     def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
         """Show the visible lines of the list, and accept the one that is clicked."""

@@ -23,6 +23,8 @@ class Dialog:
         Whether a click outside the dialog cancels it.
     is_done : bool
         Whether it has been answered and is about to close.
+    has_key_hints : bool
+        Whether it mentions keys, which a phone does not have.
     """
 
     width = 560.0
@@ -30,6 +32,7 @@ class Dialog:
     has_veil = True
     closes_on_outside_click = False
     is_done = False
+    has_key_hints = True
 
     def show_content(self, ui: Ui) -> None:
         """Show the widgets of the dialog, and handle their input; called in every run of the page."""

@@ -10,6 +10,7 @@ from robocov_app.toolkit.dialogs.dialog import Dialog
 from robocov_app.toolkit.overlay import draw_card, draw_veil
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import MOUSE_EVENTS, get_key_name, get_wheel_notches
+from robocov_app.toolkit.window.page_view import PageAppearance
 
 _WINDOW_EVENTS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 """Events that are passed on to the window even while a dialog is open."""
@@ -28,12 +29,15 @@ class Dialogs:
         Page with the widgets of the open dialog; None until it is drawn or receives an event.
     max_width : float or None
         Maximum width of dialogs at scale 1, px; None for their usual width.
+    has_key_hints : bool
+        Whether dialogs mention keys, which a phone does not have.
     """
 
     def __init__(self) -> None:
         self.current: Dialog | None = None
         self.ui: Ui | None = None
         self.max_width: float | None = None
+        self.has_key_hints = True
         self._ignored_letter = ""
         self._is_drawn = False
 
@@ -53,6 +57,13 @@ class Dialogs:
     def is_typing(self) -> bool:
         """Whether typed text goes to a text field of the open dialog."""
         return self.is_open and self.ui is not None and self.ui.edit is not None
+
+    def set_appearance(self, appearance: PageAppearance) -> None:
+        """Adopt the appearance that suits the browser page that shows the window."""
+        self.max_width = appearance.max_dialog_width
+        # On a phone that controls a large window, only the width of dialogs is limited.
+        is_on_phone = appearance.is_compact or self.max_width is not None
+        self.has_key_hints = not is_on_phone
 
     def ask(self, dialog: Dialog) -> None:
         """Open a dialog; it replaces the one that is open, if any."""
@@ -135,6 +146,7 @@ class Dialogs:
             self.ignore_letter(event.unicode)
 
     def _create_ui(self, dialog: Dialog, theme: Theme, scale: float) -> Ui:
+        dialog.has_key_hints = self.has_key_hints
         self.ui = Ui(dialog.show_with_margin, theme, scale)
         self.ui.background = None
         self.ui.box = Rect(0, 0, round(dialog.width * scale), _INITIAL_HEIGHT_PX)

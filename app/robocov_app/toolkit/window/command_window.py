@@ -124,6 +124,11 @@ class CommandWindow(BaseWindow):
         """The status message."""
         return self.model.message
 
+    @property
+    def has_status_hint(self) -> bool:
+        """Whether the status line ends with a hint; a shared page shows who controls the window there."""
+        return self.remote is None or not self.remote.share_link
+
     def hide_folder(self, folder: Path) -> None:
         """Omit a folder from the paths in messages; see `BaseWindow`."""
         self.model.hidden_folder = folder

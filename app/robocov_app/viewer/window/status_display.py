@@ -44,11 +44,11 @@ class StatusDisplay:
         return pending.progress
 
     def draw_status_line(
-        self, screen: pygame.Surface, layout: Layout, theme: Theme, facts: list[str]
+        self, screen: pygame.Surface, layout: Layout, theme: Theme, facts: list[str], *, has_hint: bool
     ) -> None:
-        """Draw the status line with facts, most important first, and the hint."""
-        hint = self._hint
-        if self._lesson.is_waiting:
+        """Draw the status line with facts, most important first, and possibly the hint."""
+        hint = self._hint if has_hint else ""
+        if has_hint and self._lesson.is_waiting:
             hint = _LESSON_HINT
         elif not self._viewer.session.playback.is_playing:
             hint = hint.replace("Space: pause", "Space: play")

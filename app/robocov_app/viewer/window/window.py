@@ -254,7 +254,7 @@ class ViewerWindow(CommandWindow):
             view.has_panel = appearance.shows_panel
         view.is_compact = appearance.is_compact
         view.is_motion_reduced = appearance.is_motion_reduced
-        self.dialogs.max_width = appearance.max_dialog_width
+        self.dialogs.set_appearance(appearance)
         self.layer_bar.max_menu_width = appearance.max_dialog_width
         self.viewer.revision += 1
 
@@ -353,7 +353,8 @@ class ViewerWindow(CommandWindow):
         self.chart_focus.draw(self.screen)
         facts = list_facts(self.viewer, self.frame_rate, self._runner.step_rate, self.video_recorder.duration)
         if layout.status.height:
-            self._status.draw_status_line(self.screen, layout, self.theme, facts)
+            has_hint = self.has_status_hint
+            self._status.draw_status_line(self.screen, layout, self.theme, facts, has_hint=has_hint)
         has_lesson = self.lesson.draw(self.screen, layout, self.theme)
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
