@@ -48,7 +48,7 @@ def browser(tmp_path_factory):
     browser.driver.quit()
 
 
-def test_a_request_for_control_is_shown_over_the_map(browser, tmp_path):
+def test_a_request_for_control_is_shown_over_the_map_and_the_list_covers_no_dialog(browser, tmp_path):
     set_page(browser, 1280, 720, is_touched=False)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         watch_link = link.process.stdout.readline().split()[-1]
@@ -71,6 +71,13 @@ def test_a_request_for_control_is_shown_over_the_map(browser, tmp_path):
                 list_left, list_top, list_right, list_bottom = browser.run_script(FIND_BOX, "#here")
                 is_beside = list_right <= left or right <= list_left
                 assert is_beside or list_bottom <= top or bottom <= list_top, "it does not cover the list"
+            set_page(browser, 390, 844, is_touched=True)
+            browser.driver.refresh()
+            browser.wait_until(lambda: browser.find("#here").is_displayed())
+            browser.run_script("tell({kind: 'command', name: 'palette'})")
+            browser.wait_until(lambda: not browser.find("#here").is_displayed())
+            browser.run_script("tell({kind: 'command', name: 'cancel'})")
+            browser.wait_until(lambda: browser.find("#here").is_displayed())
         assert browser.read_console() == []
 
 
