@@ -72,7 +72,7 @@ def choose_candidates(graph: LatticeGraph, is_usable: BoolArray) -> IntArray:
     """
     candidates, step = _choose_regular_nodes(graph.map_window.window, is_usable)
     max_distance = _MAX_CANDIDATE_DISTANCE_STEPS * step * graph.map_window.spacing
-    distances = graph.search(candidates, np.zeros(len(candidates)))
+    distances = graph.compute_nearest_distances(candidates, np.zeros(len(candidates)))
     while True:
         farthest = int(np.where(is_usable, distances, 0.0).argmax())
         if not (is_usable[farthest] and distances[farthest] > max_distance):

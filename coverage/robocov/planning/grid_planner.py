@@ -109,13 +109,13 @@ class GridPlanner:
         -------
         (m,) array, m
         """
-        first_nodes = [np.empty(0, dtype=np.intp)]
-        lengths = [np.empty(0)]
+        sources = [np.empty(0, dtype=np.intp)]
+        offsets = [np.empty(0)]
         for position in positions:
             entry_nodes = self.visibility.get_entry_nodes(position)
-            first_nodes.append(entry_nodes)
-            lengths.append(compute_point_distances(self.map_window.nodes[entry_nodes], position))
-        return self.graph.search(np.concatenate(first_nodes), np.concatenate(lengths))
+            sources.append(entry_nodes)
+            offsets.append(compute_point_distances(self.map_window.nodes[entry_nodes], position))
+        return self.graph.compute_nearest_distances(np.concatenate(sources), np.concatenate(offsets))
 
     def look_up_distances(self, position: Array, table: Array) -> Array:
         """Return the distances from a position to given nodes, based on a table of distances between nodes.

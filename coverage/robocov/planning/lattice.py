@@ -136,10 +136,10 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
     The line is sampled twice per cell. A dictionary removes the duplicates and keeps the order.
     """
-    along = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
-    row = np.rint(along * up * stride).astype(int)
-    column = np.rint(along * right * stride).astype(int)
-    return tuple(dict.fromkeys(zip(row.tolist(), column.tolist(), strict=True)))
+    fractions = np.linspace(0.0, 1.0, 2 * max(up, abs(right)) * stride + 1)
+    rows = np.rint(fractions * up * stride).astype(int)
+    columns = np.rint(fractions * right * stride).astype(int)
+    return tuple(dict.fromkeys(zip(rows.tolist(), columns.tolist(), strict=True)))
 
 
 @kernel
@@ -188,8 +188,7 @@ def _examine_crossed_cells(
 ) -> tuple[bool, bool, int]:
     """Examine the cells that a move crosses, from a node in the cell with the given row and column.
 
-    Return whether none of them is near a wall, whether none of them is a wall, and the number of unknown
-    ones.
+    Return whether none of them is near a wall, whether none of them is a wall, and how many are unknown.
     """
     is_passable = True
     is_without_wall = True
@@ -258,14 +257,14 @@ def compute_distances(
     the nodes that a path has reached, but whose distance is not final yet.
     """
     node_count = len(edges.first_edge) - 1
-    distance = np.full(node_count, np.inf)
+    distances = np.full(node_count, np.inf)
     # The first `front_size` entries of `front` are the nodes of the front, in any order.
     front = np.empty(node_count, dtype=np.intp)
     is_in_front = np.zeros(node_count, dtype=np.bool_)
-    front_size = _add_sources(sources, offsets, distance, front, is_in_front)
+    front_size = _add_sources(sources, offsets, distances, front, is_in_front)
     settled = np.empty(node_count, dtype=np.intp)
     while front_size:
-        remaining_count = _settle_nearest_nodes(distance, front, front_size, shortest_edge, settled)
+        remaining_count = _settle_nearest_nodes(distances, front, front_size, shortest_edge, settled)
         settled_count = front_size - remaining_count
         front_size = remaining_count
         for k in range(settled_count):
@@ -275,19 +274,19 @@ def compute_distances(
             node = settled[k]
             for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
                 end = edges.ends[edge]
-                length = distance[node] + edges.lengths[edge]
-                if length < distance[end] and length <= limit:
-                    distance[end] = length
+                length = distances[node] + edges.lengths[edge]
+                if length < distances[end] and length <= limit:
+                    distances[end] = length
                     if not is_in_front[end]:
                         front[front_size] = end
                         is_in_front[end] = True
                         front_size += 1
-    return distance
+    return distances
 
 
 @kernel
 def _add_sources(
-    sources: IntArray, offsets: Array, distance: Array, front: IntArray, is_in_front: BoolArray
+    sources: IntArray, offsets: Array, distances: Array, front: IntArray, is_in_front: BoolArray
 ) -> int:
     """Set the distances of the sources, in m, and add them to an empty front; return the number added.
 
@@ -296,7 +295,7 @@ def _add_sources(
     front_size = 0
     for k in range(len(sources)):
         node = sources[k]
-        distance[node] = min(distance[node], offsets[k])
+        distances[node] = min(distances[node], offsets[k])
         if not is_in_front[node]:
             front[front_size] = node
             is_in_front[node] = True
@@ -306,21 +305,21 @@ def _add_sources(
 
 @kernel
 def _settle_nearest_nodes(
-    distance: Array, front: IntArray, front_size: int, shortest_edge: float, settled: IntArray
+    distances: Array, front: IntArray, front_size: int, shortest_edge: float, settled: IntArray
 ) -> int:
     """Move the nodes to settle from the front to `settled`; return the number of nodes that remain.
 
     These are the nodes whose distance exceeds that of the nearest one by less than the shortest edge. The
     nodes that remain become the first entries of `front`.
     """
-    nearest = np.inf
+    min_distance = np.inf
     for k in range(front_size):
-        nearest = min(nearest, distance[front[k]])
+        min_distance = min(min_distance, distances[front[k]])
     settled_count = 0
     remaining_count = 0
     for k in range(front_size):
         node = front[k]
-        if distance[node] < nearest + shortest_edge:
+        if distances[node] < min_distance + shortest_edge:
             settled[settled_count] = node
             settled_count += 1
         else:
@@ -345,23 +344,24 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
     (k,) int array
         At most `max_count` nodes.
     """
-    # This is an insertion sort of the nearest nodes so far: a new one moves forward to its place, and the
-    # last one drops out.
+    # This is an insertion sort of the nearest nodes so far: a new node moves forward to its position in the
+    # list, and the last one is dropped if the list is full.
     nearest = np.empty(max_count, dtype=np.intp)
     squared_distances = np.empty(max_count)
     count = 0
     for node in range(len(nodes)):
-        squared = (nodes[node, 0] - position[0]) ** 2 + (nodes[node, 1] - position[1]) ** 2
-        if not is_candidate[node] or (count == max_count and squared >= squared_distances[max_count - 1]):
+        squared_distance = (nodes[node, 0] - position[0]) ** 2 + (nodes[node, 1] - position[1]) ** 2
+        is_too_far = count == max_count and squared_distance >= squared_distances[max_count - 1]
+        if is_too_far or not is_candidate[node]:
             continue
         count = min(count + 1, max_count)
         k = count - 1
-        while k > 0 and squared_distances[k - 1] > squared:
+        while k > 0 and squared_distances[k - 1] > squared_distance:
             nearest[k] = nearest[k - 1]
             squared_distances[k] = squared_distances[k - 1]
             k -= 1
         nearest[k] = node
-        squared_distances[k] = squared
+        squared_distances[k] = squared_distance
     return nearest[:count]
 
 
@@ -391,10 +391,10 @@ def find_clear_lines(
     lengths = np.empty(len(ends))
     for k in range(len(ends)):
         lengths[k] = math.sqrt((ends[k, 0] - position[0]) ** 2 + (ends[k, 1] - position[1]) ** 2)
-    longest = 0.0
+    max_length = 0.0
     for k in range(len(ends)):
-        longest = max(longest, lengths[k])
-    step_count = math.ceil(longest / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
+        max_length = max(max_length, lengths[k])
+    step_count = math.ceil(max_length / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
     cells_per_meter = 1.0 / frame.cell_size
     is_clear = np.ones(len(ends), dtype=np.bool_)
     for k in range(len(ends)):

@@ -86,14 +86,17 @@ class LatticeGraph:
         """The lengths of all edges as a sparse matrix, (m, m) m."""
         return build_matrix(self.edges)
 
-    def search(self, nodes: ArrayLike, offsets: ArrayLike, limit: float = math.inf) -> Array:
-        """Compute the distance from each node to the nearest of the given nodes.
+    def compute_nearest_distances(
+        self, sources: ArrayLike, offsets: ArrayLike, limit: float = math.inf
+    ) -> Array:
+        """Compute the distance from each node to the nearest of several sources.
 
         Parameters
         ----------
-        nodes : (k,) int array_like
+        sources : (k,) int array_like
+            Nodes at which paths start.
         offsets : (k,) array_like, m
-            Lengths that are added to the paths from each of the given nodes.
+            Length that is added to the paths from each source.
         limit : float, m
             The distances of nodes farther away may be infinite. A lower limit takes less time.
 
@@ -105,7 +108,7 @@ class LatticeGraph:
         return compute_distances(
             self.edges,
             self.map_window.spacing,
-            np.asarray(nodes, dtype=np.intp),
+            np.asarray(sources, dtype=np.intp),
             np.asarray(offsets, dtype=np.float64),
             limit,
         )
@@ -123,46 +126,35 @@ class LatticeGraph:
             Infinite for nodes that no path leads to.
         """
         if node not in self._distances_of_node:
-            self._distances_of_node[node] = self.search([node], [0.0])
+            self._distances_of_node[node] = self.compute_nearest_distances([node], [0.0])
         return self._distances_of_node[node]
 
-    def compute_distances_within(self, nodes: Sequence[int], limit: float) -> list[Array]:
-        """Compute the distances from each of the given nodes to all nodes within a limit.
+    def compute_distance_table(self, nodes: Sequence[int] | IntArray, limit: float = math.inf) -> Array:
+        """Compute the distances from each of the given nodes to all nodes.
+
+        Distances that `get_distances` has stored are reused, but no further ones are stored.
 
         Parameters
         ----------
-        nodes : sequence of int
+        nodes : (k,) sequence of int
         limit : float, m
             The distances of nodes farther away may be infinite. A lower limit takes less time.
 
         Returns
         -------
-        list of (m,) arrays, m
-        """
-        distances_by_node = []
-        for node in nodes:
-            distances = self._distances_of_node.get(node)
-            if distances is None:
-                distances = self.search([node], [0.0], limit)
-            distances_by_node.append(distances)
-        return distances_by_node
-
-    def compute_distance_table(self, nodes: IntArray) -> Array:
-        """Compute the distances from each of the given nodes to all nodes.
-
-        Parameters
-        ----------
-        nodes : (k,) int array
-
-        Returns
-        -------
         (k, m) array, m
+            Infinite for nodes that no path leads to.
         """
-        table = np.array([self.search([node], [0.0]) for node in nodes.tolist()])
-        return table.reshape(-1, len(self.map_window.nodes))
+        table = np.empty((len(nodes), len(self.map_window.nodes)))
+        for row, node in enumerate(nodes):
+            stored = self._distances_of_node.get(int(node))
+            table[row] = self.compute_nearest_distances([node], [0.0], limit) if stored is None else stored
+        return table
 
     def find_shortest_paths(self, node: int) -> tuple[Array, IntArray]:
         """Find the shortest paths from a node to all nodes.
+
+        This takes longer than `get_distances`, which does not find the paths.
 
         Parameters
         ----------

@@ -12,10 +12,8 @@ from scipy import ndimage
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap, dilate
 from robocov.planning.openness import MAX_BLOCKS, compute_openness
+from robocov.planning.raster import SIDE_STEPS
 from robocov.planning.window import Window
-
-SIDE_STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
-"""Steps, in rows and columns, to the four cells that share a side with a cell: right, above, left, below."""
 
 
 class Frontier(NamedTuple):

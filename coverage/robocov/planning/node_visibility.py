@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.lattice import Frame, find_clear_lines, find_nearest_nodes
 from robocov.planning.map_window import MapWindow
 
 NO_NODE = -1
 """Index that stands for no node."""
-_MAX_CLOSE_NODES = 12
-"""Maximum number of nodes close to a position that are considered."""
+_MAX_NEAREST_NODES = 12
+"""Maximum number of nodes that `NodeVisibility.find_nearest_nodes` returns."""
 _MAX_CACHED_POSITIONS = 1000
 """Maximum number of positions whose entry nodes are cached."""
 
@@ -73,8 +71,8 @@ class NodeVisibility:
         """
         return find_clear_lines(position, ends, is_obstructing, self._frame, ignored_length)
 
-    def find_close_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
-        """Find the candidates closest to a position, whether they are visible or not.
+    def find_nearest_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
+        """Find the candidates that are nearest to a position, whether they are visible or not.
 
         Parameters
         ----------
@@ -85,9 +83,9 @@ class NodeVisibility:
         Returns
         -------
         (k,) int array
-            At most twelve, the nearest first.
+            At most twelve, the nearest one first.
         """
-        return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_CLOSE_NODES)
+        return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_NEAREST_NODES)
 
     def find_nearest_node(self, position: Array) -> int:
         """Find the nearest node with clearance, whether it is visible or not.
@@ -101,14 +99,11 @@ class NodeVisibility:
         int
             `NO_NODE` if no node has clearance.
         """
-        has_clearance = self.map_window.has_clearance
-        if not has_clearance.any():
-            return NO_NODE
-        squared_distances = ((self.map_window.nodes - position) ** 2).sum(axis=1)
-        return int(np.where(has_clearance, squared_distances, np.inf).argmin())
+        nearest_nodes = self.find_nearest_nodes(position, self.map_window.has_clearance)
+        return int(nearest_nodes[0]) if len(nearest_nodes) else NO_NODE
 
     def find_entry_node(self, position: Array) -> int:
-        """Find the node at which the shortest way from a position onto the lattice ends.
+        """Find the nearest node at which a path from a position can enter the lattice.
 
         Parameters
         ----------
@@ -125,8 +120,8 @@ class NodeVisibility:
     def get_entry_nodes(self, position: Array) -> IntArray:
         """Return the nodes at which a path from a position can enter the lattice.
 
-        These are the nodes with clearance that are close to the position and visible from it. If none is
-        visible, it is the nearest one with clearance.
+        These are those of the nearest nodes with clearance that are visible from the position. If none of
+        them is visible, it is the nearest one.
 
         Parameters
         ----------
@@ -135,15 +130,15 @@ class NodeVisibility:
         Returns
         -------
         (k,) int array
-            The nearest first. Empty if no node has clearance.
+            The nearest one first. Empty if no node has clearance.
         """
         key = position.tobytes()
         if key not in self._entry_nodes:
             if len(self._entry_nodes) >= _MAX_CACHED_POSITIONS:
                 self._entry_nodes.clear()
-            close_nodes = self.find_close_nodes(position, self.map_window.has_clearance)
-            ends = self.map_window.nodes[close_nodes]
+            nearest_nodes = self.find_nearest_nodes(position, self.map_window.has_clearance)
+            ends = self.map_window.nodes[nearest_nodes]
             is_visible = self.find_clear_lines(position, ends, self.map_window.is_blocked)
             # A robot whose cell is marked as a wall actually stands next to the wall, and sees no node.
-            self._entry_nodes[key] = close_nodes[is_visible] if is_visible.any() else close_nodes[:1]
+            self._entry_nodes[key] = nearest_nodes[is_visible] if is_visible.any() else nearest_nodes[:1]
         return self._entry_nodes[key]

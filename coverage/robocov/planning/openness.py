@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.planning.discovered_map import FREE, UNKNOWN
+from robocov.planning.raster import SIDE_STEPS
 
 PRIOR_OPENNESS = 0.8
 """Openness of cells that are far from all known cells."""
 WALK_LENGTH_BLOCKS = 30.0
-"""Typical distance, in blocks, of a random walk from its start when it is cut off."""
+"""Typical distance of a random walk from its start when it is cut off, in blocks."""
 MAX_BLOCKS = 1000
 """Default of the maximum number of blocks into which a map is divided."""
 
@@ -26,8 +27,6 @@ _TOLERANCE = 1e-5
 """The relaxation ends when no openness changes by more than this in an iteration."""
 _OUTSIDE = 255
 """State that marks cells outside the region."""
-_SIDE_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1))
-"""Steps from a cell to its four neighbors: rows up, columns right."""
 
 
 class _BlockGrid(NamedTuple):
@@ -92,7 +91,7 @@ def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks
 
 @kernel
 def _count_blocks(cell_count: int, block_side: int) -> int:
-    """Return the number of blocks into which a row or a column of cells is divided, rounded up."""
+    """Return the number of blocks that a row or a column of cells is divided into, rounded up."""
     return (cell_count + block_side - 1) // block_side
 
 
@@ -136,7 +135,7 @@ def _count_sides(cells: NDArray[np.uint8], block_side: int, i: int, j: int, bloc
             if cells[row, column] != UNKNOWN:
                 continue
             unknown_count += 1
-            for up, right in _SIDE_STEPS:
+            for up, right in SIDE_STEPS:
                 neighbor_row = row + up
                 neighbor_column = column + right
                 if not (0 <= neighbor_row < rows and 0 <= neighbor_column < columns):

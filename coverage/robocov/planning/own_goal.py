@@ -10,8 +10,9 @@ import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import GridPlanner
-from robocov.planning.map_window import SIDE_STEPS, MapWindow
+from robocov.planning.map_window import MapWindow
 from robocov.planning.node_visibility import NO_NODE
+from robocov.planning.raster import SIDE_STEPS
 from robocov.planning.team_placement import UNREACHABLE_M
 
 _MAX_MOVES = 6
@@ -90,7 +91,9 @@ def find_own_goal(
 
 
 class _NodeSearch:
-    """Coverage costs with the robot at different nodes, each computed when the search comes close to it.
+    """The coverage cost as a function of the node at which the robot is.
+
+    It is computed only for the nodes that the search visits, and their neighbors.
 
     Attributes
     ----------
@@ -133,9 +136,9 @@ class _NodeSearch:
         """Add the costs of a node and its neighbors to `costs`. Return the neighbors."""
         neighbors = _list_neighbors(self._planner.map_window, node)
         new_nodes = [k for k in (node, *neighbors) if k != NO_NODE and k not in self._distances]
-        tables = self._planner.graph.compute_distances_within(new_nodes, self._limit)
-        for new_node, table in zip(new_nodes, tables, strict=True):
-            distances = table[self.targets]
+        table = self._planner.graph.compute_distance_table(new_nodes, self._limit)
+        for new_node, distances_to_all in zip(new_nodes, table, strict=True):
+            distances = distances_to_all[self.targets]
             nearest = np.minimum(self._other_distances, distances)
             self._distances[new_node] = distances
             self.costs[new_node] = float((self.target_weights * nearest).sum())

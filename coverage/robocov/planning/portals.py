@@ -1,10 +1,10 @@
 """Connections through passages that the moves of a coarse lattice miss.
 
-The moves of a lattice are straight lines between nodes. In a large window the nodes are far apart, and it may
-be that no such line leads through a narrow door. The lattice then consists of separate pieces, although the
-free cells are connected. *Portals* connect these pieces: they are the shortest paths from cell to cell
-between nodes of different pieces. They lead only through cells that are known to be free, because a wall that
-has been seen only in part seems to have narrow holes.
+The moves of a lattice are straight lines between nodes. In a large window the nodes are far apart, and there
+may be no such line through a narrow door. The lattice then consists of separate pieces, although the free
+cells are connected. *Portals* connect these pieces: they are the shortest paths from cell to cell between
+nodes of different pieces. They lead only through cells that are known to be free, because a wall that has
+been seen only in part seems to have narrow holes.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ from scipy.sparse.csgraph import connected_components
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.planning.lattice import Edges
+from robocov.planning.raster import SIDE_STEPS
 
-_NEIGHBORS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)])
-"""Rows and columns from a cell to its neighbors: first those that share a side, then those at the corners."""
-_SIDE_COUNT = 4
+_CORNER_STEPS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+"""Steps, in rows and columns, to the four neighbors of a cell that share only a corner with it."""
+_NEIGHBOR_STEPS = np.array((*SIDE_STEPS, *_CORNER_STEPS))
+"""Steps to the eight neighbors of a cell: first those that share a side, then those at the corners."""
+_SIDE_COUNT = len(SIDE_STEPS)
 """Number of neighbors that share a side."""
 _SIDE_COST = 5
 """Cost of a step to a neighbor that shares a side."""
@@ -72,8 +75,9 @@ def find_portals(is_passable: BoolArray, node_cells: IntArray, graph: csr_array)
     Returns
     -------
     Portals
-        The shortest path between each two nodes of different pieces, if the cells to which these nodes are
-        the nearest ones touch. There are no portals if the lattice connects all nodes that the cells connect.
+        For each pair of nodes of different pieces, the shortest path between them, if some cell nearest to
+        one of the nodes adjoins a cell nearest to the other. There are no portals if the lattice connects all
+        nodes that the cells connect.
     """
     rows, columns = node_cells.T
     # Pieces are connected in both directions: no move leads on from a node without clearance.
@@ -126,9 +130,9 @@ def _find_shortest_paths(
         if cost > costs[row, column]:
             # A shorter path to this cell has been found in the meantime.
             continue
-        for k in range(len(_NEIGHBORS)):
-            next_row = row + _NEIGHBORS[k, 0]
-            next_column = column + _NEIGHBORS[k, 1]
+        for k in range(len(_NEIGHBOR_STEPS)):
+            next_row = row + _NEIGHBOR_STEPS[k, 0]
+            next_column = column + _NEIGHBOR_STEPS[k, 1]
             if not (0 <= next_row < height and 0 <= next_column < width):
                 continue
             if not is_passable[next_row, next_column]:
@@ -158,7 +162,7 @@ def _find_meeting_cells(shortest: _ShortestPaths, pieces: IntArray) -> tuple[Int
     """
     height, width = shortest.nodes.shape
     nodes = shortest.nodes.ravel()
-    # All pairs of cells that share a side, and both of which belong to a node.
+    # All pairs of cells that share a side, if both cells belong to a node.
     flat_indices = np.arange(height * width).reshape(height, width)
     cells = np.concatenate([flat_indices[:, :-1].ravel(), flat_indices[:-1].ravel()])
     neighbors = np.concatenate([flat_indices[:, 1:].ravel(), flat_indices[1:].ravel()])

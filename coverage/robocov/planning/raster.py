@@ -13,6 +13,8 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation.region import Region
 
+SIDE_STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+"""Steps, in rows and columns, to the four cells that share a side with a cell: right, above, left, below."""
 _ROUNDING_CELLS = 1e-9
 """Length, in cells, that is attributed to rounding: it does not add another row or column."""
 

@@ -40,15 +40,15 @@ def find_route(graph: LatticeGraph, visibility: NodeVisibility, position: Array,
     if first == NO_NODE:
         return np.array(position[None])
     distances, predecessors = graph.find_shortest_paths(first)
-    close_nodes = visibility.find_close_nodes(goal, np.isfinite(distances) & map_window.has_clearance)
-    if not len(close_nodes):
+    last_candidates = visibility.find_nearest_nodes(goal, np.isfinite(distances) & map_window.has_clearance)
+    if not len(last_candidates):
         return np.array(position[None])
     # The robot may be too close to a wall where its route starts, but not where it ends. Therefore no cells
     # around the goal are ignored.
-    is_visible = visibility.find_clear_lines(goal, map_window.nodes[close_nodes], map_window.is_near_wall)
+    is_visible = visibility.find_clear_lines(goal, map_window.nodes[last_candidates], map_window.is_near_wall)
     # The last node is the nearest one in sight of the goal, or simply the nearest one if none is in sight
     # (`argmax` returns the first True, or 0 if there is none).
-    last = int(close_nodes[is_visible.argmax()])
+    last = int(last_candidates[is_visible.argmax()])
     path = [last]
     while path[-1] != first:
         path.append(int(predecessors[path[-1]]))
@@ -60,20 +60,20 @@ def find_route(graph: LatticeGraph, visibility: NodeVisibility, position: Array,
 
 
 def _find_first_node(visibility: NodeVisibility, position: Array) -> int:
-    """Return the first node of a route: a node with clearance, close to a position and in sight.
+    """Return the first node of a route: the nearest node with clearance in sight of a position.
 
-    If possible, the line to the node crosses no cell near a wall, except for those around the position:
-    the robot may itself be too close to a wall. `NO_NODE` if no such node is in sight.
+    If possible, the line to the node crosses no cell near a wall, except for those around the position: the
+    robot may itself be too close to a wall. Return `NO_NODE` if none of the nearest nodes is in sight.
     """
     map_window = visibility.map_window
-    close_nodes = visibility.find_close_nodes(position, map_window.has_clearance)
-    ends = map_window.nodes[close_nodes]
+    candidates = visibility.find_nearest_nodes(position, map_window.has_clearance)
+    ends = map_window.nodes[candidates]
     is_visible = visibility.find_clear_lines(
         position, ends, map_window.is_near_wall, 2.0 * map_window.clearance
     )
     if not is_visible.any():
         is_visible = visibility.find_clear_lines(position, ends, map_window.is_blocked)
-    return int(close_nodes[is_visible.argmax()]) if is_visible.any() else NO_NODE
+    return int(candidates[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
 
 def _expand_portals(graph: LatticeGraph, path: Sequence[int]) -> Array:

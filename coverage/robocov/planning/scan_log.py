@@ -1,8 +1,8 @@
 """The scans that a robot has, its own and those of others, and the map that it builds from them.
 
 All robots scan at the same times. The scans that they take at one time are a *round*; rounds and robots are
-numbered from 0. The map is built by adding all scans in the order of rounds, and of robots within a round, no
-matter in which order they arrive. Robots with the same scans therefore have the same map, bit for bit.
+numbered from 0. Whatever the order in which scans arrive, they are added to the map in the order of rounds
+and, within a round, of robots. Robots with the same scans therefore have the same map, bit for bit.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _SCAN_HEADER_BYTES = 32
 _MAX_CHECKPOINT_GAP = 1.0
 """Maximum gap between two older checkpoints, as a fraction of the age of the younger one.
 
-The gap and the age are numbers of rounds.
+Gaps and ages are counted in rounds.
 """
 
 
@@ -64,7 +64,7 @@ class NumberedScan:
 
     @property
     def size(self) -> int:
-        """Size of a message with the scan, bytes: 32, 2 for each ray, and 1 for every 8 rays.
+        """Size of a message with the scan: 32 bytes, plus 2 for each ray and 1 for every 8 rays.
 
         Examples
         --------
@@ -176,7 +176,7 @@ class ScanLog:
 
     The map is updated only when it is needed, by `update_map`, because many scans may arrive in between. Some
     earlier maps are stored as checkpoints. When scans of earlier rounds arrive, each later checkpoint is
-    repaired: the cells near these scans are taken from the checkpoint before it, and all scans near them are
+    repaired: the cells near these scans are reset to the checkpoint before it, and all scans near them are
     added again. What happens to a cell does not depend on other cells, so the result is bit-identical to
     adding all scans in order.
 
@@ -291,12 +291,12 @@ class ScanLog:
         )
 
     def update_map(self) -> ScanLog:
-        """Return the log with a map of all scans in it.
+        """Return the log with an up-to-date map, which contains all scans.
 
         Returns
         -------
         ScanLog
-            It keeps the same map object if no cell has changed.
+            Its map is the same object as before if no cell has changed.
         """
         if not self.pending_scans:
             return self
@@ -309,7 +309,7 @@ class ScanLog:
         return replace(self, checkpoints=checkpoints, pending_scans=()).share_map(known_map)
 
     def _list_scans(self, first_round: int, end_round: int) -> list[NumberedScan]:
-        """Return the scans from a first round until before an end, in the order of rounds and robots."""
+        """Return the scans of the rounds from `first_round` up to, but not including, `end_round`."""
         rounds = self.rounds[first_round:end_round]
         return [scan for round_scans in rounds for scan in round_scans if scan is not None]
 
@@ -393,8 +393,9 @@ class ScanLog:
         -------
         ScanLog
         """
-        earlier = [each for each in self.checkpoints if each.round_count < len(self.rounds)]
-        checkpoints = _thin_out([*earlier, Checkpoint(len(self.rounds), known_map)])
+        round_count = len(self.rounds)
+        earlier = [checkpoint for checkpoint in self.checkpoints if checkpoint.round_count < round_count]
+        checkpoints = _thin_out([*earlier, Checkpoint(round_count, known_map)])
         return replace(self, checkpoints=checkpoints, known_map=known_map)
 
 
@@ -404,12 +405,14 @@ def _thin_out(checkpoints: Sequence[Checkpoint]) -> tuple[Checkpoint, ...]:
     The number of checkpoints then grows only with the logarithm of the number of rounds. When a late scan
     arrives, the number of rounds that have to be added again is proportional to the age of that scan.
     """
-    kept = [checkpoints[0]]
+    remaining = [checkpoints[0]]
     last_count = checkpoints[-1].round_count
-    for candidate, next_one in pairwise(checkpoints[1:]):
-        gap = next_one.round_count - kept[-1].round_count
-        if gap > _MAX_CHECKPOINT_GAP * (last_count - next_one.round_count):
-            kept.append(candidate)
+    for checkpoint, next_checkpoint in pairwise(checkpoints[1:]):
+        # The gap that there would be without this checkpoint.
+        gap = next_checkpoint.round_count - remaining[-1].round_count
+        age = last_count - next_checkpoint.round_count
+        if gap > _MAX_CHECKPOINT_GAP * age:
+            remaining.append(checkpoint)
     if len(checkpoints) > 1:
-        kept.append(checkpoints[-1])
-    return tuple(kept)
+        remaining.append(checkpoints[-1])
+    return tuple(remaining)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import Array, IntArray
-from robocov.planning.map_window import SIDE_STEPS, MapWindow
+from robocov.planning.map_window import MapWindow
+from robocov.planning.raster import SIDE_STEPS
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
@@ -65,8 +66,8 @@ def find_viewpoint(
     is_worth_visiting = frontier_costs > min_cost
     if not is_worth_visiting.any():
         return None
-    # The frontier consists of the unknown cells that have a free one on at least one of their four sides. The
-    # cells on these sides are possible viewpoints if they are marked in `frontier.is_side_free`.
+    # Candidates are the cells on the four sides of each frontier cell. Only those that are marked in
+    # `frontier.is_side_free` may be viewpoints.
     rows_up, columns_right = np.array(SIDE_STEPS).T
     candidates = _Candidates(
         rows=frontier.rows[is_worth_visiting, None] + rows_up,

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
 from robocov.compiled import kernel
+from robocov.planning.raster import SIDE_STEPS
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
 """Minimum angle between the directions from a point to two walls that face each other."""
@@ -25,8 +26,6 @@ _NEIGHBOR_STEPS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), 
 
 Neighbors with an even index share a side with the cell.
 """
-_SIDE_STEPS = _NEIGHBOR_STEPS[::2]
-"""Rows and columns from a cell to the four neighbors that share a side with it."""
 _FORWARD_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """Rows and columns from a cell to half of its neighbors, so that each pair of neighbors is visited once."""
 _CELL_STEP = 1.0
@@ -79,7 +78,7 @@ class VoronoiRoadmap(NamedTuple):
         starts, ends = _list_adjacent_groups(vertex_of_cell)
         lengths = compute_point_distances(vertices[starts], vertices[ends])
         graph = csr_array((lengths, (starts, ends)), shape=(len(vertices), len(vertices)))
-        _spread_groups(vertex_of_cell, is_free, _SIDE_STEPS)
+        _spread_groups(vertex_of_cell, is_free, np.array(SIDE_STEPS))
         return cls(
             vertices=vertices,
             distances=dijkstra(graph, directed=False),
@@ -108,41 +107,41 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     remain.
     """
     is_in_graph = np.pad(is_free, 1)
-    wall_distance, nearest_wall = ndimage.distance_transform_edt(is_in_graph, return_indices=True)
-    must_stay = _find_cells_between_walls(wall_distance, nearest_wall) & is_in_graph
+    wall_distances, nearest_walls = ndimage.distance_transform_edt(is_in_graph, return_indices=True)
+    must_stay = _find_cells_between_walls(wall_distances, nearest_walls) & is_in_graph
     # The cells nearest to walls are removed first.
     order = np.flatnonzero(is_in_graph)
-    order = order[np.argsort(wall_distance.ravel()[order], kind="stable")]
+    order = order[np.argsort(wall_distances.ravel()[order], kind="stable")]
     _thin(is_in_graph, must_stay, order, _NEIGHBOR_STEPS)
     return is_in_graph[1:-1, 1:-1]
 
 
-def _find_cells_between_walls(wall_distance: Array, nearest_wall: NDArray[np.int32]) -> BoolArray:
+def _find_cells_between_walls(wall_distances: Array, nearest_walls: NDArray[np.int32]) -> BoolArray:
     """Find the cells whose nearest wall is in a very different direction from that of an adjacent cell.
 
     Parameters
     ----------
-    wall_distance : (rows, columns) array
-        Distance of each cell from the nearest wall, in cells.
-    nearest_wall : (2, rows, columns) int array
-        Row and column of that wall.
+    wall_distances : (rows, columns) array
+        Distance of each cell from the nearest wall cell, in cells.
+    nearest_walls : (2, rows, columns) int array
+        Row and column of that wall cell.
 
     Returns
     -------
     (rows, columns) bool array
     """
-    is_between_walls = np.zeros(wall_distance.shape, dtype=bool)
+    is_between_walls = np.zeros(wall_distances.shape, dtype=bool)
     for axis in (0, 1):
         # Views in which adjacent cells along the axis are in adjacent rows.
-        distances = np.swapaxes(wall_distance, 0, axis)
-        walls = np.swapaxes(nearest_wall, 1, 1 + axis)
+        distances = np.swapaxes(wall_distances, 0, axis)
+        walls = np.swapaxes(nearest_walls, 1, 1 + axis)
         is_between = np.swapaxes(is_between_walls, 0, axis)
-        # The distance between the wall cells that are nearest to two adjacent cells.
-        gap = np.sqrt((np.diff(walls, axis=1) ** 2).sum(axis=0))
+        # The distances between the wall cells that are nearest to two adjacent cells.
+        gaps = np.sqrt((np.diff(walls, axis=1) ** 2).sum(axis=0))
         # Two walls at a distance r from a cell, in directions that differ by an angle α, are 2 r sin(α/2)
         # apart. Two adjacent cells along the same wall already have nearest wall cells that are one apart.
-        distance = np.maximum(distances[:-1], distances[1:])
-        is_facing = gap > 2.0 * distance * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + _CELL_STEP
+        max_distances = np.maximum(distances[:-1], distances[1:])
+        is_facing = gaps > 2.0 * max_distances * math.sin(0.5 * _MIN_FACING_ANGLE_RAD) + _CELL_STEP
         is_between[:-1] |= is_facing
         is_between[1:] |= is_facing
     return is_between_walls
@@ -153,7 +152,7 @@ def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbo
     """Remove cells from the graph, in place, as long as the neighbors of each removed cell stay connected.
 
     Cells that must stay are not removed. The other cells are tested in the given order, as indices of the
-    flattened array, again and again until no more can be removed.
+    flattened array, in several passes until no more can be removed.
     """
     columns = is_in_graph.shape[1]
     has_changed = True
@@ -203,7 +202,7 @@ def _group_cells(
     search adds the other cells: those that it reaches within `max_steps` steps from neighbor to neighbor.
     """
     columns = is_in_graph.shape[1]
-    group = np.full(is_in_graph.shape, NO_VERTEX)
+    groups = np.full(is_in_graph.shape, NO_VERTEX)
     first_cells = np.empty(is_in_graph.size, dtype=np.intp)
     queue = np.empty(is_in_graph.size, dtype=np.intp)
     step_counts = np.empty(is_in_graph.size, dtype=np.intp)
@@ -211,19 +210,19 @@ def _group_cells(
     for cell in range(is_in_graph.size):
         row = cell // columns
         column = cell % columns
-        if is_in_graph[row, column] and group[row, column] == NO_VERTEX:
+        if is_in_graph[row, column] and groups[row, column] == NO_VERTEX:
             first_cells[group_count] = cell
-            group[row, column] = group_count
+            groups[row, column] = group_count
             queue[0] = cell
             step_counts[0] = 0
-            _fill_group(group, is_in_graph, max_steps, neighbor_steps, queue, step_counts)
+            _fill_group(groups, is_in_graph, max_steps, neighbor_steps, queue, step_counts)
             group_count += 1
-    return first_cells[:group_count], group
+    return first_cells[:group_count], groups
 
 
 @kernel
 def _fill_group(
-    group: IntArray,
+    groups: IntArray,
     is_in_graph: BoolArray,
     max_steps: int,
     neighbor_steps: IntArray,
@@ -232,7 +231,7 @@ def _fill_group(
 ) -> None:
     """Add the cells of the graph within `max_steps` steps of a first cell to the group of that cell.
 
-    This is a breadth-first search. `group` contains the group of each cell, or `NO_VERTEX`. `queue` contains
+    This is a breadth-first search. `groups` contains the group of each cell, or `NO_VERTEX`. `queue` contains
     flat indices of cells, and at the start only that of the first cell; entry k of `step_counts` is the
     number of steps from the first cell to ``queue[k]``. All three are changed in place.
     """
@@ -248,21 +247,21 @@ def _fill_group(
             i = row + neighbor_steps[k, _UP]
             j = column + neighbor_steps[k, _RIGHT]
             is_inside = 0 <= i < rows and 0 <= j < columns
-            if step_count < max_steps and is_inside and is_in_graph[i, j] and group[i, j] == NO_VERTEX:
-                group[i, j] = group[row, column]
+            if step_count < max_steps and is_inside and is_in_graph[i, j] and groups[i, j] == NO_VERTEX:
+                groups[i, j] = groups[row, column]
                 queue[tail] = i * columns + j
                 step_counts[tail] = step_count + 1
                 tail += 1
 
 
-def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
+def _list_adjacent_groups(groups: IntArray) -> tuple[IntArray, IntArray]:
     """List the pairs of groups with adjacent cells, each pair once, the smaller index first."""
-    rows, columns = group.shape
+    rows, columns = groups.shape
     pairs = []
     for up, right in _FORWARD_STEPS:
         # Two views of the array: `second` contains the neighbors, one step away, of the cells in `first`.
-        first = group[: rows - up, max(0, -right) : columns - max(0, right)]
-        second = group[up:, max(0, right) : columns + min(0, right)]
+        first = groups[: rows - up, max(0, -right) : columns - max(0, right)]
+        second = groups[up:, max(0, right) : columns + min(0, right)]
         is_border = (first != NO_VERTEX) & (second != NO_VERTEX) & (first != second)
         pairs.append(np.sort(np.column_stack([first[is_border], second[is_border]]), axis=1))
     starts, ends = np.unique(np.concatenate(pairs), axis=0).T
@@ -270,7 +269,7 @@ def _list_adjacent_groups(group: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @kernel
-def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray) -> None:
+def _spread_groups(groups: IntArray, is_free: BoolArray, neighbor_steps: IntArray) -> None:
     """Add each free cell without a group to the group of the nearest cell that has one, in place.
 
     Distances are counted in steps between neighbors: a breadth-first search starts from all cells with a
@@ -282,7 +281,7 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray
     head = 0
     tail = 0
     for cell in range(is_free.size):
-        if group[cell // columns, cell % columns] != NO_VERTEX:
+        if groups[cell // columns, cell % columns] != NO_VERTEX:
             queue[tail] = cell
             tail += 1
     while head < tail:
@@ -293,7 +292,7 @@ def _spread_groups(group: IntArray, is_free: BoolArray, neighbor_steps: IntArray
             i = row + neighbor_steps[k, _UP]
             j = column + neighbor_steps[k, _RIGHT]
             is_inside = 0 <= i < rows and 0 <= j < columns
-            if is_inside and is_free[i, j] and group[i, j] == NO_VERTEX:
-                group[i, j] = group[row, column]
+            if is_inside and is_free[i, j] and groups[i, j] == NO_VERTEX:
+                groups[i, j] = groups[row, column]
                 queue[tail] = i * columns + j
                 tail += 1

@@ -67,7 +67,7 @@ def test_distances_are_those_of_a_plain_search(seed: int) -> None:
     assert set(np.flatnonzero(np.isfinite(distances)).tolist()) == set(expected)
     np.testing.assert_allclose(distances[list(expected)], list(expected.values()), rtol=1e-9)
     last = int(clear_nodes[-1])
-    (limited,) = graph.compute_distances_within([last], 1.0)
+    (limited,) = graph.compute_distance_table([last], limit=1.0)
     assert (limited[np.isfinite(limited)] <= 1.0).all()
 
 
@@ -89,7 +89,7 @@ def test_a_search_from_several_nodes_finds_the_nearest_one_with_its_offset() -> 
     graph = LatticeGraph(build_map_window(build_open_room()))
     first, second = np.flatnonzero(graph.map_window.has_clearance)[[3, -5]].tolist()
     expected = np.minimum(graph.get_distances(first) + 0.7, graph.get_distances(second))
-    np.testing.assert_allclose(graph.search([first, second], [0.7, 0.0]), expected)
+    np.testing.assert_allclose(graph.compute_nearest_distances([first, second], [0.7, 0.0]), expected)
 
 
 def test_routes_through_unknown_cells_count_as_longer() -> None:
