@@ -260,12 +260,12 @@ def _check_head(result: dict[str, Any], path: Path) -> None:
     _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
 
 
-def _check_row(row: Any, place: str) -> None:
+def _check_row(row: Any, location: str) -> None:
     """Raise InputError unless a row has the expected types, and belongs to a run of the suite."""
     has_failed = isinstance(row, dict) and "error" in row
-    _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, place)
+    _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, location)
     if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
-        raise InputError(f"{place}: {row['track']} on {row['map']} is no run of the suite")
+        raise InputError(f"{location}: {row['track']} on {row['map']} is not a run of the suite")
 
 
 _TYPE_NAMES: Mapping[Any, str] = {
@@ -279,14 +279,14 @@ _TYPE_NAMES: Mapping[Any, str] = {
 }
 
 
-def _require_types(values: Any, types: Mapping[str, Any], place: object) -> None:
+def _require_types(values: Any, types: Mapping[str, Any], location: object) -> None:
     """Raise InputError unless a JSON object has all keys in `types`, with values of these types."""
     for name, expected in types.items():
         if not isinstance(values, dict) or name not in values:
-            raise InputError(f"{place}: {name}: missing, expected a complete result")
+            raise InputError(f"{location}: {name}: missing, expected a complete result")
         if not isinstance(values[name], expected):
             type_name = _TYPE_NAMES[expected]
-            raise InputError(f"{place}: {name}: expected {type_name}, got {quote(values[name])}")
+            raise InputError(f"{location}: {name}: expected {type_name}, got {quote(values[name])}")
 
 
 def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:

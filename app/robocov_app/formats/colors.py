@@ -171,7 +171,7 @@ def parse_color(text: str, option: str) -> Color:
 
 
 def parse_css_color_on_white(text: str) -> Color | None:
-    """Return the color that a CSS color gives on a white page, or None for invalid input."""
+    """Return a CSS color as it appears on a white page, or None for invalid input."""
     paint = parse_css_color(text)
     if paint is None:
         return None

@@ -18,17 +18,17 @@ class Repairs:
         self.counts: Counter[tuple[str, str]] = Counter()
         self._self_crossings: list[str] = []
 
-    def add_self_crossing(self, reason: str, place: str) -> None:
+    def add_self_crossing(self, reason: str, location: str) -> None:
         """Count an outline that crosses or touches itself.
 
         Parameters
         ----------
         reason : str
-        place : str
-            Place in the file; may be empty.
+        location : str
+            Location in the file; may be empty.
         """
-        if place:
-            reason = f"{place}: {reason}"
+        if location:
+            reason = f"{location}: {reason}"
         self._self_crossings.append(reason)
 
     def describe(self) -> tuple[str, ...]:

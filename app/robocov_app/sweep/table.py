@@ -184,7 +184,7 @@ class Table:
         self._writes_parquet = parquet or (folder / SWEEP_PARQUET_FILE).exists()
         self._error: OutputError | None = None
         self._size = 0  # bytes
-        self._row_count = -1  # The header is no row.
+        self._row_count = -1  # The header is not a row.
 
     def __enter__(self) -> Table:
         """Open the temporary CSV file and write its header; temporary files are removed at the end."""

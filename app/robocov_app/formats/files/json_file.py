@@ -38,23 +38,23 @@ class JsonFile:
         require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.source_name)
         self.document: Any = parse_json(self._content, self.source_name)
 
-    def build_error(self, place: JsonPath, value: object, expected: str) -> MapError:
+    def build_error(self, location: JsonPath, value: object, expected: str) -> MapError:
         """Build the error for an invalid value, with its line and column.
 
         Parameters
         ----------
-        place : JsonPath
+        location : JsonPath
             Keys and indices that lead to the value.
         value : object
             The value in the file.
         expected : str
             Description of the values that are accepted.
         """
-        issue = Issue.at_path(place, f"expected {expected}, got {quote_json(value)}")
+        issue = Issue.at_path(location, f"expected {expected}, got {quote_json(value)}")
         return locate_issues(MapError.from_issues(self.source_name, [issue]), self._content, self.source_name)
 
     def parse_points(
-        self, value: Any, place: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int
+        self, value: Any, location: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int
     ) -> Array:
         """Convert a JSON list of points to a (k, d) array.
 
@@ -64,7 +64,7 @@ class JsonFile:
         ----------
         value : object
             The list of points.
-        place : JsonPath
+        location : JsonPath
             Keys and indices that lead to the list.
         min_count : int
             Smallest number of points.
@@ -78,12 +78,12 @@ class JsonFile:
         """
         if not isinstance(value, list) or len(value) < min_count:
             points = "point" if min_count == 1 else "points"
-            raise self.build_error(place, value, f"a list of at least {min_count} {points} [x, y]")
+            raise self.build_error(location, value, f"a list of at least {min_count} {points} [x, y]")
         for k, point in enumerate(value):
             if not isinstance(point, list) or not min_dimensions <= len(point) <= max_dimensions:
-                raise self.build_error((*place, k), point, "a point [x, y] of finite numbers")
+                raise self.build_error((*location, k), point, "a point [x, y] of finite numbers")
             if not all(map(is_number, point)):
-                raise self.build_error((*place, k), point, "a point [x, y] of finite numbers")
+                raise self.build_error((*location, k), point, "a point [x, y] of finite numbers")
         dimensions = max(map(len, value))
         if min(map(len, value)) < dimensions:
             value = [[*point, *[np.nan] * (dimensions - len(point))] for point in value]

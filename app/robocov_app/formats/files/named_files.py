@@ -30,14 +30,14 @@ class IncludeBudget:
         self.files_read = 0
         self.bytes_read = 0
 
-    def count_file(self, path: Path, place: str) -> None:
+    def count_file(self, path: Path, location: str) -> None:
         """Count a file that is about to be read.
 
         Parameters
         ----------
         path : Path
-        place : str
-            Place where the file is named, for messages.
+        location : str
+            Location at which the file is named, for messages.
 
         Raises
         ------
@@ -49,14 +49,14 @@ class IncludeBudget:
         self.bytes_read += path.stat().st_size
         if self.files_read > self.max_files:
             expected = f"expected at most {self.max_files} (a file read twice counts twice)"
-            raise MapError(f"{place}: included files: {expected}, got more")
+            raise MapError(f"{location}: included files: {expected}, got more")
         if self.bytes_read > self.max_bytes:
             expected = f"expected at most {self.max_bytes / 1e6:g} MB in total"
-            raise MapError(f"{place}: included files: {expected}, got more")
+            raise MapError(f"{location}: included files: {expected}, got more")
 
 
 def find_named_file(
-    path: Path, name: str, kind: str, *, place: str, notes: list[str], allow_anywhere: bool
+    path: Path, name: str, kind: str, *, location: str, notes: list[str], allow_anywhere: bool
 ) -> Path:
     """Return the path of a file that is named in another file.
 
@@ -71,7 +71,7 @@ def find_named_file(
         Name, relative to the folder of `path`.
     kind : str
         Kind of the file, such as "image", for messages.
-    place : str
+    location : str
         Place of the name, for messages.
     notes : list of str
         Notes of the import. One is appended if the file next to `path` is used instead.
@@ -84,9 +84,9 @@ def find_named_file(
         If the name is empty, too long or invalid, or if the file must be in the folder but is not.
     """
     if not name:
-        raise MapError(f"{place}: empty, expected the name of the {kind}")
+        raise MapError(f"{location}: empty, expected the name of the {kind}")
     if len(name) > _MAX_PATH_CHARACTERS:
-        raise MapError(f"{place}: {quote(name)}: expected a shorter name, got {len(name)} characters")
+        raise MapError(f"{location}: {quote(name)}: expected a shorter name, got {len(name)} characters")
     named = path.parent / name
     # PureWindowsPath separates folders at both kinds of slashes.
     neighbor = path.parent / PureWindowsPath(name).name
@@ -94,16 +94,16 @@ def find_named_file(
         is_allowed = allow_anywhere or _is_inside(named, path.parent)
         is_usable = is_allowed and _exists(named)
         if not is_usable and neighbor.is_file() and _is_inside(neighbor, path.parent):
-            key = place.rpartition(": ")[2]
+            key = location.rpartition(": ")[2]
             note = f"{key}: {quote(name)} not found, used {quote(neighbor.name)} next to the file"
             if note not in notes:
                 notes.append(note)
             return neighbor
     except (OSError, ValueError, RuntimeError) as error:
-        raise MapError(f"{place}: {quote(name)}: {_describe_name_error(error)}") from None
+        raise MapError(f"{location}: {quote(name)}: {_describe_name_error(error)}") from None
     if not is_allowed:
         expected = f"expected the {kind} in it (--anywhere allows it)"
-        raise MapError(f"{place}: {quote(name)} is outside the folder of the file, {expected}")
+        raise MapError(f"{location}: {quote(name)} is outside the folder of the file, {expected}")
     return named
 
 

@@ -239,8 +239,10 @@ def _add_obstacles(shapes: Shapes, elements: Sequence[FloorElement], floor: Mult
     for element in elements:
         geometry = element.geometry
         if element.role == "post":
-            shapes.add_point(geometry.rings[0][0], geometry.labels, place=geometry.place)
+            shapes.add_point(geometry.rings[0][0], geometry.labels, location=geometry.location)
         elif element.role == "solid":
             area = _compute_area(geometry, shapes)
             if not area.is_empty and shapely.relate_pattern(floor, area, _INTERIORS_INTERSECT):
-                shapes.add_outline(geometry.rings, geometry.labels, rule=geometry.rule, place=geometry.place)
+                shapes.add_outline(
+                    geometry.rings, geometry.labels, rule=geometry.rule, location=geometry.location
+                )

@@ -177,45 +177,45 @@ class GeometryCollector:
         for k, text in enumerate(self.file.document):
             self._add_text(text, (k,))
 
-    def _add_text(self, text: Any, place: JsonPath) -> None:
+    def _add_text(self, text: Any, location: JsonPath) -> None:
         """Add a GeoJSON text: a geometry, a feature or a collection of features."""
         kind = files.get_member(text, "type")
         if kind == "FeatureCollection":
             features = text.get("features")
             if not isinstance(features, list):
-                raise self.file.build_error((*place, "features"), features, "a list of features")
-            self._store_reference_system(text, place)
+                raise self.file.build_error((*location, "features"), features, "a list of features")
+            self._store_reference_system(text, location)
             for k, feature in enumerate(features):
-                self._add_feature(feature, (*place, "features", k))
+                self._add_feature(feature, (*location, "features", k))
         elif kind == "Feature":
-            self._add_feature(text, place)
+            self._add_feature(text, location)
         elif kind == "Topology":
-            raise self.file.build_error((*place, "type"), kind, "GeoJSON, not TopoJSON")
+            raise self.file.build_error((*location, "type"), kind, "GeoJSON, not TopoJSON")
         else:
-            self.add_geometry(text, place, ())
+            self.add_geometry(text, location, ())
 
-    def _add_feature(self, feature: Any, place: JsonPath) -> None:
+    def _add_feature(self, feature: Any, location: JsonPath) -> None:
         """Add the geometry of a feature; a feature without one is counted as left out."""
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise self.file.build_error(place, feature, "a Feature")
-        self._store_reference_system(feature, place)
+            raise self.file.build_error(location, feature, "a Feature")
+        self._store_reference_system(feature, location)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise self.file.build_error((*place, "properties"), properties, "an object")
+            raise self.file.build_error((*location, "properties"), properties, "an object")
         if feature.get("geometry") is None:
             self.shapes.count_omission("feature", "without a geometry")
             return
         labels = _list_labels(properties, feature.get("id"))
-        self.add_geometry(feature["geometry"], (*place, "geometry"), labels)
+        self.add_geometry(feature["geometry"], (*location, "geometry"), labels)
 
-    def add_geometry(self, geometry: Any, place: JsonPath, labels: tuple[str, ...]) -> None:
+    def add_geometry(self, geometry: Any, location: JsonPath, labels: tuple[str, ...]) -> None:
         """Add a geometry, or each geometry of a collection.
 
         Parameters
         ----------
         geometry : object
             A geometry as parsed from JSON.
-        place : JsonPath
+        location : JsonPath
             Keys and indices that lead to the geometry.
         labels : tuple of str
             Names of the shapes that it becomes.
@@ -228,52 +228,56 @@ class GeometryCollector:
         kind = files.get_member(geometry, "type")
         expected = f"one of {', '.join(_GEOMETRIES)}"
         if kind is None:
-            raise self.file.build_error(place, geometry, expected)
+            raise self.file.build_error(location, geometry, expected)
         if kind not in _GEOMETRIES:
-            raise self.file.build_error((*place, "type"), kind, expected)
-        self._store_reference_system(geometry, place)
+            raise self.file.build_error((*location, "type"), kind, expected)
+        self._store_reference_system(geometry, location)
         if kind != "GeometryCollection":
-            self._add_coordinates(kind, geometry.get("coordinates"), (*place, "coordinates"), labels)
+            self._add_coordinates(kind, geometry.get("coordinates"), (*location, "coordinates"), labels)
             return
         members = geometry.get("geometries")
         if not isinstance(members, list):
-            raise self.file.build_error((*place, "geometries"), members, "a list of geometries")
+            raise self.file.build_error((*location, "geometries"), members, "a list of geometries")
         for k, member in enumerate(members):
-            self.add_geometry(member, (*place, "geometries", k), labels)
+            self.add_geometry(member, (*location, "geometries", k), labels)
 
     def _add_coordinates(
-        self, kind: str, value: Any, place: JsonPath, labels: tuple[str, ...], parent_place: str = ""
+        self, kind: str, value: Any, location: JsonPath, labels: tuple[str, ...], parent_location: str = ""
     ) -> None:
         """Add the coordinates of a geometry.
 
-        For a part of a multipolygon, `parent_place` is the place of the multipolygon in the file.
+        For a part of a multipolygon, `parent_location` is the location of the multipolygon in the file.
         """
         if kind in _PLURAL:
             if not isinstance(value, list):
-                raise self.file.build_error(place, value, "a list")
+                raise self.file.build_error(location, value, "a list")
             for k, member in enumerate(value):
                 self._add_coordinates(
-                    _PLURAL[kind], member, (*place, k), labels, parent_place=format_path(place)
+                    _PLURAL[kind], member, (*location, k), labels, parent_location=format_path(location)
                 )
         elif value == []:
             self.shapes.count_omission("geometry", "without coordinates")
         elif kind == "Point":
-            point = self._parse_points([value], place, 1)
-            self.geometries.append(SourceGeometry("point", (point,), labels, format_path(place)))
+            point = self._parse_points([value], location, 1)
+            self.geometries.append(SourceGeometry("point", (point,), labels, format_path(location)))
         elif kind == "LineString":
-            line = self._parse_points(value, place, 2)
-            self.geometries.append(SourceGeometry("line", (line,), labels, format_path(place)))
+            line = self._parse_points(value, location, 2)
+            self.geometries.append(SourceGeometry("line", (line,), labels, format_path(location)))
         elif not isinstance(value, list):
-            raise self.file.build_error(place, value, "a list of rings")
+            raise self.file.build_error(location, value, "a list of rings")
         else:
-            rings = [self._parse_points(ring, (*place, k), 1) for k, ring in enumerate(value)]
-            self.geometries.append(self.shapes.build_polygon(rings, labels, format_path(place), parent_place))
+            rings = [self._parse_points(ring, (*location, k), 1) for k, ring in enumerate(value)]
+            self.geometries.append(
+                self.shapes.build_polygon(rings, labels, format_path(location), parent_location)
+            )
 
-    def _parse_points(self, value: Any, place: JsonPath, min_count: int) -> Array:
-        points = self.file.parse_points(value, place, min_count=min_count, min_dimensions=2, max_dimensions=4)
+    def _parse_points(self, value: Any, location: JsonPath, min_count: int) -> Array:
+        points = self.file.parse_points(
+            value, location, min_count=min_count, min_dimensions=2, max_dimensions=4
+        )
         return self.shapes.drop_heights(points)
 
-    def _store_reference_system(self, member: dict[str, Any], place: JsonPath) -> None:
+    def _store_reference_system(self, member: dict[str, Any], location: JsonPath) -> None:
         """Store the coordinate reference system that an object names (GeoJSON before RFC 7946).
 
         Raise MapError if it differs from the one of an earlier object.
@@ -283,9 +287,9 @@ class GeometryCollector:
             return
         name = files.get_member(files.get_member(value, "properties"), "name")
         if not isinstance(name, str):
-            raise self.file.build_error((*place, "crs"), value, "the name of a reference system")
+            raise self.file.build_error((*location, "crs"), value, "the name of a reference system")
         if self.crs not in (None, name):
-            raise self.file.build_error((*place, "crs"), value, f"the same system as before, {self.crs}")
+            raise self.file.build_error((*location, "crs"), value, f"the same system as before, {self.crs}")
         self.crs = name
 
 

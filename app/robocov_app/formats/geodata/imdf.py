@@ -232,8 +232,8 @@ def _parse_levels(archive: _Archive) -> dict[str, _Level]:
         if not isinstance(identifier, str):
             raise file.build_error(("features", k, "id"), identifier, "a string")
         if not is_number(ordinal):
-            place = ("features", k, "properties", "ordinal")
-            raise file.build_error(place, ordinal, "a floor number")
+            location = ("features", k, "properties", "ordinal")
+            raise file.build_error(location, ordinal, "a floor number")
         short_names = _list_names(properties.get("short_name"))
         names = (identifier, *short_names, *_list_names(properties.get("name")))
         levels[identifier] = _Level(float(ordinal), names)
@@ -322,12 +322,12 @@ def _collect_geometries(
         shapes.count_omission("feature", "without a geometry")
         return []
     collector = GeometryCollector(file, shapes)
-    place = ("features", index, "geometry")
-    collector.add_geometry(feature["geometry"], place, tuple(dict.fromkeys(labels)))
+    location = ("features", index, "geometry")
+    collector.add_geometry(feature["geometry"], location, tuple(dict.fromkeys(labels)))
     return collector.geometries
 
 
 def _straighten(geometry: SourceGeometry) -> SourceGeometry:
     """Return the straight line from the first point of an opening to the last."""
     line = geometry.rings[0]
-    return SourceGeometry("line", (line[[0, -1]],), geometry.labels, geometry.place)
+    return SourceGeometry("line", (line[[0, -1]],), geometry.labels, geometry.location)

@@ -124,7 +124,7 @@ def measure_caption_indent(page: FigurePage, name: str) -> float:
 
 
 def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list[str]:
-    """Wrap the lines of the report to `max_width`, px; if there are too many, the last one says how many."""
+    """Wrap the lines of the report to `max_width`, px; the last one gives the number of lines left out."""
     wrapped: list[str] = []
     for line in lines:
         wrapped += _wrap_line(page, line, max_width)

@@ -77,8 +77,10 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     is_unknown = cells == _UNKNOWN_CHARACTER
     if is_unknown.any():
         row, column = np.argwhere(is_unknown)[0].tolist()
-        place = f"{source_name}: line {header.body_line + row}, column {column + 1}"
-        raise MapError(f"{place}: expected one of . G S @ O T W, got {quote(chr(characters[row, column]))}")
+        location = f"{source_name}: line {header.body_line + row}, column {column + 1}"
+        raise MapError(
+            f"{location}: expected one of . G S @ O T W, got {quote(chr(characters[row, column]))}"
+        )
     cell = get_or_default(options.cell, DEFAULT_CELL_M)
     notes: tuple[str, ...] = ()
     if options.cell is None:
@@ -140,33 +142,33 @@ def _parse_header(content: bytes, source_name: str) -> _Header:
             line = content[at:limit]
             at = len(content)
         words = line.decode("ascii", "replace").split()
-        place = f"{source_name}: line {number}"
+        location = f"{source_name}: line {number}"
         if not words:
             continue
         if len(words) == 1 and words[0].lower() == "map":
             for key in ("height", "width"):
                 if key not in sizes:
-                    raise MapError(f"{place}: expected {key} first")
+                    raise MapError(f"{location}: expected {key} first")
             files.require_cells(sizes["width"], sizes["height"], source_name)
             return _Header(sizes["width"], sizes["height"], content[at:], number + 1)
-        _parse_header_line(words, sizes, place)
+        _parse_header_line(words, sizes, location)
     raise MapError(f"{source_name}: expected a line map after type, height and width, got none")
 
 
-def _parse_header_line(words: list[str], sizes: dict[str, int], place: str) -> None:
+def _parse_header_line(words: list[str], sizes: dict[str, int], location: str) -> None:
     """Parse a line of the header; a height or width is added to `sizes`."""
     key = words[0].lower()
     value = words[1] if len(words) == 2 else ""
     if key == "type" and value:
         if value.lower() not in ("octile", "tile"):
-            raise MapError(f"{place}: expected octile, got type {quote(value)}")
+            raise MapError(f"{location}: expected octile, got type {quote(value)}")
     elif key in ("height", "width") and value.isascii() and value.isdigit():
         if len(value) > _MAX_SIZE_DIGITS:
-            raise MapError(f"{place}: expected a smaller {key}, got {quote(value)}")
+            raise MapError(f"{location}: expected a smaller {key}, got {quote(value)}")
         sizes[key] = int(value)
     else:
         expected = "expected type octile, height N, width N or map"
-        raise MapError(f"{place}: {expected}, got {quote(' '.join(words))}")
+        raise MapError(f"{location}: {expected}, got {quote(' '.join(words))}")
 
 
 def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

@@ -131,10 +131,10 @@ def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> 
     elif tag == "box":
         ring = UNIT_SQUARE * _parse_lengths(element, "size")[:2]
         frame = build_frame(position[0], position[1], math.radians(angles[0]))
-        shapes.add_outline([transform_points(frame, ring)], labels, place=f"line {element.line}")
+        shapes.add_outline([transform_points(frame, ring)], labels, location=f"line {element.line}")
     else:
         radius = float(_parse_lengths(element, "radius", count=1)[0])
-        shapes.add_circle(position[:2], radius, labels, place=f"line {element.line}")
+        shapes.add_circle(position[:2], radius, labels, location=f"line {element.line}")
 
 
 def _parse_lengths(element: Element, name: str, count: int = 3) -> Array:

@@ -44,7 +44,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     require_shapes(len(polygons), shapes.source_name)
     scale = get_or_default(options.scale, 1.0)
     for number, rings in enumerate(polygons, start=1):
-        shapes.add_outline([ring * scale for ring in rings], place=f"polygon {number}")
+        shapes.add_outline([ring * scale for ring in rings], location=f"polygon {number}")
     remark = "" if options.scale else " (the file says none; --scale)"
     shapes.notes = [f"a unit is {scale:g} m{remark}"]
     return shapes.build_foreign_map(get_map_name(path), "Imported from rings.", solid=False, overlap=True)
@@ -87,23 +87,23 @@ class _RingParser:
         expected = f"growing indices of vertices, from 1 to {len(points) - 1}"
         raise self.file.build_error(("holes",), holes, expected)
 
-    def _parse_polygon(self, value: Any, place: JsonPath) -> list[Array]:
+    def _parse_polygon(self, value: Any, location: JsonPath) -> list[Array]:
         if not isinstance(value, list) or not value:
-            raise self.file.build_error(place, value, "a list of rings")
-        return [self._parse_ring(ring, (*place, k)) for k, ring in enumerate(value)]
+            raise self.file.build_error(location, value, "a list of rings")
+        return [self._parse_ring(ring, (*location, k)) for k, ring in enumerate(value)]
 
-    def _parse_ring(self, value: Any, place: JsonPath) -> Array:
-        points = self.file.parse_points(value, place, min_count=1, min_dimensions=2, max_dimensions=3)
+    def _parse_ring(self, value: Any, location: JsonPath) -> Array:
+        points = self.file.parse_points(value, location, min_count=1, min_dimensions=2, max_dimensions=3)
         return self.shapes.drop_heights(points)
 
-    def _parse_flat_ring(self, value: Any, place: JsonPath, dimensions: int) -> Array:
+    def _parse_flat_ring(self, value: Any, location: JsonPath, dimensions: int) -> Array:
         """Return the points of a flat list of coordinates, `dimensions` of them for each point."""
         is_list = isinstance(value, list)
         if not is_list or len(value) % dimensions or len(value) < 3 * dimensions:
-            raise self.file.build_error(place, value, f"at least 3 times {dimensions} numbers")
+            raise self.file.build_error(location, value, f"at least 3 times {dimensions} numbers")
         rows = [value[k : k + dimensions] for k in range(0, len(value), dimensions)]
         points = self.file.parse_points(
-            rows, place, min_count=3, min_dimensions=dimensions, max_dimensions=dimensions
+            rows, location, min_count=3, min_dimensions=dimensions, max_dimensions=dimensions
         )
         return self.shapes.drop_heights(points)
 

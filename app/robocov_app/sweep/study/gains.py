@@ -146,10 +146,10 @@ def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) ->
     # The path leads to the value of the gain, or to an item in a list of values.
     is_list_item = isinstance(path[-1], int)
     controller_path = path[:-2] if is_list_item else path[:-1]
-    place = format_path(controller_path)
+    location = format_path(controller_path)
     if not known:
-        raise ParameterError(f"{place}: expected no gains, as the controller has none, got {quote(name)}")
-    raise ParameterError(f"{place}: {describe_unknown_name('gain', name, known)}")
+        raise ParameterError(f"{location}: expected no gains, as the controller has none, got {quote(name)}")
+    raise ParameterError(f"{location}: {describe_unknown_name('gain', name, known)}")
 
 
 def _parse_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: JsonPath) -> Range:

@@ -84,6 +84,8 @@ def require_distinct(values: Sequence[object], path: JsonPath) -> None:
         key = tuple(value.items()) if isinstance(value, Mapping) else value
         first_index = first_indices.setdefault(key, index)
         if first_index < index:
-            place = format_path((*path, index))
-            first_place = format_path((*path, first_index))
-            raise ParameterError(f"{place}: duplicate value {quote(value)}, already given at {first_place}")
+            location = format_path((*path, index))
+            first_location = format_path((*path, first_index))
+            raise ParameterError(
+                f"{location}: duplicate value {quote(value)}, already given at {first_location}"
+            )

@@ -53,9 +53,9 @@ class ExceptionLog:
             One sentence with the exception and where the log is.
         """
         self.count += 1
-        place = _find_place(error)
-        self._counts[place] += 1
-        count = self._counts[place]
+        location = _find_location(error)
+        self._counts[location] += 1
+        count = self._counts[location]
         # True for the powers of ten: 1, 10, 100, ...
         if str(count).strip("0") == "1":
             self._write(error, action, count)
@@ -113,7 +113,7 @@ def describe_os_error(error: OSError) -> str:
     return remove_controls(reason, single_line=True)
 
 
-def _find_place(error: BaseException) -> tuple[str, str, int]:
+def _find_location(error: BaseException) -> tuple[str, str, int]:
     """Return the type of an exception, and the file and line number at which it was raised."""
     frames = traceback.extract_tb(error.__traceback__, limit=-1)
     if not frames:

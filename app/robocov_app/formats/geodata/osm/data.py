@@ -45,7 +45,7 @@ class OsmElement:
     members: list[int] = field(default_factory=list)
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         """Kind and id, for messages."""
         return f"{self.kind} {self.id}"
 

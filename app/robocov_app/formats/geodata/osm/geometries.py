@@ -12,7 +12,7 @@ _WIDTH = re.compile(r"(\d{1,3}(?:\.\d+)?)\s*m?")
 
 def to_point(data: OsmData, node: OsmElement) -> SourceGeometry:
     """Return a node as a point."""
-    return SourceGeometry("point", (data.get_point(node)[None],), node.labels, node.place)
+    return SourceGeometry("point", (data.get_point(node)[None],), node.labels, node.location)
 
 
 def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | None:
@@ -21,7 +21,7 @@ def to_line(data: OsmData, way: OsmElement, shapes: Shapes) -> SourceGeometry | 
     if lines is None:
         shapes.count_omission("way", "with missing nodes")
         return None
-    return SourceGeometry("line", (lines[0],), way.labels, way.place, width=parse_width(way.tags))
+    return SourceGeometry("line", (lines[0],), way.labels, way.location, width=parse_width(way.tags))
 
 
 def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeometry | None:
@@ -38,7 +38,7 @@ def to_polygon(data: OsmData, element: OsmElement, shapes: Shapes) -> SourceGeom
     if not all((ring[0] == ring[-1]).all() for ring in rings):
         shapes.count_omission(element.kind, "that is not closed")
         return None
-    return SourceGeometry("polygon", tuple(rings), element.labels, element.place, rule="evenodd")
+    return SourceGeometry("polygon", tuple(rings), element.labels, element.location, rule="evenodd")
 
 
 def parse_width(tags: dict[str, str]) -> float | None:

@@ -176,7 +176,7 @@ def _find_doors(data: OsmData, doors: list[OsmElement], walls: list[OsmElement])
         line = data.get_lines(OsmElement("way", door.id, members=[before, door.id, after]))
         if line is not None:
             width = parse_width(door.tags)
-            lines.append(SourceGeometry("line", (line[0],), ("door",), door.place, width=width))
+            lines.append(SourceGeometry("line", (line[0],), ("door",), door.location, width=width))
     return lines
 
 
@@ -214,4 +214,4 @@ def _build_opening(door: SourceGeometry) -> SourceGeometry:
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M
     half: Array = direction * (width / 2 / max(length, _MIN_LENGTH_M))
-    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.place)
+    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.location)

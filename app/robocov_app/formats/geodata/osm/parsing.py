@@ -140,54 +140,54 @@ def _read_json(path: Path) -> OsmData:
     return data
 
 
-def _add_json_element(data: OsmData, file: JsonFile, value: Any, place: JsonPath) -> None:
+def _add_json_element(data: OsmData, file: JsonFile, value: Any, location: JsonPath) -> None:
     """Add a node, way or relation, unless it was deleted; other kinds of elements are skipped."""
     if not isinstance(value, dict):
-        raise file.build_error(place, value, "an element of OpenStreetMap")
+        raise file.build_error(location, value, "an element of OpenStreetMap")
     kind = value.get("type")
     if kind not in ("node", "way", "relation"):  # such as the areas and counts of Overpass
         return
     number = value.get("id")
     if type(number) is not int:
-        raise file.build_error((*place, "id"), number, "a whole number")
+        raise file.build_error((*location, "id"), number, "a whole number")
     if value.get("action") == "delete" or value.get("visible") is False:
         return
-    element = OsmElement(kind, number, _parse_json_tags(file, value, place))
+    element = OsmElement(kind, number, _parse_json_tags(file, value, location))
     if kind == "node":
-        longitude, latitude = _parse_json_point(file, value, place)
+        longitude, latitude = _parse_json_point(file, value, location)
         data.add_node(number, longitude, latitude)
     elif kind == "way":
-        element.members = _parse_json_nodes(data, file, value, place)
+        element.members = _parse_json_nodes(data, file, value, location)
     else:
-        element.members = _parse_json_ways(data, file, value, place)
+        element.members = _parse_json_ways(data, file, value, location)
     data.add_element(element)
 
 
-def _parse_json_tags(file: JsonFile, value: dict[str, Any], place: JsonPath) -> dict[str, str]:
+def _parse_json_tags(file: JsonFile, value: dict[str, Any], location: JsonPath) -> dict[str, str]:
     tags = value.get("tags", {})
     if not isinstance(tags, dict):
-        raise file.build_error((*place, "tags"), tags, "an object")
+        raise file.build_error((*location, "tags"), tags, "an object")
     return {key: text for key, text in tags.items() if key in USED_TAGS and isinstance(text, str)}
 
 
-def _parse_json_point(file: JsonFile, value: Any, place: JsonPath) -> tuple[float, float]:
+def _parse_json_point(file: JsonFile, value: Any, location: JsonPath) -> tuple[float, float]:
     if not isinstance(value, dict):
-        raise file.build_error(place, value, "lat and lon")
+        raise file.build_error(location, value, "lat and lon")
     for key, limit in (("lon", 360.0), ("lat", 90.0)):
         degrees = value.get(key)
         if not is_number(degrees) or not abs(degrees) <= limit:  # type: ignore[arg-type]
-            raise file.build_error((*place, key), degrees, "degrees")
+            raise file.build_error((*location, key), degrees, "degrees")
     return float(value["lon"]), float(value["lat"])
 
 
-def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], place: JsonPath) -> list[int]:
+def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], location: JsonPath) -> list[int]:
     """Return the ids of the nodes of a way, and add the positions that the way contains (``out geom``)."""
     numbers = value.get("nodes", [])
     if not isinstance(numbers, list) or not all(type(number) is int for number in numbers):
-        raise file.build_error((*place, "nodes"), numbers, "a list of whole numbers")
+        raise file.build_error((*location, "nodes"), numbers, "a list of whole numbers")
     if "geometry" not in value:
         return numbers
-    line = _parse_json_line(file, value["geometry"], (*place, "geometry"))
+    line = _parse_json_line(file, value["geometry"], (*location, "geometry"))
     # A way may have positions without ids: its nodes get new ones.
     if len(line) != len(numbers):
         return data.add_line(line)
@@ -198,35 +198,35 @@ def _parse_json_nodes(data: OsmData, file: JsonFile, value: dict[str, Any], plac
     return numbers
 
 
-def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], place: JsonPath) -> list[int]:
+def _parse_json_ways(data: OsmData, file: JsonFile, value: dict[str, Any], location: JsonPath) -> list[int]:
     """Return the ids of the ways of a relation, and add the ways that it contains (``out geom``)."""
     members = value.get("members", [])
     if not isinstance(members, list):
-        raise file.build_error((*place, "members"), members, "a list of members")
+        raise file.build_error((*location, "members"), members, "a list of members")
     numbers = []
     for k, member in enumerate(members):
-        member_place = (*place, "members", k)
+        member_location = (*location, "members", k)
         if not isinstance(member, dict):
-            raise file.build_error(member_place, member, "a member of a relation")
+            raise file.build_error(member_location, member, "a member of a relation")
         if member.get("type") != "way":
             continue
         number = member.get("ref")
         if type(number) is not int:
-            raise file.build_error((*member_place, "ref"), number, "a whole number")
+            raise file.build_error((*member_location, "ref"), number, "a whole number")
         numbers.append(number)
         if "geometry" in member and number not in data.ways:
-            line = _parse_json_line(file, member["geometry"], (*member_place, "geometry"))
+            line = _parse_json_line(file, member["geometry"], (*member_location, "geometry"))
             data.add_element(OsmElement("way", number, members=data.add_line(line)))
     return numbers
 
 
-def _parse_json_line(file: JsonFile, value: Any, place: JsonPath) -> list[tuple[float, float] | None]:
+def _parse_json_line(file: JsonFile, value: Any, location: JsonPath) -> list[tuple[float, float] | None]:
     """Return the points of a line, with None for points outside the query's bounding box."""
     if not isinstance(value, list):
-        raise file.build_error(place, value, "a list of lat and lon")
+        raise file.build_error(location, value, "a list of lat and lon")
     line: list[tuple[float, float] | None] = []
     for k, point in enumerate(value):
-        line.append(None if point is None else _parse_json_point(file, point, (*place, k)))
+        line.append(None if point is None else _parse_json_point(file, point, (*location, k)))
     return line
 
 

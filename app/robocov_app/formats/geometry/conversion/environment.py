@@ -218,7 +218,7 @@ def _report_deviation(deviation: Deviation, free: MultiPolygon, conversion: Conv
 
 
 def _report_unreachable(environment: Environment, conversion: Conversion) -> None:
-    """Note the regions that a robot cannot reach from the largest one."""
+    """Report the regions that a robot cannot reach from the largest one."""
     if shapely.get_num_coordinates(environment.free) > _MAX_CHECKED_VERTICES:
         return
     areas = sorted((room.area for room in find_rooms(environment.free, conversion.radius)), reverse=True)

@@ -162,7 +162,9 @@ def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOu
         neighbors = np.sort(tree.query(current.area, "dwithin", distance=drawing.snap))
         for k in neighbors.tolist():
             neighbor: ClosedOutline = outlines[k]
-            has_same_parent = neighbor.parent_place != "" and neighbor.parent_place == largest.parent_place
+            has_same_parent = (
+                neighbor.parent_location != "" and neighbor.parent_location == largest.parent_location
+            )
             if neighbor in members or not (k in containers or has_same_parent):
                 continue
             if are_edge_to_edge(current.area, neighbor.area, drawing.snap):
@@ -198,7 +200,7 @@ def _find_covering_outline(drawing: Drawing) -> Boundary | None:
     members = {
         outline
         for outline in drawing.outlines
-        if outline.parent_place != "" and outline.parent_place == largest.parent_place
+        if outline.parent_location != "" and outline.parent_location == largest.parent_location
     }
     if len(members) == len(drawing.outlines):
         members = set()

@@ -102,19 +102,19 @@ class Shapes:
         if not self.accept(geometry.labels):
             return
         if geometry.kind == "point":
-            self.add_point(geometry.rings[0][0], geometry.labels, place=geometry.place)
+            self.add_point(geometry.rings[0][0], geometry.labels, location=geometry.location)
         elif geometry.kind == "line":
             width = self.thickness
             if geometry.width and self.options.thickness is None:
                 width = geometry.width
-            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), place=geometry.place)
+            self.add_line(WallLine(geometry.rings[0], width, geometry.labels), location=geometry.location)
         else:
             self.add_outline(
                 geometry.rings,
                 geometry.labels,
                 rule=geometry.rule,
-                place=geometry.place,
-                parent_place=geometry.parent_place,
+                location=geometry.location,
+                parent_location=geometry.parent_location,
             )
 
     def add_outline(
@@ -123,9 +123,9 @@ class Shapes:
         labels: Sequence[str] = (),
         *,
         rule: Rule = "holes",
-        place: str = "",
-        thing: str = "outline",
-        parent_place: str = "",
+        location: str = "",
+        kind: str = "outline",
+        parent_location: str = "",
         paint: Paint = UNPAINTED,
     ) -> bool:
         """Add the area that rings enclose.
@@ -136,12 +136,12 @@ class Shapes:
         labels : sequence of str
         rule : str
             See `enclosed_area.find_enclosed_area`.
-        place : str
-            Place in the file, for messages.
-        thing : str
+        location : str
+            Location in the file, for messages.
+        kind : str
             Kind of shape, for the report if it is left out because it encloses no area. If empty, such a
             shape is not reported.
-        parent_place : str
+        parent_location : str
             See `SourceGeometry`.
         paint : Paint
 
@@ -150,16 +150,18 @@ class Shapes:
         bool
             Whether the rings enclose an area.
         """
-        enclosed = find_enclosed_area(self._check_rings(rings, place), rule, self._crossings)
+        enclosed = find_enclosed_area(self._check_rings(rings, location), rule, self._crossings)
         for reason, count in enclosed.lost_holes.items():
             self.count_omission("hole", reason, count)
         if enclosed.invalidity is not None:
-            self.repairs.add_self_crossing(enclosed.invalidity, place)
+            self.repairs.add_self_crossing(enclosed.invalidity, location)
         if enclosed.area.is_empty:
-            if thing:
-                self.count_omission(thing, "without an area")
+            if kind:
+                self.count_omission(kind, "without an area")
             return False
-        self._store_outline(ClosedOutline(enclosed.area, tuple(labels), parent_place=parent_place), paint)
+        self._store_outline(
+            ClosedOutline(enclosed.area, tuple(labels), parent_location=parent_location), paint
+        )
         return True
 
     def add_circle(
@@ -168,13 +170,13 @@ class Shapes:
         radius: float,
         labels: Sequence[str] = (),
         *,
-        place: str = "",
+        location: str = "",
         paint: Paint = UNPAINTED,
     ) -> None:
         """Add a disc with a center, (2,) m, and a radius, m."""
-        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], place)
+        self._check_rings([center + np.array([[-radius, -radius], [radius, radius]])], location)
         circle = CircleObstacle((float(center[0]), float(center[1])), radius, get_obstacle_name(labels))
-        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], place)
+        (ring,) = self._check_rings([np.asarray(circle.polygon.exterior.coords)[:-1]], location)
         self._store_outline(ClosedOutline(MultiPolygon([Polygon(ring)]), tuple(labels), circle), paint)
 
     def _store_outline(self, outline: ClosedOutline, paint: Paint) -> None:
@@ -191,12 +193,12 @@ class Shapes:
         edges = tuple(replace(line, order=last.order) for line in lines)
         self.outlines[-1] = replace(last, edges=edges)
 
-    def add_line(self, line: WallLine, *, place: str = "") -> None:
+    def add_line(self, line: WallLine, *, location: str = "") -> None:
         """Add a wall; raise MapError if a coordinate or the width is out of range."""
-        (points,) = self._check_rings([line.points], place)
+        (points,) = self._check_rings([line.points], location)
         width = max(line.width, 0.0)
-        width_place = ": ".join(filter(None, (self.source_name, place, "width")))
-        files.require_length(width, width_place, 0.0)
+        width_location = ": ".join(filter(None, (self.source_name, location, "width")))
+        files.require_length(width, width_location, 0.0)
         if width < MIN_SIZE_M:
             self.repairs.counts["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
             width = MIN_SIZE_M
@@ -205,9 +207,9 @@ class Shapes:
             return
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
-    def add_point(self, point: Array, labels: Sequence[str] = (), *, place: str = "") -> None:
+    def add_point(self, point: Array, labels: Sequence[str] = (), *, location: str = "") -> None:
         """Add a point, (2,) m; it becomes a pillar if the option ``pillar`` is given, else it is left out."""
-        ((x, y),) = self._check_rings([point[None]], place)[0].tolist()
+        ((x, y),) = self._check_rings([point[None]], location)[0].tolist()
         if self.options.pillar is None:
             self.count_omission("point", "(--pillar RADIUS makes pillars of them)")
         else:
@@ -238,14 +240,14 @@ class Shapes:
             ]
 
     def build_polygon(
-        self, rings: Iterable[Array], labels: tuple[str, ...], place: str, parent_place: str = ""
+        self, rings: Iterable[Array], labels: tuple[str, ...], location: str, parent_location: str = ""
     ) -> SourceGeometry:
         """Build a polygon of a format that requires closed rings; open rings are counted as repaired."""
         rings = tuple(rings)
         unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
         if unclosed:
             self.repairs.counts["ring", "closed: the last point was not the first"] += unclosed
-        return SourceGeometry("polygon", rings, labels, place, parent_place=parent_place)
+        return SourceGeometry("polygon", rings, labels, location, parent_location=parent_location)
 
     def drop_heights(self, points: Array) -> Array:
         """Return points without their third coordinate, (k, 2); the report mentions dropped coordinates."""
@@ -267,7 +269,7 @@ class Shapes:
         self.vertices += number
         files.require_vertices(self.vertices, self.source_name)
 
-    def _check_rings(self, rings: Sequence[Array], place: str) -> list[Array]:
+    def _check_rings(self, rings: Sequence[Array], location: str) -> list[Array]:
         """Count and round the points of rings; raise MapError if a coordinate is out of range."""
         self.count_vertices(sum(map(len, rings)))
         for ring in rings:
@@ -275,8 +277,8 @@ class Shapes:
             if not is_valid.all():
                 x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
                 location = self.source_name
-                if place:
-                    location = f"{self.source_name}: {place}"
+                if location:
+                    location = f"{self.source_name}: {location}"
                 expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
                 raise MapError(f"{location}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
@@ -356,7 +358,7 @@ class Shapes:
 
 
 def note_colors(shapes: Shapes, key: ColorKey) -> None:
-    """Note how often declared colors occur; if none of a role does, note which colors the file has."""
+    """Report how often declared colors occur; if none of a role does, list the colors in the file."""
     painted: list[ClosedOutline | WallLine] = [*shapes.outlines, *shapes.lines, *_list_edges(shapes)]
     for role in ("free", "solid"):
         declared = [color for color, its_role in key.entries if its_role == role]

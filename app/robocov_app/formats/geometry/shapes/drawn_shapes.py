@@ -31,23 +31,23 @@ class SourceGeometry:
     rings : tuple of (k, 2) arrays
         Rings of a polygon; a line or a point is a single array.
     labels : tuple of str
-    place : str
-        Place in the file, for messages.
+    location : str
+        Location in the file, for messages.
     rule : str
         See `enclosed_area.find_enclosed_area`.
     width : float or None, m
         Width of a line, if the file gives it.
-    parent_place : str
-        If this is one of several parts of a geometry: the place of that geometry in the file.
+    parent_location : str
+        If this is one of several parts of a geometry: the location of that geometry in the file.
     """
 
     kind: Kind
     rings: tuple[Array, ...]
     labels: tuple[str, ...] = ()
-    place: str = ""
+    location: str = ""
     rule: Rule = "holes"
     width: float | None = None
-    parent_place: str = ""
+    parent_location: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class ClosedOutline:
         Names of the shape, the most specific one first.
     circle : CircleObstacle or None
         The disc, if the outline is a circle.
-    parent_place : str
+    parent_location : str
         See `SourceGeometry`.
     color : Color or None
         Color of the fill on a white page, if known.
@@ -77,7 +77,7 @@ class ClosedOutline:
     area: MultiPolygon
     labels: tuple[str, ...] = ()
     circle: CircleObstacle | None = None
-    parent_place: str = ""
+    parent_location: str = ""
     color: Color | None = None
     role: Role | None = None
     order: int = 0

@@ -187,7 +187,7 @@ def _report_pale(
     floors: _PaleFloors,
     report: InterpretationReport,
 ) -> None:
-    """Note which pale fills are treated as floors, and which pale paint is treated as solid."""
+    """Report which pale fills are treated as floors, and which pale paint is treated as solid."""
     rest = [outline for outline in undecided if outline not in floors.outlines]
     pale = [outline.color for outline in rest if is_pale(outline.color)]
     pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]

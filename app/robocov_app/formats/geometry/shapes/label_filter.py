@@ -29,13 +29,13 @@ class LabelFilter:
         self._known: dict[str, str] = {}
 
     def register_and_fold(self, labels: Iterable[str]) -> set[str]:
-        """Remember that labels occur in the file, and return them in lower case, as they are compared."""
+        """Record the labels that occur in the file, and return them in lower case, as they are compared."""
         label_by_folded = {label.casefold(): label for label in labels}
         self._known |= label_by_folded
         return set(label_by_folded)
 
     def accepts(self, labels: Iterable[str]) -> bool:
-        """Remember that labels occur in the file, and return whether to read a shape with these labels."""
+        """Record the labels that occur in the file, and return whether to read a shape with these labels."""
         folded_labels = self.register_and_fold(labels)
         if self.only is not None and not self.only & folded_labels:
             return False

@@ -170,7 +170,7 @@ def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
     walls = shapely.intersection(shapely.boundary(parts[first]), reach[second])
     walls = np.array([_find_longest(wall) for wall in walls], dtype=object)
     # The width of a gap is measured at three points of its wall.
-    widths = np.stack([_measure_distances(walls, parts[second], place) for place in (0.25, 0.5, 0.75)])
+    widths = np.stack([_measure_distances(walls, parts[second], location) for location in (0.25, 0.5, 0.75)])
     # Where the gaps between four rooms cross, only the corners of diagonally opposite rooms are close to each
     # other. Their wall is short, and there is no gap to close between them.
     is_long = shapely.length(walls) > _MIN_LENGTH * tolerance

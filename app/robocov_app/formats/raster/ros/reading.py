@@ -51,7 +51,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         path,
         metadata.image,
         "image",
-        place=f"{source_name}: image",
+        location=f"{source_name}: image",
         notes=repaired,
         allow_anywhere=options.anywhere,
     )

@@ -197,16 +197,16 @@ class ObstacleReader:
     def _add_shape(self, element: Element, shape: ObjectShape, labels: tuple[str, ...]) -> None:
         """Add an obstacle whose points are in pixels on the map."""
         shapes = self._shapes
-        place = f"line {element.line}"
+        location = f"line {element.line}"
         points = self._frame.to_meters(shape.points)
         if shape.kind == "line":
-            shapes.add_line(WallLine(points, shapes.thickness, labels), place=place)
+            shapes.add_line(WallLine(points, shapes.thickness, labels), location=location)
         elif shape.kind == "circle" and (points[0] != points[1]).any():
             radius = float(np.hypot(*(points[1] - points[0])))
-            shapes.add_circle(points[0], radius, labels, place=place)
+            shapes.add_circle(points[0], radius, labels, location=location)
         elif shape.kind == "point":
-            shapes.add_point(points[0], place=place)
+            shapes.add_point(points[0], location=location)
         else:
             is_polygon = shape.kind == "polygon"
-            if not is_polygon or not shapes.add_outline([points], labels, place=place, thing=""):
+            if not is_polygon or not shapes.add_outline([points], labels, location=location, kind=""):
                 shapes.count_omission("object", "that is a text or a template, or has no area")

@@ -73,16 +73,16 @@ def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Til
 
 def _read_file(element: Element, path: Path, shapes: Shapes, budget: files.IncludeBudget) -> Element:
     """Return the tileset in the file that an element names."""
-    place = f"{element.source_name}:{element.line}"
+    location = f"{element.source_name}:{element.line}"
     file = files.find_named_file(
         path,
         element.attributes["source"],
         "tileset",
-        place=place,
+        location=location,
         notes=shapes.notes,
         allow_anywhere=shapes.options.anywhere,
     )
-    budget.count_file(file, place)
+    budget.count_file(file, location)
     return read_xml_tree(file, "tileset", "TSX")
 
 

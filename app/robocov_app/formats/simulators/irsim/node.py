@@ -1,4 +1,4 @@
-"""Values of a YAML file with their places in it, which error messages name."""
+"""Values of a YAML file with their locations in it, which error messages name."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Node:
     ----------
     value : str, list, dict or None
         None if the file does not contain it.
-    place : str
+    location : str
         Place of the value, for messages, as in "world.yaml: obstacle[0].shape".
     """
 
     value: files.Value | None
-    place: str
+    location: str
 
     @property
     def is_given(self) -> bool:
@@ -37,7 +37,7 @@ class Node:
 
     def __getitem__(self, name: str) -> Node:
         """Return the value of a key; raise MapError if this value is not a mapping."""
-        prefix = self.place if self.place.endswith(": ") else f"{self.place}."
+        prefix = self.location if self.location.endswith(": ") else f"{self.location}."
         if isinstance(self.value, dict):
             return Node(self.value.get(name), f"{prefix}{name}")
         if self.is_given:
@@ -60,7 +60,7 @@ class Node:
         if not self.is_given:
             return []
         if isinstance(self.value, list):
-            return [Node(item, f"{self.place}[{k}]") for k, item in enumerate(self.value)]
+            return [Node(item, f"{self.location}[{k}]") for k, item in enumerate(self.value)]
         if not allow_single:
             self.raise_error("a list")
         return [self]
@@ -87,7 +87,7 @@ class Node:
     def parse_length(self, default: float) -> float:
         """Return the value as a positive length, m; raise MapError if it is out of range."""
         value = self.parse_number(default)
-        files.require_length(value, self.place)
+        files.require_length(value, self.location)
         return value
 
     def parse_numbers(self, default: list[float]) -> Array:
@@ -114,5 +114,5 @@ class Node:
         return np.array([*values, *default[len(values) :]])
 
     def raise_error(self, expected: str) -> NoReturn:
-        """Raise a MapError with the place of this value and a description of the expected one."""
-        raise MapError(f"{self.place}: expected {expected}, got {quote(self.value)}")
+        """Raise a MapError with the location of this value and a description of the expected one."""
+        raise MapError(f"{self.location}: expected {expected}, got {quote(self.value)}")

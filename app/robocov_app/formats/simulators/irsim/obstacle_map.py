@@ -37,19 +37,19 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
         If there is no such picture, or it cannot be read.
     """
     source = _get_source(world["obstacle_map"])
-    # Notes name the place without the file.
-    _, _, place = source.place.rpartition(": ")
+    # Notes name the location without the file.
+    _, _, location = source.location.rpartition(": ")
     file = files.find_named_file(
         path,
         source.get_text(),
         "image",
-        place=source.place,
+        location=source.location,
         notes=shapes.notes,
         allow_anywhere=shapes.options.anywhere,
     )
     if not file.is_file():
         file = _find_packaged_picture(source)
-        shapes.notes.append(f"{place}: {quote(file.name)} read from the installed ir-sim")
+        shapes.notes.append(f"{location}: {quote(file.name)} read from the installed ir-sim")
     picture = read_picture(file, to_one_line(file))
     step = int(world["mdownsample"].parse_number(1.0))
     if step < 1:
@@ -57,7 +57,7 @@ def read_obstacle_map(world: Node, path: Path, shapes: Shapes) -> BoolArray:
     is_free = 2 * picture.level.astype(np.uint32) >= picture.max_level
     transparency = describe_transparency(picture)
     if transparency:
-        shapes.notes.append(f"{place}: {transparency}")
+        shapes.notes.append(f"{location}: {transparency}")
         if not is_free.any():
             raise MapError(f"{to_one_line(file)}: no cell is free: {transparency}")
     # IR-SIM takes every nth row, counted from the bottom.
@@ -70,7 +70,7 @@ def _get_source(obstacle_map: Node) -> Node:
         return obstacle_map
     if obstacle_map["name"].get_text() != "image":
         name = quote(obstacle_map["name"].value)
-        raise MapError(f"{obstacle_map.place}: expected an image, got {name}, which IR-SIM generates")
+        raise MapError(f"{obstacle_map.location}: expected an image, got {name}, which IR-SIM generates")
     return obstacle_map["path"]
 
 
@@ -85,7 +85,9 @@ def _find_packaged_picture(source: Node) -> Path:
         If IR-SIM is not installed, or has no such picture.
     """
     name = source.get_text()
-    missing = f"{source.place}: expected an image next to the file, or an image of IR-SIM, got {quote(name)}"
+    missing = (
+        f"{source.location}: expected an image next to the file, or an image of IR-SIM, got {quote(name)}"
+    )
     package = importlib.util.find_spec("irsim")
     if package is None or not package.submodule_search_locations:
         raise MapError(f"{missing}. IR-SIM is not installed (pip install ir-sim).")

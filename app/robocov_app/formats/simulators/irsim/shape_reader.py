@@ -54,10 +54,12 @@ class ShapeReader:
             self._add_rectangle(shape, frame, labels, shift)
         elif name == "polygon":
             points = _parse_vertices(shape, frame, minimum=3)
-            self._shapes.add_outline([points], labels, place=_get_place(shape), thing="polygon")
+            self._shapes.add_outline([points], labels, location=_get_location(shape), kind="polygon")
         elif name == "linestring":
             points = _parse_vertices(shape, frame, minimum=2)
-            self._shapes.add_line(WallLine(points, self._shapes.thickness, labels), place=_get_place(shape))
+            self._shapes.add_line(
+                WallLine(points, self._shapes.thickness, labels), location=_get_location(shape)
+            )
         elif name == "compound":
             for part in shape["parts"].list_items():
                 pose = part["pose"].parse_numbers([0.0, 0.0, 0.0])[:3]
@@ -70,19 +72,19 @@ class ShapeReader:
         center = shape["center"].parse_numbers([0.0, 0.0])[:2] + shift
         radius = shape["radius"].parse_length(_DEFAULT_RADIUS_M)
         (center,) = transform_points(frame, center[None])
-        self._shapes.add_circle(center, radius, labels, place=_get_place(shape))
+        self._shapes.add_circle(center, radius, labels, location=_get_location(shape))
 
     def _add_rectangle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
         length = shape["length"].parse_length(_DEFAULT_SIDE_M)
         width = shape["width"].parse_length(_DEFAULT_SIDE_M)
         ring = transform_points(frame, UNIT_SQUARE * [length, width] + shift)
-        self._shapes.add_outline([ring], labels, place=_get_place(shape))
+        self._shapes.add_outline([ring], labels, location=_get_location(shape))
 
 
-def _get_place(shape: Node) -> str:
-    """Return the place of a shape for messages, without the name of the file."""
-    _, _, place = shape.place.partition(": ")
-    return place
+def _get_location(shape: Node) -> str:
+    """Return the location of a shape for messages, without the name of the file."""
+    _, _, location = shape.location.partition(": ")
+    return location
 
 
 def _parse_vertices(shape: Node, frame: Array, *, minimum: int) -> Array:

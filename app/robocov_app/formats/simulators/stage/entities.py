@@ -23,7 +23,7 @@ class Entity:
     ----------
     type : str
         Type of the entity, or name of the macro on which it is based.
-    place : str
+    location : str
         File and line, for messages.
     properties : dict of str to list of str
         Values of each property.
@@ -32,7 +32,7 @@ class Entity:
     """
 
     type: str
-    place: str
+    location: str
     properties: dict[str, list[str]] = field(default_factory=dict)
     children: list[Entity] = field(default_factory=list)
 
@@ -67,7 +67,9 @@ class Entity:
         numbers = [files.parse_number(text) for text in texts]
         values = np.array([*numbers, *default[len(texts) :]])
         if not (np.abs(values) <= MAX_COORDINATE_M).all():
-            raise MapError(f"{self.place}: expected numbers within 1e7, got {name} {quote(' '.join(texts))}")
+            raise MapError(
+                f"{self.location}: expected numbers within 1e7, got {name} {quote(' '.join(texts))}"
+            )
         return values
 
 
@@ -117,7 +119,7 @@ class _EntityParser:
     def parse_content(self, entity: Entity, depth: int) -> None:
         """Add properties and children to an entity, up to its closing bracket; at depth 0, up to the end."""
         if depth > files.MAX_DEPTH:
-            raise MapError(f"{entity.place}: nested deeper than {files.MAX_DEPTH}")
+            raise MapError(f"{entity.location}: nested deeper than {files.MAX_DEPTH}")
         while self._tokens:
             token = self._tokens.popleft()
             if depth and token.kind == ")":
@@ -129,13 +131,13 @@ class _EntityParser:
                 self._parse_macro(token, depth)
             elif self._peek_kind(0) == "(":
                 self._tokens.popleft()
-                child = Entity(token.text, token.place)
+                child = Entity(token.text, token.location)
                 entity.children.append(child)
                 self.parse_content(child, depth + 1)
             else:
                 entity.properties[token.text] = self._parse_values(token)
         if depth:
-            Token("", "the end of the file", entity.place).raise_error("a ) to close this bracket")
+            Token("", "the end of the file", entity.location).raise_error("a ) to close this bracket")
 
     def _peek_kind(self, index: int) -> str:
         """Return the kind of the token at an index from here on, or an empty string past the end."""
@@ -152,7 +154,7 @@ class _EntityParser:
         name = self._tokens.popleft()
         base = self._tokens.popleft()
         self._tokens.popleft()  # the bracket
-        macro = Entity(base.text, define.place)
+        macro = Entity(base.text, define.location)
         self.parse_content(macro, depth + 1)
         self.macros.setdefault(name.text, macro)
 

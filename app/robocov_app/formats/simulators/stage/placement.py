@@ -81,7 +81,7 @@ class ModelPlacer:
     world : World
     shapes : Shapes
     find_file : callable
-        ``find_file(name, kind, place=place)`` returns the path of a file that the world names.
+        ``find_file(name, kind, location=location)`` returns the path of a file that the world names.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class ModelPlacer:
         for given in entities:
             entity, labels = self._expand_macros(given)
             if depth > files.MAX_DEPTH:
-                raise MapError(f"{entity.place}: nested in more than {files.MAX_DEPTH} models")
+                raise MapError(f"{entity.location}: nested in more than {files.MAX_DEPTH} models")
             if entity.type in ("window", "block"):
                 continue
             model_frame = frame @ self._parse_pose(entity, "pose")
@@ -139,12 +139,12 @@ class ModelPlacer:
             chain.append(macros[chain[-1].type])
             if len(chain) > files.MAX_DEPTH:
                 raise MapError(
-                    f"{entity.place}: the model {quote(entity.type)} is defined in terms of itself"
+                    f"{entity.location}: the model {quote(entity.type)} is defined in terms of itself"
                 )
         self._entity_count += 1 + sum(len(base.children) for base in chain)
         if self._entity_count > MAX_ENTITIES:
-            raise MapError(f"{entity.place}: expected at most {MAX_ENTITIES} models and blocks, got more")
-        expanded = Entity(chain[-1].type, entity.place)
+            raise MapError(f"{entity.location}: expected at most {MAX_ENTITIES} models and blocks, got more")
+        expanded = Entity(chain[-1].type, entity.location)
         for base in reversed(chain):
             expanded.properties.update(base.properties)
             expanded.children.extend(base.children)
@@ -162,7 +162,7 @@ class ModelPlacer:
         """Add the outlines of a model: those in its bitmap, or else its blocks, or else its box."""
         size = entity.parse_numbers("size", (_DEFAULT_SIDE, _DEFAULT_SIDE)) * self._meters_per_unit
         for length in size.tolist():
-            files.require_length(length, f"{entity.place}: size")
+            files.require_length(length, f"{entity.location}: size")
         box = _ModelBox(frame, size)
         blocks = self._parse_blocks(entity)
         if "bitmap" in entity.properties:
@@ -178,11 +178,11 @@ class ModelPlacer:
         elif not entity.parse_number("noblocks", 0):
             rings = [np.asarray(box.polygon.exterior.coords)[:-1]]
         for ring in rings:
-            self._shapes.add_outline([ring], labels, place=entity.place, thing="block")
+            self._shapes.add_outline([ring], labels, location=entity.location, kind="block")
 
     def _add_bitmap(self, entity: Entity, box: _ModelBox, size: Array, labels: tuple[str, ...]) -> None:
         """Add a model with a bitmap to the floor plans."""
-        file = self._find_file(entity.get_text("bitmap"), "image", place=f"{entity.place}: bitmap")
+        file = self._find_file(entity.get_text("bitmap"), "image", location=f"{entity.location}: bitmap")
         bitmap = self._bitmaps.read(file)
         self._shapes.count_vertices(count_polygon_vertices(bitmap.free))
         cell = float(max(size[0] / bitmap.columns, size[1] / bitmap.rows))
@@ -228,5 +228,5 @@ def _parse_rings(entity: Entity) -> list[Array]:
     for prefix, points in rings.items():
         count = entity.parse_number(f"{prefix}points", len(points))
         if count != len(points):
-            raise MapError(f"{entity.place}: expected {count:g} points as stated, got {len(points)}")
+            raise MapError(f"{entity.location}: expected {count:g} points as stated, got {len(points)}")
     return [np.array([points[index] for index in sorted(points)]) for points in rings.values()]

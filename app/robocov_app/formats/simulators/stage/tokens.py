@@ -32,17 +32,17 @@ class Token(NamedTuple):
         "word", "number", "string", or the bracket itself.
     text : str
         The text of the token, without quotation marks.
-    place : str
+    location : str
         File and line, for messages.
     """
 
     kind: str
     text: str
-    place: str
+    location: str
 
     def raise_error(self, expected: str) -> NoReturn:
-        """Raise a MapError with the place of this token and a description of the expected one."""
-        raise MapError(f"{self.place}: expected {expected}, got {quote(self.text)}")
+        """Raise a MapError with the location of this token and a description of the expected one."""
+        raise MapError(f"{self.location}: expected {expected}, got {quote(self.text)}")
 
 
 def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
@@ -52,7 +52,7 @@ def read_tokens(path: Path, find_file: Callable[..., Path]) -> deque[Token]:
     ----------
     path : Path
     find_file : callable
-        ``find_file(name, kind, place=place)`` returns the path of a file that another file names.
+        ``find_file(name, kind, location=location)`` returns the path of a file that another file names.
 
     Raises
     ------
@@ -97,16 +97,16 @@ class _TokenReader:
 
     def _append(self, token: Token) -> None:
         if len(self.tokens) >= MAX_TOKENS:
-            raise MapError(f"{token.place}: expected at most {MAX_TOKENS} words and numbers, got more")
+            raise MapError(f"{token.location}: expected at most {MAX_TOKENS} words and numbers, got more")
         self.tokens.append(token)
 
     def _include(self, token: Token, open_files: tuple[Path, ...]) -> None:
         """Append the tokens of the file that a token names; raise MapError if it includes itself."""
         if token.kind != "string":
             token.raise_error("a file to include")
-        path = self._find_file(token.text, "file", place=token.place)
+        path = self._find_file(token.text, "file", location=token.location)
         includes_itself = any(path.resolve() == file.resolve() for file in open_files)
         if includes_itself or len(open_files) > files.MAX_DEPTH:
             token.raise_error("a file that does not include itself")
-        self._budget.count_file(path, token.place)
+        self._budget.count_file(path, token.location)
         self.read(path, (*open_files, path))

@@ -135,7 +135,7 @@ class EntityReader:
             if add is None:
                 self._shapes.count_omission(to_one_line(kind)[:_MAX_KIND_CHARACTERS])
             else:
-                add(entity, labels, _describe_place(entity))
+                add(entity, labels, _describe_location(entity))
 
     def _add_block(self, insert: Any, layer: str, blocks: tuple[str, ...]) -> None:
         """Add the entities of a block at each position where it is inserted."""
@@ -149,18 +149,18 @@ class EntityReader:
         for single in inserts:
             self._add_entities(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
 
-    def _add_point(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_point(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         (point,) = self._to_meters([entity.dxf.location])
-        self._shapes.add_point(point, place=place)
+        self._shapes.add_point(point, location=location)
 
-    def _add_segment(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
-        self._add_line(self._to_meters([entity.dxf.start, entity.dxf.end]), labels, place)
+    def _add_segment(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
+        self._add_line(self._to_meters([entity.dxf.start, entity.dxf.end]), labels, location)
 
-    def _add_quadrilateral(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_quadrilateral(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         ring = self._to_meters(entity.wcs_vertices())
-        self._shapes.add_outline([ring], labels, rule="evenodd", place=place)
+        self._shapes.add_outline([ring], labels, rule="evenodd", location=location)
 
-    def _add_hatch(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_hatch(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         """Add a hatch as an area, if the option ``hatches`` is set; otherwise count it as left out."""
         if not self._shapes.options.hatches:
             self._shapes.count_omission("HATCH", "(--hatches imports them as areas)")
@@ -171,25 +171,25 @@ class EntityReader:
         for path in from_hatch(entity):
             self._require_near(to_plane(path.control_vertices()))
             rings.append(self._to_meters(list(path.flattening(self._tolerance))))
-        self._shapes.add_outline(rings, labels, rule="evenodd", place=place)
+        self._shapes.add_outline(rings, labels, rule="evenodd", location=location)
 
-    def _add_circle(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_circle(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         """Add a circle as a disc, or as a curve if it is tilted."""
         is_disc = entity.dxf.radius and abs(entity.ocs().uz.z) > _MIN_UPWARD_COMPONENT
         if not is_disc:
-            self._add_curve(entity, labels, place)
+            self._add_curve(entity, labels, location)
             return
         radius = self._get_radius(entity)
         self._has_curves = True
         (center,) = self._to_meters([entity.ocs().to_wcs(entity.dxf.center)])
-        self._shapes.add_circle(center, radius * self._scale, labels, place=place)
+        self._shapes.add_circle(center, radius * self._scale, labels, location=location)
 
-    def _add_curve(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_curve(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         """Add a circle, arc, ellipse or spline as an outline if it is closed, otherwise as a wall."""
         points = self._flatten(entity)
         self._has_curves = True
         self._require_near(points)
-        self._add_line(points * self._scale, labels, place)
+        self._add_line(points * self._scale, labels, location)
 
     def _flatten(self, entity: Any) -> Array:
         """Approximate a circle, arc, ellipse or spline by points, (k, 2) in units of the drawing."""
@@ -203,7 +203,7 @@ class EntityReader:
         tolerance = min(self._tolerance, self._get_radius(entity) / 8)
         return to_plane(list(entity.flattening(tolerance)))
 
-    def _add_polyline(self, entity: Any, labels: tuple[str, ...], place: str) -> None:
+    def _add_polyline(self, entity: Any, labels: tuple[str, ...], location: str) -> None:
         """Add a polyline, whose edges may be arcs; it gets the largest width of its edges."""
         polyline = _parse_polyline(entity)
         if polyline is None:
@@ -225,17 +225,17 @@ class EntityReader:
             points = to_plane(list(plane.points_to_wcs(vectors)))
         self._require_near(points)
         width = max(polyline.width, float(rows[:, 3:].max()))
-        self._add_line(points * self._scale, labels, place, width * self._scale)
+        self._add_line(points * self._scale, labels, location, width * self._scale)
 
-    def _add_line(self, points: Array, labels: tuple[str, ...], place: str, width: float = 0.0) -> None:
+    def _add_line(self, points: Array, labels: tuple[str, ...], location: str, width: float = 0.0) -> None:
         """Add a line: as an outline if it is closed and has no width, otherwise as a wall.
 
         Parameters
         ----------
         points : (k, 2) array, m
         labels : tuple of str
-        place : str
-            Place in the file, for messages.
+        location : str
+            Location in the file, for messages.
         width : float, m
             Width in the file; 0 if there is none. The option ``thickness`` takes precedence over it.
         """
@@ -244,13 +244,13 @@ class EntityReader:
         is_closed = len(points) > 3 and ends_meet
         has_width = width > 0.0
         if is_closed and not has_width:
-            self._shapes.add_outline([points[:-1]], labels, rule="evenodd", place=place)
+            self._shapes.add_outline([points[:-1]], labels, rule="evenodd", location=location)
             return
         if is_closed:
             points = np.concatenate([points[:-1], points[:1]])
         if not has_width or self._shapes.options.thickness is not None:
             width = self._shapes.thickness
-        self._shapes.add_line(WallLine(points, width, labels), place=place)
+        self._shapes.add_line(WallLine(points, width, labels), location=location)
 
     def _to_meters(self, vectors: Sequence[Any]) -> Array:
         """Convert ezdxf vectors to points, (k, 2) m; third coordinates are counted as left out."""
@@ -270,7 +270,7 @@ class EntityReader:
             raise MapError(f"{self._shapes.source_name}: a curve beyond {MAX_COORDINATE_M:.0f} m")
 
 
-def _describe_place(entity: Any) -> str:
+def _describe_location(entity: Any) -> str:
     """Return the kind and the handle of an entity, which identify it in messages."""
     kind = entity.dxftype()
     if not entity.dxf.get("handle"):

@@ -138,7 +138,7 @@ class ShapeReader:
         if radius <= 0.0:
             return False
         (center,) = transform_points(state.matrix, center)
-        self.shapes.add_circle(center, radius, state.labels, place=_format_line(element), paint=paint)
+        self.shapes.add_circle(center, radius, state.labels, location=_format_line(element), paint=paint)
         return True
 
     def _add_area(
@@ -152,14 +152,14 @@ class ShapeReader:
         if state.style["fill-rule"].lower() == "evenodd":
             rule = "evenodd"
         return self.shapes.add_outline(
-            rings, state.labels, rule=rule, place=_format_line(element), thing="", paint=paint
+            rings, state.labels, rule=rule, location=_format_line(element), kind="", paint=paint
         )
 
     def _add_edges(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> None:
         """Add the stroke of a filled shape, which is a wall only if the fill turns out to be a floor."""
         try:
             lines = self._build_lines(subpaths, state, paint)
-        except ValueError:  # an invalid width is no error, because the stroke may never be used
+        except ValueError:  # an invalid width is not an error, because the stroke may never be used
             return
         min_width = self.shapes.options.compute_stroke_width(self.unit)
         wide = [line for line in lines if min_width <= line.measure_widths()[1] <= MAX_SIZE_M]
@@ -180,7 +180,7 @@ class ShapeReader:
         if state.style["stroke-dasharray"].lower() != "none":
             self.dashed_count += 1
         for line in lines:
-            self.shapes.add_line(line, place=_format_line(element))
+            self.shapes.add_line(line, location=_format_line(element))
 
     def _build_lines(self, subpaths: Sequence[Subpath], state: ElementState, paint: Paint) -> list[WallLine]:
         """Build the walls of a stroke, one for each subpath; none if it has no width."""

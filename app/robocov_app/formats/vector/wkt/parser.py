@@ -57,7 +57,7 @@ class _Geometry(NamedTuple):
         Whether the last coordinate of its points is a measure, not a height.
     start : int
         Index of its first character in the text.
-    place : str
+    location : str
         Number of the geometry, for messages, such as "geometry 2.1".
     depth : int
         Number of collections around it.
@@ -66,7 +66,7 @@ class _Geometry(NamedTuple):
     kind: str
     is_measured: bool
     start: int
-    place: str
+    location: str
     depth: int
 
 
@@ -133,8 +133,8 @@ class WktParser:
         self._scanner.position = match.end()
         self._scanner.skip_space()
 
-    def _parse_geometry(self, place: str, *, depth: int) -> None:
-        """Parse a geometry, whose number for messages is `place`, inside `depth` collections."""
+    def _parse_geometry(self, location: str, *, depth: int) -> None:
+        """Parse a geometry, whose number for messages is `location`, inside `depth` collections."""
         if depth > MAX_DEPTH:
             self._scanner.raise_error(f"nested too deeply, expected at most {MAX_DEPTH} levels")
         start = self._scanner.position
@@ -143,7 +143,7 @@ class WktParser:
             self._shapes.count_omission("geometry", "without coordinates")
             return
         parse = self._parsers[kind]
-        parse(_Geometry(kind, is_measured, start, place, depth))
+        parse(_Geometry(kind, is_measured, start, location, depth))
 
     def _parse_kind(self) -> tuple[str, bool]:
         """Return the kind of a geometry, and whether its last coordinate is a measure."""
@@ -185,24 +185,24 @@ class WktParser:
 
     def _parse_collection(self, geometry: _Geometry) -> None:
         for number in self._iterate_items(may_be_empty=False):
-            self._parse_geometry(f"{geometry.place}.{number}", depth=geometry.depth + 1)
+            self._parse_geometry(f"{geometry.location}.{number}", depth=geometry.depth + 1)
 
     def _parse_polygon(self, geometry: _Geometry) -> None:
-        self._add_polygon(geometry, geometry.place)
+        self._add_polygon(geometry, geometry.location)
 
     def _parse_polygons(self, geometry: _Geometry) -> None:
         for number in self._iterate_items():
-            self._add_polygon(geometry, f"{geometry.place}.{number}", parent_place=geometry.place)
+            self._add_polygon(geometry, f"{geometry.location}.{number}", parent_location=geometry.location)
 
-    def _add_polygon(self, geometry: _Geometry, place: str, parent_place: str = "") -> None:
-        """Parse the rings of a polygon; `parent_place` numbers a geometry of several polygons."""
+    def _add_polygon(self, geometry: _Geometry, location: str, parent_location: str = "") -> None:
+        """Parse the rings of a polygon; `parent_location` numbers a geometry of several polygons."""
         rings = [self._parse_points(geometry, minimum=1) for _ in self._iterate_items()]
         if rings:
-            self._geometries.append(self._shapes.build_polygon(rings, (), place, parent_place))
+            self._geometries.append(self._shapes.build_polygon(rings, (), location, parent_location))
 
     def _parse_line(self, geometry: _Geometry) -> None:
         points = self._parse_points(geometry, minimum=2)
-        self._geometries.append(SourceGeometry("line", (points,), place=geometry.place))
+        self._geometries.append(SourceGeometry("line", (points,), location=geometry.location))
 
     def _parse_lines(self, geometry: _Geometry) -> None:
         for _ in self._iterate_items():
@@ -224,7 +224,7 @@ class WktParser:
 
     def _add_points(self, points: Array, geometry: _Geometry) -> None:
         self._geometries += [
-            SourceGeometry("point", (point[None],), place=geometry.place) for point in points
+            SourceGeometry("point", (point[None],), location=geometry.location) for point in points
         ]
 
     def _parse_points(self, geometry: _Geometry, *, minimum: int) -> Array:
