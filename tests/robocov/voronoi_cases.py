@@ -148,15 +148,15 @@ def assert_cells_are_exact(cells: VoronoiPartition, region: Region) -> None:
     for robot, p in enumerate(cells.generators):
         area, mx, my, polar = map(float, compute_exact_cell(robot, cells.generators, region))
         assert cells.masses[robot] == pytest.approx(area, rel=1e-8, abs=ROUNDING * region.area)
-        moment = cells.masses[robot] * (cells.centroid[robot] - p)
+        moment = cells.masses[robot] * (cells.centroids[robot] - p)
         assert moment == pytest.approx([mx, my], abs=ROUNDING * region.area * size)
-        assert cells.polar_moment[robot] == pytest.approx(polar, abs=ROUNDING * region.area * size**2)
+        assert cells.polar_moments[robot] == pytest.approx(polar, abs=ROUNDING * region.area * size**2)
 
 
 def compute_moment_about_centroid(cells: Cells) -> Array:
     """Return J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
-    lever = cells.generators - cells.centroid
-    return cells.polar_moment - cells.masses * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
+    lever = cells.generators - cells.centroids
+    return cells.polar_moments - cells.masses * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
 
 
 def estimate_size(cells: VoronoiPartition, region: Region) -> float:

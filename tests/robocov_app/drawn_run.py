@@ -57,7 +57,7 @@ def record_walk(
     unknown = np.full_like(positions, np.nan)
     goals = unknown
     if controller != "rpf":
-        goals = np.array([partition(points, environment.region).centroid for points in positions])
+        goals = np.array([partition(points, environment.region).centroids for points in positions])
     return Record(
         environment=environment,
         team=Team.homogeneous(n),

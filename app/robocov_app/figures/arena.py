@@ -209,7 +209,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> N
     if record.steering is not None:
         _draw_headings(axes, record, record.steering[-1], radii, theme)
     if has_goals(record):
-        _draw_goals(axes, record, cells.centroid, radii, theme)
+        _draw_goals(axes, record, cells.centroids, radii, theme)
 
 
 def _draw_cells(
@@ -512,7 +512,7 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
     if (record.present[-1] & ~record.working[-1]).any():
         handles.append(build_robot_handle(legend.FAILED_ROBOT, theme.failed_robot, theme))
     if has_goals(record):
-        is_centroid = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroid)
+        is_centroid = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroids)
         handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
     cell_edge = to_plot_color(theme.cell_edge)
     handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))

@@ -164,8 +164,8 @@ class ObservationLayout:
             scans = self._check_scans(seen.scans if scans is None else scans)
             rows[:, blocks["rays"]] = np.where(scans.hit, scans.distances / sensing_range, 1.0)
         if self.centroid:
-            centroid = compute_known_cells(seen, "distance", None).centroid
-            rows[:, blocks["centroid"]] = (centroid - seen.positions) / unit
+            centroids = compute_known_cells(seen, "distance", None).centroids
+            rows[:, blocks["centroid"]] = (centroids - seen.positions) / unit
         # With localization errors, believed positions may be outside the region.
         return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
 

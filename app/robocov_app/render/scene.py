@@ -171,7 +171,7 @@ class Scene:
             snapshot,
             cells=outlines,
             cell_owners=owners,
-            centroids=cells.centroid,
+            centroids=cells.centroids,
             adjacency=cells.adjacency,
             moving=list_moving_obstacles(environment, snapshot.time),
             **attributes,

@@ -105,7 +105,8 @@ class Barrier(BaseController):
         """Compute the forces of the certified accelerations that are nearest to Lloyd's."""
         team = memory.team
         cells = compute_known_cells(seen, self.cells, memory.triangulation)
-        velocities = compute_approach_velocities(cells.centroid - seen.positions, self.k_prop, team.max_speed)
+        offsets = cells.centroids - seen.positions
+        velocities = compute_approach_velocities(offsets, self.k_prop, team.max_speed)
         desired = (velocities - seen.velocities) / self.response_time
         accelerations, memory = self.certify(seen, memory, desired)
         forces = accelerations * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
@@ -115,7 +116,7 @@ class Barrier(BaseController):
         corrections = (accelerations - attainable) * team.mass[:, None]
         return Decision(
             forces=forces,
-            goals=cells.centroid,
+            goals=cells.centroids,
             terms={"attraction": forces - corrections, "barrier": corrections},
             cells=cells,
             memory=replace(memory, triangulation=cells.triangulation),

@@ -92,7 +92,7 @@ class OwnView:
     @property
     def centroid(self) -> Array:
         """Centroid of the robot's Voronoi cell, (2,) m."""
-        return np.asarray(self._cells.centroid[self.number])
+        return np.asarray(self._cells.centroids[self.number])
 
     @property
     def cell(self) -> Array:
@@ -264,7 +264,7 @@ class IndividualControllerAdapter:
             messages[robot] = own.sent_messages
         return Decision(
             forces=forces,
-            goals=cells.centroid,
+            goals=cells.centroids,
             cells=cells,
             memory=IndividualMemories(memories, cells.triangulation),
             messages=messages if any(messages) else (),

@@ -222,12 +222,12 @@ class TangentBug(BaseController):
                 _add_squares(squares, points)
                 for squares, points in zip(obstacle_squares, obstacle_points, strict=True)
             )
-            states = self._navigate(seen, team, states, cells.centroid, obstacle_points, obstacle_squares)
-        velocities = self._compute_velocities(seen, team, states, cells.centroid)
+            states = self._navigate(seen, team, states, cells.centroids, obstacle_points, obstacle_squares)
+        velocities = self._compute_velocities(seen, team, states, cells.centroids)
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
-        goals = [state.get_goal(centroid) for state, centroid in zip(states, cells.centroid, strict=True)]
+        goals = [state.get_goal(centroid) for state, centroid in zip(states, cells.centroids, strict=True)]
         return Decision(
             forces=forces,
             goals=np.array(goals),

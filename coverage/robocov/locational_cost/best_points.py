@@ -129,7 +129,7 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
     disadvantage of "sensing" with a low h.
     """
     if target == "centroid":
-        return cells.centroid
+        return cells.centroids
     if target not in TARGETS:
         raise ParameterError(f"target: {describe_unknown_name('target', target, TARGETS)}")
     f = Distance() if target == "median" else Sensing(height)
@@ -173,7 +173,7 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
     >>> find_best_points(partition(np.array([[1.0, 0.5]]), triangle), Distance()).round(4)
     array([[0.9733, 0.9733]])
     """
-    centroids = cells.centroid - cells.generators
+    centroids = cells.centroids - cells.generators
     # Only the shapes of the cells and the clearances of the centroids are used, not the derivatives.
     shapes = compute_derivatives(cells.edges, centroids, SquaredDistance())
     if density is None or density.is_uniform:

@@ -32,7 +32,7 @@ class Cells(ABC):
     """(n, 2) m, the points to which the cells belong."""
     masses: Array
     """(n,) m², M of equation (2): the area of each cell if the density is 1."""
-    centroid: Array
+    centroids: Array
     """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
     """φ, the density of masses, centroids and moments; None stands for 1 everywhere."""
@@ -59,7 +59,7 @@ class Cells(ABC):
         return self.edges.list_adjacent_pairs()
 
     @cached_property
-    def polar_moment(self) -> Array:
+    def polar_moments(self) -> Array:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moment of each cell about its generator."""
         density = self.density or Uniform()
         return density.compute_moments(self.edges, self.generators)[:, POLAR_MOMENT]

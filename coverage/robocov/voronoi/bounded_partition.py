@@ -47,7 +47,7 @@ class VoronoiPartition(Cells):
         The point to which each cell belongs.
     masses : (n,) array, m²
         Mass M of each cell, equation (2). It is the area if the density is 1.
-    centroid : (n, 2) array, m
+    centroids : (n, 2) array, m
         Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
     density : Density or None
         Density φ with which masses, centroids and moments are computed; None means 1 everywhere.
@@ -64,7 +64,7 @@ class VoronoiPartition(Cells):
     >>> import robocov as rc
     >>> square = rc.Region([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     >>> cells = rc.partition([[0.5, 1.0], [1.5, 1.0]], square)
-    >>> cells.centroid
+    >>> cells.centroids
     array([[0.5, 1. ],
            [1.5, 1. ]])
     >>> [len(polygon) for polygon in cells.polygons]
@@ -171,7 +171,7 @@ def partition(
     voronoi_cells = VoronoiPartition(
         generators=points,
         masses=cells.masses,
-        centroid=cells.centroids,
+        centroids=cells.centroids,
         triangulation=mesh if mesh.shape[1] > 0 else None,
         _compute_edges=partial(_compute_edges, points, region.sides, neighbor_positions, mesh, edge_count),
     )
@@ -253,10 +253,10 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     if density is not None and density.is_uniform:
         cells.masses = cells.masses * density.max_value
     elif density is not None:
-        cells.masses, cells.centroid = density.compute_masses_and_centroids(
-            cells.edges, cells.generators, cells.masses, cells.centroid
+        cells.masses, cells.centroids = density.compute_masses_and_centroids(
+            cells.edges, cells.generators, cells.masses, cells.centroids
         )
-    for values in (cells.generators, cells.masses, cells.centroid):
+    for values in (cells.generators, cells.masses, cells.centroids):
         values.setflags(write=False)
     return cells
 

@@ -59,7 +59,7 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     Notes
     -----
     By the divergence theorem, an integral over a cell is a sum of signed contributions of its edges. Each
-    edge contributes the triangle between the edge and the generator, as far as it lies in the disc. This is a
+    edge contributes the part inside the disc of the triangle between the edge and the generator. This is a
     smaller triangle for the section of the edge in the disc, and circular sectors for the rest.
     """
     cell_count = len(radii)

@@ -219,7 +219,7 @@ def _walk_around(
 
     The walk visits the half-edges that start at the robot, from `first_half_edge` on. Each leads to a
     neighbor j, and belongs to a triangle, whose circumcenter is a Voronoi vertex. All coordinates are
-    relative to the robot. Points with an index of n or more are sentinels, which are no neighbors.
+    relative to the robot. Points with an index of n or more are sentinels, not neighbors.
     """
     mesh = triangulation.mesh
     vertices = workspace.vertices

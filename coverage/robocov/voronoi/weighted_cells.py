@@ -60,7 +60,7 @@ class WeightedCells(Cells):
         The position of the robot to which each cell belongs.
     masses : (n,) array, m²
         Mass M of each cell, equation (2). It is the area if the density is 1.
-    centroid : (n, 2) array, m
+    centroids : (n, 2) array, m
         Centroid C of each cell, equation (2). The centroid of an empty cell is its generator.
     density : Density or None
         Density φ with which masses, centroids and moments are computed; None means 1 everywhere.
@@ -127,10 +127,10 @@ class WeightedCells(Cells):
         return outlines, np.array(cells, dtype=np.intp)
 
     @cached_property
-    def polar_moment(self) -> Array:
+    def polar_moments(self) -> Array:
         """Polar moment of each cell about its generator, (n,) m⁴; exact if the density is uniform."""
         if self.density is not None and not self.density.is_uniform:
-            return super().polar_moment
+            return super().polar_moments
         weight = 1.0 if self.density is None else self.density.max_value
         moments = compute_moments(self.pieces, cell_count=len(self.generators))
         return np.where(self.masses > 0.0, weight * moments[:, POLAR_MOMENT], 0.0)
@@ -192,7 +192,7 @@ def partition_by_travel_time(
     >>> import robocov as rc
     >>> square = rc.Region(np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]))
     >>> cells = rc.partition_by_travel_time(np.array([[0.0, 0.0], [3.0, 0.0]]), np.array([1.0, 2.0]), square)
-    >>> bool(abs(cells.masses[0] - np.pi * 2.0**2) < 1e-12), cells.centroid[0].round(12).tolist()
+    >>> bool(abs(cells.masses[0] - np.pi * 2.0**2) < 1e-12), cells.centroids[0].round(12).tolist()
     (True, [-1.0, 0.0])
     """
     points = to_generators(generators)
@@ -254,12 +254,12 @@ def _compute_weighted_cells(
     # A cell without arcs is one of the polygons. Take the mass and centroid that were computed for the
     # polygon, so that their last bits do not depend on the presence of other robots.
     masses = np.where(is_straight, polygons.masses, masses)
-    centroids = np.where(is_straight[:, None], polygons.centroid, centroids)
+    centroids = np.where(is_straight[:, None], polygons.centroids, centroids)
     speeds.setflags(write=False)
     return WeightedCells(
         generators=points,
         masses=masses,
-        centroid=centroids,
+        centroids=centroids,
         speeds=speeds,
         pieces=pieces,
         region=region,

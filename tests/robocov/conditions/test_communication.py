@@ -325,7 +325,7 @@ def test_cells_by_reports_agree_with_a_partition_for_each_robot(n: int, seed: in
         known_positions = np.concatenate([positions[i : i + 1], reported[robot == i]])
         own_cells = partition(known_positions, SQUARE)
         assert cells.masses[i] == pytest.approx(own_cells.masses[0], rel=1e-9, abs=1e-12)
-        np.testing.assert_allclose(cells.centroid[i], own_cells.centroid[0], atol=1e-9)
+        np.testing.assert_allclose(cells.centroids[i], own_cells.centroids[0], atol=1e-9)
         other_cells = cells.edges.other_cells[cells.edges.cells == i]
         assert set(other_cells.tolist()) <= {-1, *other[robot == i].tolist()}
 
@@ -340,7 +340,7 @@ def test_cells_by_true_reports_equal_ordinary_cells(n: int) -> None:
     ordinary = partition(positions, SQUARE, neighbors)
     by_reports = partition(positions, SQUARE, neighbors, reported_positions=positions[other])
     assert by_reports.masses.tobytes() == ordinary.masses.tobytes()
-    assert by_reports.centroid.tobytes() == ordinary.centroid.tobytes()
+    assert by_reports.centroids.tobytes() == ordinary.centroids.tobytes()
 
 
 def test_reported_positions_without_neighbors_are_rejected() -> None:

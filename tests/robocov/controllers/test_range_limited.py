@@ -75,7 +75,7 @@ def test_a_disc_that_contains_the_cell_changes_nothing(radius: float) -> None:
     cells = partition(positions, REGION)
     area, offsets = compute_disc_limited_moments(cells.edges, np.full(9, radius))
     np.testing.assert_allclose(area, cells.masses, rtol=1e-12)
-    np.testing.assert_allclose(positions + offsets, cells.centroid, rtol=1e-12)
+    np.testing.assert_allclose(positions + offsets, cells.centroids, rtol=1e-12)
 
 
 def test_polygons_with_chords_instead_of_arcs_have_nearly_the_same_moments() -> None:

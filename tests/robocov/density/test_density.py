@@ -43,8 +43,8 @@ def test_mass_centroid_and_polar_moment_agree_with_quadrature(density):
         is_smooth = isinstance(density, Uniform | Gaussians)
         tolerance = 2e-4 if is_smooth else 8e-3
         assert cells.masses[k] == pytest.approx(mass, rel=tolerance)
-        assert_allclose(cells.centroid[k], centroid, atol=tolerance)
-        assert cells.polar_moment[k] == pytest.approx(polar, rel=2 * tolerance)
+        assert_allclose(cells.centroids[k], centroid, atol=tolerance)
+        assert cells.polar_moments[k] == pytest.approx(polar, rel=2 * tolerance)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
@@ -56,11 +56,11 @@ def test_moments_of_cells_add_up_to_those_of_the_region(density, seed, count):
     cells = build_cells(density, points, SQUARE)
     region_cell = build_cells(density, [[4.0, 4.0]], SQUARE)
     assert cells.masses.sum() == pytest.approx(region_cell.masses[0], rel=1e-11)
-    first_moment = region_cell.masses[0] * region_cell.centroid[0]
-    assert_allclose(cells.masses @ cells.centroid, first_moment, rtol=1e-10)
-    lever = np.square(cells.centroid - [4.0, 4.0]).sum(axis=1)
+    first_moment = region_cell.masses[0] * region_cell.centroids[0]
+    assert_allclose(cells.masses @ cells.centroids, first_moment, rtol=1e-10)
+    lever = np.square(cells.centroids - [4.0, 4.0]).sum(axis=1)
     polar_moments = compute_moment_about_centroid(cells) + cells.masses * lever
-    assert polar_moments.sum() == pytest.approx(region_cell.polar_moment[0], rel=1e-10)
+    assert polar_moments.sum() == pytest.approx(region_cell.polar_moments[0], rel=1e-10)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
@@ -71,8 +71,8 @@ def test_moments_obey_the_parallel_axis_theorem(density, seed):
     points = np.random.default_rng(seed).uniform(1.0, 7.0, (4, 2))
     cells = build_cells(density, points, SQUARE)
     for k, ring in enumerate(cells.polygons):
-        centered = build_cells(density, cells.centroid[[k]], Region(ring))
-        assert compute_moment_about_centroid(cells)[k] == pytest.approx(centered.polar_moment[0], rel=1e-9)
+        centered = build_cells(density, cells.centroids[[k]], Region(ring))
+        assert compute_moment_about_centroid(cells)[k] == pytest.approx(centered.polar_moments[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("density", [*GAUSSIANS.values(), RASTERS["bilinear"], POLYGONS["rooms"]])
@@ -85,13 +85,13 @@ def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(dens
     i = int(rng.integers(5))
     cells = build_cells(density, points, SQUARE)
     step = 1e-5
-    slope = 2.0 * cells.masses[i] * (points[i] - cells.centroid[i])
+    slope = 2.0 * cells.masses[i] * (points[i] - cells.centroids[i])
     for axis in (0, 1):
         costs = []
         for sign in (1.0, -1.0):
             moved = points.copy()
             moved[i, axis] += sign * step
-            costs.append(build_cells(density, moved, SQUARE).polar_moment.sum())
+            costs.append(build_cells(density, moved, SQUARE).polar_moments.sum())
         difference_quotient = (costs[0] - costs[1]) / (2 * step)
         assert difference_quotient == pytest.approx(slope[axis], abs=1e-4 * cells.masses.sum())
 
@@ -100,11 +100,11 @@ def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(dens
 def test_voronoi_cells_are_the_best_partition(density):
     """Check (5): the cells of other generators have a larger locational cost."""
     points = np.array(ROBOTS)
-    best = build_cells(density, points, SQUARE).polar_moment.sum()
+    best = build_cells(density, points, SQUARE).polar_moments.sum()
     rng = np.random.default_rng(1)
     for _ in range(5):
         cells = build_cells(density, points + rng.normal(0.0, 0.3, points.shape), SQUARE)
-        squared_lever = np.square(points - cells.centroid).sum(axis=1)
+        squared_lever = np.square(points - cells.centroids).sum(axis=1)
         assert (compute_moment_about_centroid(cells) + cells.masses * squared_lever).sum() > best
 
 
@@ -114,11 +114,11 @@ def test_a_density_of_one_equals_no_density_to_the_last_bit(count):
     plain = build_cells(None, points)
     uniform = build_cells(Uniform(), points)
     assert np.array_equal(plain.masses, uniform.masses)
-    assert np.array_equal(plain.centroid, uniform.centroid)
-    assert np.array_equal(plain.polar_moment, uniform.polar_moment)
+    assert np.array_equal(plain.centroids, uniform.centroids)
+    assert np.array_equal(plain.polar_moments, uniform.polar_moments)
     assert_allclose(build_cells(Uniform(3.0), points).masses, 3.0 * plain.masses, rtol=1e-15)
-    assert np.array_equal(build_cells(Uniform(3.0), points).centroid, plain.centroid)
-    assert np.array_equal(build_cells(Gaussians((), 2.0), points).centroid, plain.centroid)
+    assert np.array_equal(build_cells(Uniform(3.0), points).centroids, plain.centroids)
+    assert np.array_equal(build_cells(Gaussians((), 2.0), points).centroids, plain.centroids)
 
 
 def test_densities_of_each_kind_have_the_expected_values():
@@ -160,8 +160,8 @@ def test_cells_without_mass_have_the_centroid_of_their_area():
     cells = build_cells(WeightedPolygons((corner,), 0.0), points, SQUARE)
     plain = build_cells(None, points, SQUARE)
     assert cells.masses.tolist() == pytest.approx([1.0, 0.0, 0.0], abs=1e-13)
-    assert_allclose(cells.centroid[0], [0.5, 0.5], atol=1e-6)
-    assert_allclose(cells.centroid[1:], plain.centroid[1:], atol=1e-6)
+    assert_allclose(cells.centroids[0], [0.5, 0.5], atol=1e-6)
+    assert_allclose(cells.centroids[1:], plain.centroids[1:], atol=1e-6)
 
 
 @given(x=st.floats(4.0, 60.0))
@@ -172,8 +172,8 @@ def test_centroids_far_from_a_peak_are_continuous(x):
     cell = Region(np.array([[x, -0.5], [x + 1.0, -0.5], [x + 1.0, 0.5], [x, 0.5]]))
     cells = build_cells(peak, [[x + 0.5, 0.1]], cell)
     shifted_cells = build_cells(peak, [[x + 0.5, 0.1 + 1e-9]], cell)
-    assert cell.contains(cells.centroid, 1e-6).all()
-    assert_allclose(cells.centroid, shifted_cells.centroid, atol=1e-3)
+    assert cell.contains(cells.centroids, 1e-6).all()
+    assert_allclose(cells.centroids, shifted_cells.centroids, atol=1e-3)
 
 
 def test_edges_of_areas_on_borders_of_cells_count_once():
@@ -228,7 +228,7 @@ def test_a_raster_of_cells_equals_polygons(seed, rows, columns):
     raster = build_cells(Raster(values, (1.0, 0.0, 7.0, 8.0), "cells"), points, inner)
     polygons = build_cells(WeightedPolygons(tuple(areas), 0.0), points, inner)
     assert_allclose(raster.masses, polygons.masses, rtol=1e-9, atol=1e-12)
-    assert_allclose(raster.polar_moment, polygons.polar_moment, rtol=1e-9, atol=1e-12)
+    assert_allclose(raster.polar_moments, polygons.polar_moments, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
@@ -241,7 +241,7 @@ def test_a_cell_depends_only_on_robots_within_range(density):
     def list_cell_values(positions, i):
         neighbors = Neighbors.from_ranges(positions, ranges[: len(positions)])
         cells = partition(positions, SQUARE, neighbors, density=density)
-        return cells.masses[i], *cells.centroid[i], cells.polar_moment[i]
+        return cells.masses[i], *cells.centroids[i], cells.polar_moments[i]
 
     moved = points.copy()
     distant = np.flatnonzero(np.hypot(*(points - points[0]).T) > 3.4)

@@ -277,7 +277,7 @@ def test_best_points_do_not_depend_on_other_cells_to_the_last_bit() -> None:
             single_cell = VoronoiPartition(
                 cells.generators[row],
                 cells.masses[row],
-                cells.centroid[row],
+                cells.centroids[row],
                 _compute_edges=lambda edges=single_edges: edges,
             )
             assert find_best_points(single_cell, f)[0].tobytes() == best_points[i].tobytes()
@@ -303,11 +303,11 @@ def test_iterations_converge_from_any_point_of_the_cell(seed: int, thin: float, 
     rng = np.random.default_rng(seed)
     cells = build_single_cell(rng.normal(size=(rng.integers(3, 7), 2)) * [1.0, 10.0**thin])
     ring = cells.polygons[0]
-    centroid = cells.centroid[0]
+    centroid = cells.centroids[0]
     start = rng.dirichlet(np.full(len(ring), 0.1)) @ ring
     f = Distance() if height is None else Sensing(10.0**height)
     expected = find_best_points(cells, f)
-    cells.centroid = (start + 1e-4 * (centroid - start))[None]
+    cells.centroids = (start + 1e-4 * (centroid - start))[None]
     points = find_best_points(cells, f)
     np.testing.assert_allclose(points, expected, rtol=0, atol=1e-7 * np.ptp(ring, axis=0).max())
 
@@ -325,4 +325,4 @@ def test_descent_steps_divide_by_the_absolute_eigenvalues(numbers: list[float]) 
 
 def test_the_best_point_for_squared_distances_is_the_centroid() -> None:
     cells = partition(scatter_points(PENTAGON, 8, np.random.default_rng(5)), PENTAGON)
-    np.testing.assert_allclose(find_best_points(cells, SquaredDistance()), cells.centroid, atol=1e-12)
+    np.testing.assert_allclose(find_best_points(cells, SquaredDistance()), cells.centroids, atol=1e-12)

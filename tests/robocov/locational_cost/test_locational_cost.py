@@ -192,7 +192,7 @@ def test_squared_distances_obey_the_parallel_axis_theorem(seed: int, name: str, 
     region = REGIONS[name]
     cells = partition(scatter_points(region, n, rng), region)
     points = rng.normal(scale=2.0, size=(n, 2))
-    lever = points + cells.generators - cells.centroid
+    lever = points + cells.generators - cells.centroids
     size = region.diameter
     expected = compute_moment_about_centroid(cells) + cells.masses * (lever**2).sum(axis=1)
     f = SquaredDistance()

@@ -25,7 +25,7 @@ POINTS = scatter_points(PENTAGON, 9, np.random.default_rng(2))
 
 def test_each_target_is_the_optimum_of_its_performance_function() -> None:
     cells = partition(POINTS, PENTAGON)
-    assert find_targets(cells, None, "centroid", 1.0) is cells.centroid
+    assert find_targets(cells, None, "centroid", 1.0) is cells.centroids
     np.testing.assert_array_equal(
         find_targets(cells, None, "median", 1.0), find_best_points(cells, Distance())
     )

@@ -55,7 +55,7 @@ def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> 
 def test_one_robot_gets_the_whole_region() -> None:
     cells = partition(np.array([[1.0, 1.0]]), PENTAGON)
     assert cells.masses == pytest.approx([PENTAGON.area])
-    assert cells.centroid == pytest.approx(PENTAGON.centroid[None])
+    assert cells.centroids == pytest.approx(PENTAGON.centroid[None])
     assert cells.polygons[0] == pytest.approx(PENTAGON.vertices)
     assert cells.adjacency.shape == (0, 2)
 
@@ -63,7 +63,7 @@ def test_one_robot_gets_the_whole_region() -> None:
 def test_an_empty_team_has_no_cells() -> None:
     cells = partition(np.empty((0, 2)), SQUARE)
     assert cells.masses.shape == (0,)
-    assert cells.centroid.shape == (0, 2)
+    assert cells.centroids.shape == (0, 2)
     assert cells.polygons == []
     assert cells.adjacency.shape == (0, 2)
 
@@ -74,8 +74,8 @@ def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
     across = [(0, 1), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 6), (4, 5), (4, 7), (5, 8), (6, 7), (7, 8)]
     for cells in (partition(points, SQUARE), partition_by_clipping(points, SQUARE)):
         assert cells.masses == pytest.approx(np.full(9, 4.0), rel=1e-13)
-        assert cells.centroid == pytest.approx(points, rel=1e-13)
-        assert cells.polar_moment == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
+        assert cells.centroids == pytest.approx(points, rel=1e-13)
+        assert cells.polar_moments == pytest.approx(np.full(9, 16.0 / 6.0), rel=1e-13)
         assert cells.adjacency.tolist() == [list(pair) for pair in across]
         assert [len(polygon) for polygon in cells.polygons] == [4] * 9
 
@@ -117,7 +117,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
 def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
     cells = partition(family(region, n, np.random.default_rng(seed)), region)
-    for ring, mass, centroid in zip(cells.polygons, cells.masses, cells.centroid, strict=True):
+    for ring, mass, centroid in zip(cells.polygons, cells.masses, cells.centroids, strict=True):
         if mass < 1e-9 * region.area:
             continue
         local = ring - centroid
@@ -136,15 +136,15 @@ def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
     points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
     for cells in (partition(points, PENTAGON), partition_by_clipping(points, PENTAGON)):
         direct = []
-        for ring, centroid in zip(cells.polygons, cells.centroid, strict=True):
+        for ring, centroid in zip(cells.polygons, cells.centroids, strict=True):
             x, y = (ring - centroid).T
             u, v = (np.roll(ring, -1, axis=0) - centroid).T
             edges = (x * v - u * y) * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
             direct.append(edges.sum())
         assert compute_moment_about_centroid(cells) == pytest.approx(np.array(direct), abs=1e-11)
-        lever = points - cells.centroid
+        lever = points - cells.centroids
         shifted = np.array(direct) + cells.masses * (lever**2).sum(axis=1)
-        assert cells.polar_moment == pytest.approx(shifted, abs=1e-11)
+        assert cells.polar_moments == pytest.approx(shifted, abs=1e-11)
 
 
 @settings(deadline=None, max_examples=120)
@@ -157,7 +157,7 @@ def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float
     plain = partition(points, PENTAGON)
     turned = partition(points @ turn, Region(PENTAGON.vertices @ turn))
     assert turned.masses == pytest.approx(plain.masses, abs=1e-11)
-    lever = plain.centroid @ turn - turned.centroid
+    lever = plain.centroids @ turn - turned.centroids
     assert plain.masses[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
 
 
@@ -179,7 +179,7 @@ def test_coincident_robots_get_the_same_cell() -> None:
         once = partition(points, PENTAGON)
         assert twice.masses[:n] == pytest.approx(once.masses, rel=1e-12)
         assert twice.masses[n:].tolist() == twice.masses[:2].tolist()
-        assert twice.centroid[n:].tolist() == twice.centroid[:2].tolist()
+        assert twice.centroids[n:].tolist() == twice.centroids[:2].tolist()
         assert twice.polygons[n].tolist() == twice.polygons[0].tolist()
 
 
@@ -192,9 +192,9 @@ def test_robots_at_one_position_get_the_region_each() -> None:
 def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
     cells = partition(np.array([[1.0, 1.0], [-9.0, 1.0], [5.0, 5.0]]), SQUARE)
     assert cells.masses[1] == 0.0
-    assert cells.centroid[1].tolist() == [-9.0, 1.0]
+    assert cells.centroids[1].tolist() == [-9.0, 1.0]
     assert cells.polygons[1].shape == (0, 2)
-    assert cells.polar_moment[1] == 0.0
+    assert cells.polar_moments[1] == 0.0
     assert cells.masses.sum() == pytest.approx(SQUARE.area)
 
 
@@ -222,9 +222,9 @@ def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int,
     after = partition(moved, SQUARE, Neighbors.from_ranges(moved, np.full(len(moved), range_)))
 
     assert after.masses[index] == before.masses[robot]
-    assert after.centroid[index].tolist() == before.centroid[robot].tolist()
+    assert after.centroids[index].tolist() == before.centroids[robot].tolist()
     assert after.polygons[index].tolist() == before.polygons[robot].tolist()
-    assert after.polar_moment[index] == before.polar_moment[robot]
+    assert after.polar_moments[index] == before.polar_moments[robot]
 
 
 @settings(deadline=None, max_examples=120)
@@ -237,7 +237,7 @@ def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, ran
         heard = np.concatenate([points[robot : robot + 1], points[neighbors.list_neighbors(robot)]])
         area, mx, my, _ = map(float, compute_exact_cell(0, heard, PENTAGON))
         assert cells.masses[robot] == pytest.approx(area, abs=1e-11)
-        lever = cells.centroid[robot] - points[robot]
+        lever = cells.centroids[robot] - points[robot]
         assert cells.masses[robot] * lever == pytest.approx([mx, my], abs=1e-10)
 
 
@@ -260,7 +260,7 @@ def test_equal_input_gives_equal_bits_and_read_only_cells(n: int) -> None:
     first = partition(points, PENTAGON)
     second = partition(points, Region(PENTAGON.vertices))
     assert first.masses.tobytes() == second.masses.tobytes()
-    assert first.centroid.tobytes() == second.centroid.tobytes()
+    assert first.centroids.tobytes() == second.centroids.tobytes()
     rings = [ring.tobytes() for ring in second.polygons]
     # The partition does not share the array of the caller.
     points[:] = 0.0

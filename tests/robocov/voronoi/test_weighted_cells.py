@@ -77,7 +77,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     # Nearly tangent circles of some micrometers and of a kilometer keep fewer digits.
     tolerance = 1e-6 if speeds == "very different" else 1e-9
     assert cells.masses.sum() == pytest.approx(region.area, rel=tolerance)
-    first = cells.masses @ (cells.centroid - region.centroid)
+    first = cells.masses @ (cells.centroids - region.centroid)
     np.testing.assert_allclose(first, 0.0, atol=tolerance * region.area * region.diameter)
 
 
@@ -95,7 +95,7 @@ def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: floa
         expected = build_cell_of_discs(i, points, speeds, region, neighbors.list_neighbors(i))
         assert cells.masses[i] == pytest.approx(expected.area, abs=1e-6 * region.area)
         if expected.area > 1e-3 * region.area:
-            np.testing.assert_allclose(cells.centroid[i], expected.centroid.coords[0], atol=1e-4)
+            np.testing.assert_allclose(cells.centroids[i], expected.centroid.coords[0], atol=1e-4)
 
 
 @settings(max_examples=40)
@@ -131,7 +131,7 @@ def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: s
     cells = partition_by_travel_time(points, np.full(n, rng.uniform(0.1, 3.0)), REGIONS[name])
     ordinary = partition(points, REGIONS[name])
     assert cells.masses.tobytes() == ordinary.masses.tobytes()
-    assert cells.centroid.tobytes() == ordinary.centroid.tobytes()
+    assert cells.centroids.tobytes() == ordinary.centroids.tobytes()
 
 
 @settings(max_examples=40)
@@ -146,7 +146,7 @@ def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: in
     ordinary = partition(points, REGIONS[name])
     np.testing.assert_allclose(cells.masses, ordinary.masses, atol=1e-10)
     large = ordinary.masses > 0.01
-    np.testing.assert_allclose(cells.centroid[large], ordinary.centroid[large], atol=1e-9)
+    np.testing.assert_allclose(cells.centroids[large], ordinary.centroids[large], atol=1e-9)
 
 
 def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
@@ -154,7 +154,7 @@ def test_a_fast_robot_encloses_a_slow_one_whose_cell_is_a_disc() -> None:
     assert isinstance(cells, WeightedCells)
     # Apollonius: center p - d / (k² - 1), radius k d / (k² - 1), k = 3
     assert cells.masses[0] == pytest.approx(np.pi * (3 / 8) ** 2, rel=1e-14)
-    np.testing.assert_allclose(cells.centroid[0], [3.0 - 1 / 8, 3.0], atol=1e-15)
+    np.testing.assert_allclose(cells.centroids[0], [3.0 - 1 / 8, 3.0], atol=1e-15)
     assert cells.masses[1] == pytest.approx(36.0 - cells.masses[0], rel=1e-14)
     assert compute_moment_about_centroid(cells)[0] == pytest.approx(np.pi * (3 / 8) ** 4 / 2, rel=1e-13)
     outlines, owners = cells.outlines
@@ -176,7 +176,7 @@ def test_a_cell_may_have_two_components_and_a_centroid_outside() -> None:
     assert owners.tolist() == [1, 1, 0]
     assert sum(shapely.Polygon(outline).area for outline in outlines) == pytest.approx(40.0, rel=1e-3)
     # Behind the slow robot the fast one arrives first again, so its centroid lies beyond the slow robot.
-    assert cells.centroid[1, 0] > 19.0
+    assert cells.centroids[1, 0] > 19.0
 
 
 def test_speeds_that_differ_by_rounding_give_the_ordinary_cells() -> None:
@@ -193,9 +193,9 @@ def test_robots_at_one_position_share_a_cell_if_they_are_equally_fast() -> None:
     points = np.array([[2.0, 3.0], [2.0, 3.0], [4.0, 3.0], [2.0, 3.0]])
     cells = partition_by_travel_time(points, np.array([1.0, 2.0, 2.0, 2.0]), SQUARE)
     assert cells.masses[0] == 0.0
-    np.testing.assert_array_equal(cells.centroid[0], points[0])
+    np.testing.assert_array_equal(cells.centroids[0], points[0])
     np.testing.assert_allclose(cells.masses[[1, 2, 3]], [18.0, 18.0, 18.0])
-    np.testing.assert_array_equal(cells.centroid[1], cells.centroid[3])
+    np.testing.assert_array_equal(cells.centroids[1], cells.centroids[3])
 
 
 @settings(max_examples=15)
@@ -206,10 +206,10 @@ def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -
     points = scatter_points(SQUARE, n, rng)
     speeds = rng.choice([0.5, 1.0, 1.5], n)
     cells = partition_by_travel_time(points, speeds, SQUARE)
-    slope = 2.0 * (cells.masses / speeds**2)[:, None] * (points - cells.centroid)
+    slope = 2.0 * (cells.masses / speeds**2)[:, None] * (points - cells.centroids)
 
     def compute_cost(positions: np.ndarray) -> float:
-        moments = partition_by_travel_time(positions, speeds, SQUARE).polar_moment
+        moments = partition_by_travel_time(positions, speeds, SQUARE).polar_moments
         return float((moments / speeds**2).sum())
 
     i = int(rng.integers(n))
@@ -243,7 +243,7 @@ def test_a_cell_depends_only_on_the_neighbors_of_its_robot(seed: int, n: int, re
     new_neighbors = Neighbors.from_ranges(new_points, np.full(n, reach))
     after = partition_by_travel_time(new_points, new_speeds, SQUARE, new_neighbors)
     assert before.masses[i].tobytes() == after.masses[i].tobytes()
-    assert before.centroid[i].tobytes() == after.centroid[i].tobytes()
+    assert before.centroids[i].tobytes() == after.centroids[i].tobytes()
 
 
 def test_reported_positions_replace_the_true_ones() -> None:
@@ -296,6 +296,6 @@ def test_mass_and_moments_are_weighted_by_a_density(name: str) -> None:
         assert cells.masses[i] == pytest.approx(mass, rel=1e-2, abs=1e-3)
         if mass > 0.1:
             centroid = weight[is_owned] @ samples[is_owned] / mass
-            np.testing.assert_allclose(cells.centroid[i], centroid, atol=0.02)
+            np.testing.assert_allclose(cells.centroids[i], centroid, atol=0.02)
         polar = weight[is_owned] @ ((samples[is_owned] - points[i]) ** 2).sum(axis=1)
-        assert cells.polar_moment[i] == pytest.approx(polar, rel=2e-2, abs=1e-3)
+        assert cells.polar_moments[i] == pytest.approx(polar, rel=2e-2, abs=1e-3)

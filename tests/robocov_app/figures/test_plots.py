@@ -120,13 +120,13 @@ class TestTrajectories:
         assert len(drawn.get_paths()) == 5
         assert drawn.get_paths()[2].vertices[:-1] == pytest.approx(cells.polygons[2])
         marks = next(line for line in axes.lines if line.get_marker() == "+")
-        assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroid)
+        assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroids)
 
     def test_no_centroid_peeps_out_from_under_a_robot(self):
         record = record_walk(ROOMS, 5)
-        last = partition(record.positions[-1], ROOMS.region).centroid
+        last = partition(record.positions[-1], ROOMS.region).centroids
         for _ in range(60):
-            last = partition(last, ROOMS.region).centroid
+            last = partition(last, ROOMS.region).centroids
         positions = np.concatenate([record.positions, last[None]])
         goals = np.concatenate([record.goals, last[None]])
         arrived = replace(record, positions=positions, goals=goals)

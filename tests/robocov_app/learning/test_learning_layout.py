@@ -51,7 +51,7 @@ def compute_row(layout: ObservationLayout, seen: Observations, robot: int, reach
         hit = seen.scans.hit[robot]
         row += [d / 2.0 if h else 1.0 for d, h in zip(distances, hit, strict=True)]
     if layout.centroid:
-        row += [*(partition(seen.positions, REGION, seen.neighbors).centroid[robot] - [x, y]) / 10.0]
+        row += [*(partition(seen.positions, REGION, seen.neighbors).centroids[robot] - [x, y]) / 10.0]
     return [min(max(value, -1.0), 1.0) for value in row]
 
 

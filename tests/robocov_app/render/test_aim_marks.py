@@ -12,7 +12,7 @@ from robocov.voronoi import partition
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.scene import CENTROID_TOLERANCE_M, Scene, are_centroids
 
-CENTROIDS = partition(TWO, SQUARE.region).centroid
+CENTROIDS = partition(TWO, SQUARE.region).centroids
 UPRIGHT = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]])
 ACROSS = np.array([[0.0, 0.0], [3.0, 3.0], [-3.0, 3.0]])
 
@@ -46,20 +46,20 @@ def test_goals_are_centroids_with_limited_communication() -> None:
     """That of what it takes for its cell; the word does not change with each message that is lost."""
     scene = build_scene(TWO, goals=CENTROIDS)
     alone = partition(TWO[:1], SQUARE.region)
-    heard = replace(alone, centroid=np.repeat(alone.centroid, 2, axis=0))
-    decision = Decision(np.zeros((2, 2)), heard.centroid, cells=heard)
+    heard = replace(alone, centroids=np.repeat(alone.centroids, 2, axis=0))
+    decision = Decision(np.zeros((2, 2)), heard.centroids, cells=heard)
     assert scene.snapshot is not None
     limited = Scene.from_snapshot(
         SQUARE, replace(scene.team, communication_range=np.ones(2)), Snapshot(scene.snapshot.seen, decision)
     )
-    assert not are_centroids(heard.centroid, CENTROIDS)
+    assert not are_centroids(heard.centroids, CENTROIDS)
     _, painter = list_pixels(limited, "centroids")
     assert list_legend_texts(painter, limited) == ["cell centroid"]
 
 
 @pytest.mark.parametrize("goals", [CENTROIDS, TWO + 1])
 def test_a_robot_that_has_arrived_has_no_cross(goals: np.ndarray) -> None:
-    arrived = goals if goals is not CENTROIDS else partition(CENTROIDS, SQUARE.region).centroid
+    arrived = goals if goals is not CENTROIDS else partition(CENTROIDS, SQUARE.region).centroids
     pixels, _ = list_pixels(build_scene(arrived, goals=arrived), "centroids")
     assert len(pixels) == 0
 

@@ -85,7 +85,7 @@ def test_the_legend_lists_the_visible_elements():
     scene = build_scene(
         TWO,
         forces=np.ones((2, 2)),
-        goals=partition(TWO, SQUARE.region).centroid,
+        goals=partition(TWO, SQUARE.region).centroids,
         obstacle_points=TWO - 1,
         communication_range=5.0,
     )

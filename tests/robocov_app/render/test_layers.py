@@ -368,7 +368,7 @@ class TestCells:
         used = partition(TWO, SQUARE.region)
         scene = self.scene(np.inf, used)
         assert scene.cells is used.polygons
-        assert scene.centroids is used.centroid
+        assert scene.centroids is used.centroids
 
     @pytest.mark.parametrize("reach", [np.inf, 3.0])
     @pytest.mark.parametrize(

@@ -65,7 +65,7 @@ def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number
 
 def test_a_partition_with_centers_of_mass():
     axes = draw_figure(1, RUNS, PARTITION, "light").axes[0]
-    centers = partition(PARTITION.positions[0], SQUARE.region).centroid
+    centers = partition(PARTITION.positions[0], SQUARE.region).centroids
     (dots,) = [line for line in axes.lines if len(line.get_xdata()) == 6]
     assert np.asarray(dots.get_xydata()) == pytest.approx(centers)
     (robots,) = [c for c in axes.collections if type(c) is PathCollection]

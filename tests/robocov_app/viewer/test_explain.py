@@ -291,7 +291,7 @@ def test_only_robots_in_communication_range_are_counted():
 def test_a_goal_at_the_centroid_is_named():
     positions = np.array([[1.0, 1.0], [7.0, 7.0]])
     cells = partition(positions, SQUARE.region)
-    report = build_report(positions, goals=cells.centroid, cells=cells)
+    report = build_report(positions, goals=cells.centroids, cells=cells)
     assert report.verdict.endswith("short of its centroid: no force acts on it")
 
 

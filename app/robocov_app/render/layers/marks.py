@@ -108,7 +108,7 @@ def _choose_targets(scene: Scene) -> tuple[str, Array]:
     if cells is not None:
         # A robot that misses messages computes a cell that differs from the drawn one. Goals are compared
         # with the centroids of computed cells, otherwise the name would change with each lost message.
-        centroids = cells.centroid
+        centroids = cells.centroids
     if centroids.shape == goals.shape and are_centroids(goals, centroids):
         return legend.CELL_CENTROID, scene.centroids
     return legend.GOAL, goals

@@ -73,7 +73,7 @@ def find_sensor_optima(heights: Sequence[float]) -> list[SensorOptimum]:
     return [
         _find_ground_optimum(cell),
         *(_find_optimum(cell, height) for height in heights),
-        _build_optimum(cell, np.inf, cell.centroid[0], float("nan")),
+        _build_optimum(cell, np.inf, cell.centroids[0], float("nan")),
     ]
 
 
@@ -88,7 +88,7 @@ def _find_optimum(cell: VoronoiPartition, height: float) -> SensorOptimum:
     """Find the best position at a height, m, and the loss of a sensor above the centroid instead."""
     position = find_best_points(cell, Sensing(height))[0]
     best = _compute_cost(cell, position, height)
-    at_centroid = _compute_cost(cell, cell.centroid[0], height)
+    at_centroid = _compute_cost(cell, cell.centroids[0], height)
     return _build_optimum(cell, height, position, float(1.0 - at_centroid / best))
 
 
@@ -99,7 +99,7 @@ def _compute_cost(cell: VoronoiPartition, position: Array, height: float) -> flo
 
 def _build_optimum(cell: VoronoiPartition, height: float, position: Array, loss: float) -> SensorOptimum:
     x, y = position.tolist()
-    return SensorOptimum(height, x, y, float(np.hypot(*(position - cell.centroid[0]))), loss)
+    return SensorOptimum(height, x, y, float(np.hypot(*(position - cell.centroids[0]))), loss)
 
 
 def _build_cell() -> VoronoiPartition:

@@ -141,7 +141,7 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], partition_run: R
 
 def _describe_partition(run: Record) -> str:
     positions = run.positions[0]
-    centroids = partition(positions, run.environment.region).centroid
+    centroids = partition(positions, run.environment.region).centroids
     mean_distance = float(np.hypot(*(centroids - positions).T).mean())
     return (
         f"The robots are at random positions in “{run.environment.name}”, on average "
@@ -248,7 +248,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
         list(cells.polygons), facecolors=fills, edgecolors=edge_color, linewidths=0.8, zorder=1
     )
     axes.add_collection(collection, autolim=False)
-    axes.plot(*cells.centroid.T, zorder=8, clip_on=False, **dot_style)
+    axes.plot(*cells.centroids.T, zorder=8, clip_on=False, **dot_style)
     arena.draw_robots(axes, positions, run.team.radius, [theme.final] * len(positions), theme)
     return page.figure
 

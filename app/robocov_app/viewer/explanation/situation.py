@@ -34,7 +34,7 @@ _RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
 
 @dataclass(frozen=True)
 class NearbyObject:
-    """Something near the robot.
+    """An object near the robot.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ def _build_goal(
     goal = _get_vector(decision.goals, robot)
     if goal is None:
         return None
-    is_centroid = decision.cells is not None and goal == _get_vector(decision.cells.centroid, robot)
+    is_centroid = decision.cells is not None and goal == _get_vector(decision.cells.centroids, robot)
     name = "its centroid" if is_centroid else "its goal"
     return NearbyObject(name, goal - position, obstruction=_find_obstruction(environment, position, goal))
 
