@@ -1,4 +1,4 @@
-"""Build hook: a wheel carries the built handbook where the environment of the build has what that takes."""
+"""Build hook: adds the built handbook to a wheel if its requirements are installed."""
 
 import os
 import subprocess

@@ -73,7 +73,7 @@ class InputError(RobocovError):
 
 
 class Issue(NamedTuple):
-    """Something that is wrong in a JSON document.
+    """An issue in a JSON document.
 
     Attributes
     ----------

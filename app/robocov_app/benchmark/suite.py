@@ -315,7 +315,7 @@ def select_maps(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> d
 
 
 def _expand_rankings(names: Sequence[str]) -> list[str]:
-    """Return the names of tracks, where a name of a ranking stands for all of its tracks."""
+    """Return the names of tracks; the name of a ranking is replaced by those of its tracks."""
     tracks: list[str] = []
     for name in names:
         if name not in TRACKS and name not in RANKED_TRACKS:

@@ -12,7 +12,7 @@ parallel_env = CoverageParallelEnv
 
 
 def env(**options: Any) -> Any:
-    """Build the environment as PettingZoo's ``AECEnv``, in which the robots act one after the other.
+    """Build the environment as PettingZoo's ``AECEnv``, in which the robots act one at a time.
 
     Parameters
     ----------

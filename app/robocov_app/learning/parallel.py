@@ -25,7 +25,9 @@ Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[st
 
 
 class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
-    """Environment with one learner for each robot, with its knowledge only: PettingZoo's ``ParallelEnv``.
+    """Environment with one learner for each robot: PettingZoo's ``ParallelEnv``.
+
+    A learner knows only what its robot knows.
 
     The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's `ObservationLayout`:
     float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for

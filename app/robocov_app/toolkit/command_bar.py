@@ -99,7 +99,7 @@ class CommandBar(CommandPart):
         self.ui.draw_overlays(screen)
 
     def show_content(self, ui: Ui) -> None:
-        """Show the three groups; the middle one is centered as far as there is space."""
+        """Show the three groups; the middle one is centered if there is enough space."""
         ui.inset(_MARGIN_PX, (ui.box.height / ui.scale - _BUTTON_HEIGHT_PX) / 2, _MARGIN_PX)
         center = self.list_center_cells(ui)
         right = self.list_right_cells(ui)

@@ -51,7 +51,7 @@ class SheetHandle:
         return True
 
     def draw(self, screen: Surface, layout: Layout, theme: Theme) -> None:
-        """Draw the strip with its grip; nothing if the panel is no sheet."""
+        """Draw the strip with its grip; nothing if the panel is not a sheet."""
         strip = Rect(layout.handle)
         if not strip.height:
             return

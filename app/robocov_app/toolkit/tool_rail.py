@@ -15,7 +15,7 @@ from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.toolkit.window_part import CommandPart
 
 VIEW_COMMANDS = ("fit", "zoom:in", "zoom:out")
-"""Commands of the camera, shown below the tools as far as there is space."""
+"""Commands of the camera; those that fit are shown below the tools."""
 
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 4.0

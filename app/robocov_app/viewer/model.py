@@ -90,7 +90,7 @@ class ViewerModel(WindowModel):
 
     @property
     def selected_obstacles(self) -> tuple[Obstacle, ...]:
-        """The selected obstacles, as far as they are still on the displayed map."""
+        """The selected obstacles that are still on the displayed map."""
         obstacles = self.session.displayed.environment.obstacles
         return tuple(obstacle for obstacle in self.inspection.obstacles if obstacle in obstacles)
 

@@ -24,7 +24,7 @@ class ViewState:
     has_suggestions : bool
         Whether the window suggests what to try once the team has settled.
     has_motion : bool
-        Whether the camera glides when the zoom changes, as far as the user of this window has chosen.
+        Whether the user of this window wants the camera to glide when the zoom changes.
     is_motion_reduced : bool
         Whether the user's system asks for reduced motion, so that the camera does not glide.
     is_compact : bool

@@ -104,7 +104,7 @@ class KeyChanged(_HeldMessage):
 
 
 class TextTyped(_Message):
-    """Text is entered other than by single keys: on a phone, or with an input method."""
+    """Text is entered by other means than single keys: on a phone, or with an input method."""
 
     kind: Literal["text"]
     text: Annotated[str, Field(max_length=1000), _Lines]
@@ -142,7 +142,7 @@ class FocusLost(_Message):
 class PageChanged(_Message):
     """The page reports its size in device pixels, device pixels per CSS pixel, and the user's preferences.
 
-    `touch` tells whether the main pointer is a finger.
+    `touch` is true if the main pointer is a finger.
     """
 
     kind: Literal["page"]
@@ -155,7 +155,7 @@ class PageChanged(_Message):
 
     @property
     def is_small(self) -> bool:
-        """Whether the page is that of a phone, upright or not, for example."""
+        """Whether the page is small, such as that of a phone in portrait or landscape."""
         return self.width < NARROW_PAGE_PX * self.ratio or self.height < LOW_PAGE_PX * self.ratio
 
     @property

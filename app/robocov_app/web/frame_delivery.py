@@ -75,7 +75,7 @@ class FrameDelivery:
         self._encoder.shutdown(wait=False, cancel_futures=True)
 
     def _choose_delivery(self) -> _Delivery | None:
-        """Return the page that gets the next frame, and that frame; None if no page is ready.
+        """Return the next frame to send, and the page that gets it; None if no page is ready.
 
         The controlling page and the others take turns. Among the others, the page that shows the oldest frame
         comes first.

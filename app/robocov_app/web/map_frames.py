@@ -23,7 +23,7 @@ MAX_TIME_FRACTION = 0.25
 
 
 class MapFrames:
-    """Draws the map in all requested sizes, not more often than those who watch need it.
+    """Draws the map in all requested sizes, only as often as spectators need it.
 
     The server's thread sets `requested_sizes` and reads `frames`, the window's thread calls `update`.
 

@@ -214,7 +214,7 @@ class PageConnection:
         await self._finish_upload()
 
     async def _finish_upload(self) -> None:
-        """Once all of a file has arrived, save it and let the window open it."""
+        """Save a file once all of it has arrived, and open it in the window."""
         upload = self._page.upload
         if upload is None or not upload.is_complete:
             return

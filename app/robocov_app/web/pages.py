@@ -209,7 +209,7 @@ class Pages:
         self.give_control(self.controlling)
 
     def remove_surplus_control_page(self) -> Page | None:
-        """If too many pages may control the window, remove the oldest one that does not.
+        """Remove the oldest page without control if too many pages may take control.
 
         Returns
         -------
@@ -243,7 +243,7 @@ class Pages:
         self.give_control(next(receivers, self.controlling))
 
     def give_control(self, page: Page | None) -> None:
-        """Let a page control the window; if it is None or gone, the first page that may control it."""
+        """Give control to a page; if it is None or gone, to the first page that may have it."""
         if page not in self._pages:
             page = next((other for other in self._pages if other.may_control), None)
         if page is not self.controlling:
@@ -309,7 +309,7 @@ class Pages:
         return sum(not page.may_control for page in self._pages)
 
     def _replace(self, earlier: Page, page: Page) -> None:
-        """Let a page inherit number, name and control from its earlier connection, and abort that."""
+        """Pass number, name and control to a page from its earlier connection, and abort that one."""
         page.number = earlier.number
         page.name = earlier.name
         page.requests_control = earlier.requests_control

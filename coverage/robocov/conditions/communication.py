@@ -382,7 +382,7 @@ class Radio:
         true_positions: Array,
         working: BoolArray,
     ) -> tuple[Inbox | None, int]:
-        """Send controller messages at the end of a step, as far as the conditions allow.
+        """Send controller messages at the end of a step, within the limits of the conditions.
 
         Parameters
         ----------

@@ -75,7 +75,7 @@ def find_edge(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner
     if len(searched) > MANY_OBJECTS:
         nearby = {item.key for item in _list_items_near(sketch, point, reach)}
         distant_obstacles = sketch.index_by_key.keys() - nearby
-        # The boundary and the starts, which are no obstacles, are always searched.
+        # The boundary and the starts, which are not obstacles, are always searched.
         searched = [owner for owner in searched if owner not in distant_obstacles]
     smallest_gap = reach
     nearest: Edge | None = None

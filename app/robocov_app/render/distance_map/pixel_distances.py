@@ -437,7 +437,7 @@ def _list_block_pixels(
 
 
 def _spread_over_pixels(blocks: BorderPixels, height: int, width: int) -> BorderPixels:
-    """Return the pixels of blocks, as far as they are inside a picture, with the values of their block."""
+    """Return the pixels of blocks that are inside a picture, with the values of their block."""
     rows, columns, block_indices = _list_block_pixels(blocks.rows, blocks.columns, height, width)
     return BorderPixels(rows, columns, blocks.owners[block_indices], blocks.distances[block_indices])
 

@@ -48,7 +48,7 @@ def _choose_grid_step(min_step: float) -> float:
 
 
 def _draw_grid_line(canvas: Canvas, environment: Environment, axis: int, coordinate: float) -> None:
-    """Draw the line on which x (axis 0) or y (axis 1) has a value, m, as far as it is in the region."""
+    """Draw the part inside the region of the line on which x (axis 0) or y (axis 1) has a value, m."""
     region = environment.region
     line = np.full((2, 2), coordinate)
     line[:, 1 - axis] = (region.bounds[1 - axis], region.bounds[3 - axis])
@@ -166,7 +166,7 @@ _build_moving_legend = build_legend(
 
 
 def build_obstacles_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of obstacles at rest and moving obstacles, as far as the scene has them."""
+    """Build the legend of obstacles at rest and moving obstacles, if the scene has any."""
     return [*_build_static_legend(scene), *_build_moving_legend(scene)]
 
 

@@ -33,7 +33,7 @@ class Argument:
 
 @dataclass(frozen=True)
 class Command:
-    """Something that can be done in a window.
+    """An action of a window that can be run by its name or key.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class CommandTable:
         return self._attempt(command.execute)
 
     def take_command(self, event: pygame.event.Event) -> Command | None:
-        """Note a pressed key, and return its command; None if it is already held and does not repeat."""
+        """Record a pressed key, and return its command; None if it is already held and does not repeat."""
         command = self._by_key.get(get_key_name(event))
         is_held = event.key in self._held_keys
         self._held_keys.add(event.key)

@@ -138,7 +138,7 @@ def _find_best_displacement(
     dx, dy = displacement
     best_rank = (math.inf, math.inf)
     best = Snap(displacement)
-    # Among many points, some lie near the grid by chance, which is no reason to snap.
+    # Among many points, some lie near the grid by chance, which is not a reason to snap.
     other_kinds = settings.kinds - {"grid", "angle", "midpoint", "intersection"}
     other_settings = replace(settings, kinds=other_kinds)
     for number, (x, y) in enumerate(_choose_moved_points(points)):

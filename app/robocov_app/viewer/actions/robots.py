@@ -41,7 +41,7 @@ class RobotActions:
         self._viewer.inspection.select_robot(numbers[(index + steps) % len(numbers)])
 
     def fail_or_revive(self) -> None:
-        """Let the selected robot fail, or revive it."""
+        """Make the selected robot fail, or revive it."""
         toggle_failure(self._viewer.session, self._require_selected())
 
     def remove(self) -> None:
@@ -49,7 +49,7 @@ class RobotActions:
         self._viewer.session.remove_robot(self._require_selected())
 
     def add_at_cursor(self) -> str:
-        """Let a robot join at the free position nearest to the cursor; return a message."""
+        """Add a robot at the free position nearest to the cursor; return a message."""
         cursor = self._viewer.inspection.cursor
         if cursor is None:
             raise ParameterError("move the mouse to where the robot should join")

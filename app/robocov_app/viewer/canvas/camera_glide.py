@@ -9,7 +9,7 @@ GLIDE_S = 0.15
 
 
 class CameraGlide:
-    """Leads from one camera to another within `GLIDE_S`; fast at first, then slower.
+    """Moves smoothly from one camera to another within `GLIDE_S`; fast at first, then slower.
 
     The point of the world that both cameras show at the same pixel stays there all the time.
 

@@ -255,5 +255,5 @@ class ViewerCanvas:
 
     @property
     def scenes(self) -> list[Scene]:
-        """Scene of each pane that was drawn last."""
+        """The scene drawn last in each pane."""
         return self._scenes

@@ -46,7 +46,7 @@ class SharedCamera:
             self._pass_to_painters(self._camera)
 
     def fit(self) -> None:
-        """Show the whole map at once, and no longer follow a robot."""
+        """Show the whole map at once, and stop following a robot."""
         self._viewer.inspection.followed = None
         self._glide = None
         self._camera = None
@@ -69,7 +69,7 @@ class SharedCamera:
         self._glide_from(start)
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the map by dx and dy pixels, and no longer follow a robot.
+        """Move the map by dx and dy pixels, and stop following a robot.
 
         The center of the view stays within the bounds of the map.
         """
@@ -120,7 +120,7 @@ class SharedCamera:
         self._pass_to_painters(camera)
 
     def _glide_from(self, start: Camera) -> None:
-        """Let the camera glide from `start` to the present one, unless the user prefers no motion."""
+        """Let the camera glide from `start` to the present one, unless the user prefers reduced motion."""
         view = self._viewer.view
         if self.is_animated and view.has_motion and not view.is_motion_reduced:
             self._glide = CameraGlide(start, self._painters[0].camera.with_view(start.view))

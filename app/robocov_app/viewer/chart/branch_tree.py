@@ -101,7 +101,7 @@ def _count_shared(path: list[Node], other: list[Node]) -> int:
 
 
 def _find_fork_step(path: list[Node], other: list[Node]) -> int:
-    """Return the step at which two paths part, from the nodes that they do not share."""
+    """Return the step at which two paths diverge, from the nodes that they do not share."""
     return min(node.first_step for node in [*path[:1], *other[:1]])
 
 

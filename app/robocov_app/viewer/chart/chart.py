@@ -162,7 +162,7 @@ class Chart:
         return self.times.to_column(time)
 
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw the chart and the time slider onto the window, as far as the layout has them."""
+        """Draw the parts of the chart and the time slider that the layout has space for."""
         if not self.layout.time_slider.height:
             return
         frame = self._frame

@@ -25,7 +25,7 @@ _SIMULATED_BAR_STRENGTH = 0.4
 
 
 def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> None:
-    """Draw the empty bar of the time slider, and a label that tells whether present or past is shown.
+    """Draw the empty bar of the time slider, and a label that shows whether the past is displayed.
 
     Parameters
     ----------

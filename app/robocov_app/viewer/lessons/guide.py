@@ -134,7 +134,7 @@ class LessonGuide:
             self.player = None
 
     def handle_command(self, name: str) -> bool:
-        """Let the lesson handle a command of the window; return whether the command is thereby done."""
+        """Let the lesson handle a command of the window; return whether it has done so."""
         if self.shown is not None and name in _CHAPTER_STEPS:
             self.shown.skip(_CHAPTER_STEPS[name])
             return True

@@ -457,7 +457,7 @@ def _do_nothing() -> None:
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:
-    """Go to the start of a chapter's run, and let its edits be repeated when their time comes."""
+    """Go to the start of a chapter's run, and repeat its edits at their times."""
     target = session.timeline.document.nodes[chapter.edit]
     session.seek(session.timeline.document.get_path(target)[0], 0)
     session.timeline.finish_seek()

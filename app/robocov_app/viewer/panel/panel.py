@@ -124,7 +124,7 @@ class ViewerPanel(CommandPanel):
         self._age_s = 0.0  # time since the panel was drawn
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt a layout and a theme; on a phone, widgets are larger, as far as the width allows."""
+        """Adopt a layout and a theme; on a phone, widgets are larger if the width allows."""
         scale = layout.scale
         if layout.is_compact and layout.has_panel:
             scale = min(_FINGER_SCALE * scale, max(layout.panel.width / PANEL_WIDTH_PX, scale))

@@ -265,7 +265,7 @@ class PaneGroup:
         return numbers
 
     def _add_joining_robots(self) -> list[AutomaticEvent]:
-        """Add the robots that join in the last step, and return their events."""
+        """Add the robots whose join time lies within the last step, and return their events."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
             return []
@@ -281,7 +281,7 @@ class PaneGroup:
         return events
 
     def _find_join_position(self, number: int) -> Point:
-        """Return the position, m, at which the conditions let a robot join."""
+        """Return the position, m, at which a robot joins by the conditions."""
         conditions = self.scenario.conditions
         joins = () if conditions is None else conditions.joins
         position = next((join.position for join in joins if join.robot == number), None)
@@ -291,7 +291,7 @@ class PaneGroup:
         return x, y
 
     def _stop_failing_robots(self) -> list[AutomaticEvent]:
-        """Let robots with a failure time in the last step fail, and return their events."""
+        """Stop the robots whose failure time lies within the last step, and return their events."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.has_team_changes:
             return []

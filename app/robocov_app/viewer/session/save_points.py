@@ -142,6 +142,6 @@ def _restore_document(timeline: Timeline, point: SavePoint) -> None:
 
 
 def _build_run_key(run: PaneGroup) -> tuple[object, ...]:
-    """Return values of a run; each edit or step changes at least one of them."""
+    """Return a key of the state of a run, which changes with each edit and each step."""
     panes = [(pane.number, id(pane.setup), id(pane.simulation)) for pane in run.panes]
     return run.step, run.drag, id(run.scenario), *panes

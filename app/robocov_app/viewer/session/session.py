@@ -125,7 +125,7 @@ class Session:
         saved : SavedSession
             Content of the file.
         seconds : float, s
-            Maximum time for the call. If it is not enough, the next frames do the rest.
+            Maximum time for the call. If it is not enough, the seek continues in the next frames.
 
         Returns
         -------
@@ -417,11 +417,11 @@ class Session:
         self.apply(RemoveRobot(number), "robot", f"robot {number} removed")
 
     def fail_robot(self, number: int) -> None:
-        """Let a robot fail."""
+        """Make a robot fail."""
         self.apply(FailRobot(number), "failure", f"robot {number} failed")
 
     def revive_robot(self, number: int) -> None:
-        """Let a failed robot work again."""
+        """Revive a failed robot."""
         self.apply(ReviveRobot(number), "robot", f"robot {number} works again")
 
 
@@ -446,7 +446,7 @@ def _apply_in_past(timeline: Timeline, edit: RunEdit) -> bool:
 
 
 def toggle_failure(session: Session, number: int) -> str:
-    """Let a robot fail, or if it has failed, work again; return the description of the edit."""
+    """Make a robot fail, or revive it if it has failed; return the description of the edit."""
     if number in session.displayed.get_setup(session.timeline.panes[0]).failed:
         session.revive_robot(number)
     else:

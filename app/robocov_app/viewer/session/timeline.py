@@ -156,14 +156,14 @@ class Timeline:
             pane.controller.build()
 
     def show(self, index: int) -> None:
-        """Display the recorded state with an index; from the last state on, this is the present."""
+        """Display the recorded state with an index; the last one is the present."""
         self.shown_index = index if index < len(self.history) - 1 else None
         self._calls_at_shown_state = 0
 
     def show_next(self) -> None:
         """Play one step of the past; display the next recorded state once its step is reached.
 
-        Where the past was thinned, several calls pass before that, so that it plays at the same speed.
+        If the past was thinned, this takes several calls, so that it plays at the same speed.
         """
         assert self.shown_index is not None
         shown = self.history[self.shown_index]
@@ -234,7 +234,7 @@ class Timeline:
         edit : callable or None
             Called with the run at that step, to change it before it becomes the present.
         seconds : float, s
-            Maximum time for the call. If it is not enough, `continue_seek` must do the rest.
+            Maximum time for the call. If it is not enough, call `continue_seek` until the seek ends.
 
         Raises
         ------

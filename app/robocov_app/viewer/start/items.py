@@ -12,7 +12,7 @@ from robocov_app.viewer.start.drawing import StartDrawing
 
 @dataclass(frozen=True)
 class StartItem:
-    """Something on the page that can be clicked, or chosen by arrow keys and Enter.
+    """An element of the page that can be clicked, or chosen by arrow keys and Enter.
 
     Attributes
     ----------

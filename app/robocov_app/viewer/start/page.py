@@ -219,7 +219,7 @@ class StartPage(BaseWindow):
             self._click(event.pos)
 
     def _handle_while_loading(self, event: pygame.event.Event) -> None:
-        """Give up the choice on Escape; other input waits for the viewer."""
+        """Cancel the choice on Escape; other input waits for the viewer."""
         if event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
             self.choice = None
 

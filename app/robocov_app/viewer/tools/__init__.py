@@ -5,7 +5,7 @@
 ``outlines``  polygons and walls, point by point
 ``segments``  the ruler, and circles from their center
 ``brush``     paint the density
-``clicks``    delete, add a robot, let a robot fail
+``clicks``    delete, add a robot, make a robot fail
 ``snapping``  snapping of new points to corners and walls
 ``toolbox``   all tools, by name
 """

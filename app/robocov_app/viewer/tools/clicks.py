@@ -20,7 +20,7 @@ class EraserTool(ViewerTool):
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Delete the robot under the cursor, or else the obstacle; say what to do if there is neither."""
+        """Delete the robot under the cursor, otherwise the obstacle; show a hint if there is neither."""
         if event.robot is not None:
             session.remove_robot(event.robot)
             return f"robot {event.robot} removed"
@@ -45,7 +45,7 @@ class AddRobotTool(ViewerTool):
 
 
 class FailureTool(ViewerTool):
-    """Lets robots fail, and revives them."""
+    """Makes robots fail, and revives them."""
 
     name = "failure"
     title = "Failure"
@@ -54,7 +54,7 @@ class FailureTool(ViewerTool):
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
-        """Let the robot under the cursor fail, or revive it; say what to do if there is none."""
+        """Make the robot under the cursor fail, or revive it; show a hint if there is none."""
         if event.robot is None:
             return _NO_ROBOT_TO_FAIL
         return toggle_failure(session, event.robot)

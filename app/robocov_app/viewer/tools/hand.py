@@ -121,7 +121,7 @@ class HandTool(ViewerTool):
             session.drag_robot(self.robot, event.unsnapped_point)
 
     def _hover(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Note the handle or the obstacle under the pointer; a robot in front of it takes precedence."""
+        """Find the handle or the obstacle under the pointer; a robot in front of it takes precedence."""
         environment = session.displayed.environment
         self.hovered = None
         selected = self._get_single_selection(session)

@@ -123,7 +123,7 @@ def drag_handle(
 def _move_point(
     points: tuple[Point, ...], index: int, origin: Point, point: Point, *, is_constrained: bool
 ) -> tuple[Point, ...]:
-    """Return points of which one is moved; its edge from `origin` may be constrained to a round angle."""
+    """Return points with one of them moved; its edge from `origin` may be constrained to a round angle."""
     if is_constrained:
         point = constrain_angle(origin, point)
     moved = map_points((point,), lambda coordinates: coordinates)

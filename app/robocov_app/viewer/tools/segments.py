@@ -88,7 +88,7 @@ class RulerTool(SegmentTool):
     hint = "drag from one point to another"
 
     def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
-        """Keep the measurement visible until the next press; after a click, say what to do."""
+        """Keep the measurement visible until the next press; after a click, show a hint."""
         self.segment.release()
         if clicked:
             return "nothing measured: drag from one point to another"

@@ -55,7 +55,7 @@ class PictureSources:
 
 
 class MapPicture:
-    """Draws panes, chart, message and lesson of a window in another size, for somebody who watches.
+    """Draws panes, chart, message and lesson of a window in another size, for a spectator.
 
     Parameters
     ----------

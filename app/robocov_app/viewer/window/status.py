@@ -59,7 +59,7 @@ def list_facts(
 
 
 def describe_cut_off(viewer: ViewerModel, pane: Pane) -> str:
-    """Describe the area of a pane that no robot can reach; empty if there is none worth mentioning."""
+    """Describe the area of a pane that no robot can reach; empty if it is negligible."""
     known_cost = viewer.costs.known.get(pane.number)
     if known_cost is None or known_cost.result.uncovered_area <= MIN_UNCOVERED_AREA_M2:
         return ""

@@ -198,7 +198,7 @@ class ViewerWindow(CommandWindow):
         return (self.top_bar, self.tool_rail, self.panel)
 
     def _list_focus_groups(self) -> list[FocusGroup]:
-        """Return what Tab visits: top bar, tool rail, chips, panel and chart, as far as they are visible."""
+        """Return the visible parts that Tab visits, among top bar, tool rail, chips, panel and chart."""
         groups: list[FocusGroup] = []
         if not self.top_bar.hidden:
             groups.append(self.top_bar.ui)

@@ -174,7 +174,7 @@ class RemoveRobot(RobotEdit):
 
 @dataclass(frozen=True)
 class FailRobot(RobotEdit):
-    """Let a robot fail: it stops, sends no messages, and is an obstacle to the others."""
+    """Make a robot fail: it stops, sends no messages, and is an obstacle to the others."""
 
     do: Literal["fail"] = field(default="fail", kw_only=True)
 
@@ -190,7 +190,7 @@ class FailRobot(RobotEdit):
 
 @dataclass(frozen=True)
 class ReviveRobot(RobotEdit):
-    """Let a failed robot work again, at its position or the nearest free one."""
+    """Revive a failed robot at its position or the nearest free one."""
 
     do: Literal["revive"] = field(default="revive", kw_only=True)
 

@@ -125,7 +125,7 @@ class QuestionModel(_Model):
 
 
 class TaskModel(_Model):
-    """Something that the viewer of a lesson does."""
+    """An action that the viewer of a lesson is asked to do."""
 
     text: Text = Field(description="What the viewer does")
     until: ConditionModel = Field(description="Condition at which the task is done")

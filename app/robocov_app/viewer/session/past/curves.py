@@ -17,7 +17,7 @@ _FILE_TIME_DECIMALS = 3
 
 @dataclass(frozen=True)
 class SessionEvent:
-    """Something that happened in a session.
+    """An event in a session.
 
     Attributes
     ----------

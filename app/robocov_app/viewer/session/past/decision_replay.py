@@ -93,7 +93,7 @@ def _complete_recorded_decision(state: PaneState) -> Decision:
 
 
 def _decide(seen: Observations, state: PaneState) -> Decision:
-    """Let the controller decide again; if it raises or decides nonsense, all forces are zero."""
+    """Call the controller again; if it raises or returns invalid forces, all forces are zero."""
     no_forces = Decision(np.zeros_like(seen.positions))
     controller = _build_controller(state.setup)
     if controller is None:

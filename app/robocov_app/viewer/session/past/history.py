@@ -96,7 +96,7 @@ class RunHistory:
         self.append(state)
 
     def rewind(self, last: RunState) -> None:
-        """Remove the states after a given one, which thereby becomes the newest again."""
+        """Remove the states after a given one, which becomes the newest one again."""
         while self.states and self.last is not last and self.last.step >= last.step:
             self._remove_last()
         if not self.states or self.last is not last:
