@@ -125,7 +125,7 @@ def test_projected_geometries_keep_their_rings() -> None:
     scaled = convert_to_meters(figures, Shapes("plan", ReadOptions(scale=2.0)), None)
     assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]
     assert (scaled[0].rings[1] == 2.0).all()
-    assert (scaled[0].labels, scaled[0].place, scaled[1].rings[0].tolist()) == (
+    assert (scaled[0].labels, scaled[0].location, scaled[1].rings[0].tolist()) == (
         ("hall",),
         "geometry 1",
         [[10.0, 10.0]],

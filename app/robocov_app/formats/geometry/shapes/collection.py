@@ -276,11 +276,11 @@ class Shapes:
             is_valid = np.abs(ring) <= MAX_COORDINATE_M  # False for nan, too
             if not is_valid.all():
                 x, y = ring[int(np.argmin(is_valid.all(axis=1)))].tolist()
-                location = self.source_name
+                source = self.source_name
                 if location:
-                    location = f"{self.source_name}: {location}"
+                    source = f"{self.source_name}: {location}"
                 expected = f"expected coordinates from {-MAX_COORDINATE_M:.0f} to {MAX_COORDINATE_M:.0f} m"
-                raise MapError(f"{location}: {expected}, got a point at [{x:g}, {y:g}] m")
+                raise MapError(f"{source}: {expected}, got a point at [{x:g}, {y:g}] m")
         return [np.round(ring, _DIGITS) + 0.0 for ring in rings]
 
     def build_foreign_map(
