@@ -17,11 +17,11 @@ from typing import Any
 MAX_MEMORY_BYTES = 800_000_000
 """Maximum address space of a case, in addition to that of the process before."""
 MAX_MESSAGE_CHARS = 2000
-MAX_WORDS_CHARS = 500
+MAX_TEXT_CHARS = 500
 MAX_TRACEBACK_CHARS = 8000
 
 
-class WrongError(AssertionError):
+class UnexpectedEffectError(AssertionError):
     """An input has an effect that it must not have."""
 
 
@@ -46,11 +46,11 @@ def answer(job: dict[str, Any]) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             try:
-                words = _READERS[job["kind"]](Path(job["file"]), job)
-                outcome = {"outcome": "read", "words": words}
+                text = _READERS[job["kind"]](Path(job["file"]), job)
+                outcome = {"outcome": "read", "text": text}
             except RobocovError as error:
                 _require_one_line(str(error))
-                outcome = {"outcome": "refused", "words": str(error)}
+                outcome = {"outcome": "refused", "text": str(error)}
     except MemoryError as error:
         outcome = _build_finding("memory", error)
     except (Exception, SystemExit) as error:
@@ -67,7 +67,7 @@ def _build_finding(kind: str, error: BaseException) -> dict[str, Any]:
         place = f"{Path(own_frames[-1].filename).name}:{own_frames[-1].name}"
     return {
         "outcome": kind,
-        "words": f"{type(error).__name__}: {error}"[:MAX_WORDS_CHARS],
+        "text": f"{type(error).__name__}: {error}"[:MAX_TEXT_CHARS],
         "signature": f"{kind}-{type(error).__name__}-{place}",
         "traceback": "".join(traceback.format_exception(error))[-MAX_TRACEBACK_CHARS:],
     }
@@ -75,7 +75,7 @@ def _build_finding(kind: str, error: BaseException) -> dict[str, Any]:
 
 def _require_one_line(message: str) -> None:
     if not message.isprintable() or not message or len(message) > MAX_MESSAGE_CHARS:
-        raise WrongError(f"expected a message of one line: {message[:300]!r}")
+        raise UnexpectedEffectError(f"expected a message of one line: {message[:300]!r}")
 
 
 def _require_map(environment: Any) -> str:
@@ -85,12 +85,12 @@ def _require_map(environment: Any) -> str:
     from robocov.mapfile.check import check_map
 
     if not isinstance(environment, Environment):
-        raise WrongError(f"expected a map: {type(environment).__name__}")
+        raise UnexpectedEffectError(f"expected a map: {type(environment).__name__}")
     if from_json(to_json(environment)) != environment:
-        raise WrongError("the map changes when it is written and read")
+        raise UnexpectedEffectError("the map changes when it is written and read")
     text = dump_map(environment)
     if dump_map(parse_map(text, "again")) != text:
-        raise WrongError("the text of the map changes when it is read and written")
+        raise UnexpectedEffectError("the text of the map changes when it is read and written")
     report = check_map(environment)
     json.dumps(report.to_dict(), allow_nan=False)
     counts = f"{report.obstacle_count} obstacles, {report.vertex_count} vertices"
@@ -136,16 +136,16 @@ def _check(path: Path, job: dict[str, Any]) -> str:
     out = io.StringIO()
     err = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        status = command(["check", str(path), *job["options"].get("words", ())])
+        status = command(["check", str(path), *job["options"].get("arguments", ())])
     lines = err.getvalue().splitlines()
     if status not in (0, 2) or any(not line.startswith("robocov: error: ") for line in lines):
-        raise WrongError(f"status {status}: {err.getvalue()[-1500:]}")
-    if "--json" in job["options"].get("words", ()):
+        raise UnexpectedEffectError(f"status {status}: {err.getvalue()[-1500:]}")
+    if "--json" in job["options"].get("arguments", ()):
         (row,) = json.loads(out.getvalue())["maps"]
         if row["valid"] != (status == 0):
-            raise WrongError(f"status {status}, but valid is {row['valid']}")
+            raise UnexpectedEffectError(f"status {status}, but valid is {row['valid']}")
     elif (status == 2) != bool(lines):
-        raise WrongError(f"status {status} with {len(lines)} errors")
+        raise UnexpectedEffectError(f"status {status} with {len(lines)} errors")
     return "valid" if status == 0 else "invalid"
 
 

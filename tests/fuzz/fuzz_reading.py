@@ -62,7 +62,7 @@ class Outcome:
     outcome : str
         ``read`` or ``refused``, or one of the findings ``error``, ``memory``, ``slow``, ``hang`` and
         ``crash``.
-    words : str
+    text : str
         Description of what was read, or the error message.
     signature : str
         Identical for findings with the same cause; empty if there is no finding.
@@ -72,13 +72,13 @@ class Outcome:
     """
 
     outcome: str
-    words: str = ""
+    text: str = ""
     signature: str = ""
     traceback: str = ""
     seconds: float = 0.0
 
     @property
-    def good(self) -> bool:
+    def is_expected(self) -> bool:
         """Whether the outcome is not a finding."""
         return self.outcome in ("read", "refused")
 
@@ -90,11 +90,16 @@ class Reader:
     ----------
     seconds : float, s
         Maximum processor time of a case.
+
+    Attributes
+    ----------
+    start_count : int
+        How often the process was started.
     """
 
     def __init__(self, seconds: float = MAX_CPU_S) -> None:
         self.seconds = seconds
-        self.started = 0
+        self.start_count = 0
         self._process: subprocess.Popen[bytes] | None = None
         self._folder = tempfile.TemporaryDirectory(prefix="fuzz-")
         self._errors = (Path(self._folder.name) / "stderr").open("w+b")
@@ -130,7 +135,7 @@ class Reader:
         elapsed = time.monotonic() - start_time
         if answer is not None:
             outcome = Outcome(**answer)
-            if outcome.good and outcome.seconds > self.seconds:
+            if outcome.is_expected and outcome.seconds > self.seconds:
                 return Outcome("slow", f"{outcome.seconds:.1f} s", f"slow-{job.kind}", "", elapsed)
             return outcome
         is_hanging = process.poll() is None and elapsed >= max_wait
@@ -160,7 +165,7 @@ class Reader:
                 env=environment,
                 cwd=self._folder.name,
             )
-            self.started += 1
+            self.start_count += 1
             self._pending = b""
             if self._wait_for_answer(_MAX_START_S) is None:
                 self._stop()

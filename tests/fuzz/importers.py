@@ -103,7 +103,7 @@ def draw_job(target: str, random: Random) -> Job:
         return Job(target)
     if target == "check":
         is_json = random.random() < 0.3
-        return Job(target, options={"words": ["--json"]} if is_json else {})
+        return Job(target, options={"arguments": ["--json"]} if is_json else {})
     from robocov_app.formats import IMPORTERS
 
     options = {}
@@ -146,12 +146,12 @@ class Tally:
         """Count an outcome, and return whether it is of a new kind."""
         self.counts[outcome.outcome] += 1
         self.slowest = max(self.slowest, outcome.seconds)
-        if not outcome.good:
+        if not outcome.is_expected:
             self.findings.setdefault(outcome.signature, (case, job, outcome))
-        kind = outcome.words
+        kind = outcome.text
         if outcome.outcome == "refused":
             kind = re.sub(r"'[^']*'|\"[^\"]*\"|[-+\d.]+", "#", kind.partition(": ")[2])[:80]
-        is_new = outcome.good and kind not in self.kinds
+        is_new = outcome.is_expected and kind not in self.kinds
         self.kinds.add(kind)
         return is_new
 
@@ -257,7 +257,7 @@ def save(folder: Path, target: str, case: Case, job: Job, outcome: Outcome) -> P
         (finding / name).write_bytes(content)
     document = {"files": list(case.files), "job": vars(job), "signature": outcome.signature}
     (finding / "finding.json").write_text(json.dumps(document, indent=1))
-    (finding / "finding.txt").write_text(f"{outcome.signature}\n{outcome.words}\n\n{outcome.traceback}")
+    (finding / "finding.txt").write_text(f"{outcome.signature}\n{outcome.text}\n\n{outcome.traceback}")
     return finding
 
 
@@ -268,7 +268,7 @@ def read_saved(folder: Path) -> tuple[Case, Job]:
     return case, Job(**document["job"])
 
 
-def main(words: list[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Fuzz, save the findings, and return 1 if there are any."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -292,18 +292,18 @@ def main(words: list[str] | None = None) -> int:
         default=MAX_CPU_S,
         help="maximum processor time of a case, s (default: %(default)s)",
     )
-    arguments = parser.parse_args(words)
+    options = parser.parse_args(arguments)
     known = list_targets()
-    for name in arguments.formats:
+    for name in options.formats:
         if name not in known:
             parser.error(f"unknown format {name!r} (known: {', '.join(known)})")
     warnings.simplefilter("ignore")
-    with Reader(arguments.seconds) as reader:
-        if arguments.again:
-            return 1 if _read_findings(arguments.again, reader) else 0
+    with Reader(options.seconds) as reader:
+        if options.again:
+            return 1 if _read_findings(options.again, reader) else 0
         count = 0
-        for target in arguments.formats or known:
-            count += _fuzz_target(target, reader, arguments)
+        for target in options.formats or known:
+            count += _fuzz_target(target, reader, options)
     return 1 if count else 0
 
 
@@ -312,24 +312,24 @@ def _read_findings(folders: list[Path], reader: Reader) -> int:
     count = 0
     for folder in folders:
         outcome = reader.read(*read_saved(folder))
-        print(f"{outcome.outcome:<8} {folder}\n    {outcome.words.partition(chr(10))[0]}", flush=True)
-        if not outcome.good:
+        print(f"{outcome.outcome:<8} {folder}\n    {outcome.text.partition(chr(10))[0]}", flush=True)
+        if not outcome.is_expected:
             count += 1
     return count
 
 
-def _fuzz_target(target: str, reader: Reader, arguments: argparse.Namespace) -> int:
+def _fuzz_target(target: str, reader: Reader, options: argparse.Namespace) -> int:
     """Fuzz a target, save the findings, and return their number."""
     if target not in SEEDS:
         print(f"{target:<10} has no seeds", flush=True)
         return 1
-    deadline = time.monotonic() + 60.0 * arguments.minutes
-    tally = fuzz(target, reader, arguments.seed, lambda _: time.monotonic() > deadline)
-    print(f"{tally}  (seed {arguments.seed})", flush=True)
+    deadline = time.monotonic() + 60.0 * options.minutes
+    tally = fuzz(target, reader, options.seed, lambda _: time.monotonic() > deadline)
+    print(f"{tally}  (seed {options.seed})", flush=True)
     for case, job, outcome in tally.findings.values():
         small = _shrink(case, job, outcome, reader)
-        folder = save(arguments.out, target, small, job, outcome)
-        print(f"  {outcome.outcome}: {outcome.words.partition(chr(10))[0]}\n    {folder}", flush=True)
+        folder = save(options.out, target, small, job, outcome)
+        print(f"  {outcome.outcome}: {outcome.text.partition(chr(10))[0]}\n    {folder}", flush=True)
     return len(tally.findings)
 
 

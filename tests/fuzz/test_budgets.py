@@ -1,16 +1,17 @@
-"""No file costs more than is promised, by a generous factor: machines are busy, and not all are as fast."""
+"""Time and memory for reading large files, compared with the budgets of the handbook."""
 
 from pathlib import Path
 
 import pytest
 from budgets import CASES, measure_cases
 
-FACTOR = 3.0
+MAX_BUDGET_SHARE = 3.0
+"""More than 1, because test machines are slower and run other processes."""
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is measured as Linux tells it")
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
 @pytest.mark.parametrize("name", [name for name in CASES if not name.startswith(("7,900", "noise", "rooms"))])
-def test_a_file_costs_no_more_than_is_promised(name: str) -> None:
+def test_reading_a_file_stays_within_its_budget(name: str) -> None:
     ((_, cost),) = measure_cases([name], seconds=60.0)
-    assert cost.share < FACTOR, cost
+    assert cost.share < MAX_BUDGET_SHARE, cost

@@ -1,4 +1,4 @@
-"""A short part of the fuzzing of `importers.py`, and that it finds what it is there for."""
+"""A short run of `importers.py`, and tests of the fuzzer itself."""
 
 import os
 from collections.abc import Iterator
@@ -12,19 +12,23 @@ from fuzz_reading import Job, Outcome, Reader
 from fuzz_seeds import SEEDS, Case
 from fuzz_shrinking import shrink
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name == "nt", reason="waits for pipes as POSIX does")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name == "nt", reason="select() works with pipes on POSIX only"),
+]
 
-FEW = {"dxf": 60}
-"""Cases of formats whose libraries are slow."""
+CASE_COUNT = 220
+CASE_COUNTS = {"dxf": 60}
+"""Fewer cases for formats with slow libraries."""
 
 
 @pytest.fixture(scope="module")
 def reader() -> Iterator[Reader]:
-    with Reader() as reading:
-        yield reading
+    with Reader() as reader:
+        yield reader
 
 
-def test_everything_that_reads_files_of_others_has_seeds() -> None:
+def test_every_target_has_seeds() -> None:
     assert set(SEEDS) == set(importers.list_targets())
 
 
@@ -32,61 +36,60 @@ def test_everything_that_reads_files_of_others_has_seeds() -> None:
 def test_every_seed_is_read(target: str, reader: Reader) -> None:
     for case in SEEDS[target]:
         outcome = reader.read(case, importers.build_usual_job(target))
-        assert outcome.outcome == "read", f"{outcome.words}\n{outcome.traceback}"
+        assert outcome.outcome == "read", f"{outcome.text}\n{outcome.traceback}"
 
 
 @pytest.mark.parametrize("target", SEEDS)
-def test_nothing_comes_of_some_inputs_but_maps_and_refusals(
-    target: str, reader: Reader, tmp_path: Path
-) -> None:
-    many = FEW.get(target, 220)
-    tally = importers.fuzz(target, reader, 0, lambda tally: sum(tally.counts.values()) >= many)
+def test_fuzzed_files_are_read_or_refused(target: str, reader: Reader, tmp_path: Path) -> None:
+    case_count = CASE_COUNTS.get(target, CASE_COUNT)
+    tally = importers.fuzz(target, reader, 0, lambda tally: sum(tally.counts.values()) >= case_count)
     for case, job, outcome in tally.findings.values():
-        place = importers.save(tmp_path, target, case, job, outcome)
-        print(f"{place}\n{outcome.signature}\n{outcome.words}\n{outcome.traceback}")
+        folder = importers.save(tmp_path, target, case, job, outcome)
+        print(f"{folder}\n{outcome.signature}\n{outcome.text}\n{outcome.traceback}")
     assert not tally.findings
-    assert sum(tally.counts.values()) == many
+    assert sum(tally.counts.values()) == case_count
     assert len(tally.kinds) > 1
 
 
-# The harness finds what it is there for
+# Tests of the fuzzer
 
 
-def read_word(word: str, reader: Reader) -> Outcome:
+def read_misbehaving_file(word: str, reader: Reader) -> Outcome:
+    """Read a file whose word makes the reading process misbehave."""
     return reader.read(Case({"word.txt": word.encode()}), Job("misbehaving"))
 
 
 @pytest.mark.parametrize(
-    ("word", "outcome", "words"),
+    ("word", "kind", "text"),
     [
         ("fine", "read", "fine"),
         ("refused", "refused", "word.txt: refused"),
         ("error", "error", "KeyError: 'error'"),
         ("warning", "error", "RuntimeWarning: something is odd"),
-        ("lines", "error", "WrongError: expected a message of one line"),
+        ("lines", "error", "UnexpectedEffectError: expected a message of one line"),
         ("memory", "memory", "MemoryError"),
         ("crash", "crash", "status -6"),
     ],
 )
-def test_what_may_not_be_is_found(word: str, outcome: str, words: str, reader: Reader) -> None:
-    found = read_word(word, reader)
-    assert found.outcome == outcome
-    assert found.words.startswith(words)
-    assert found.good == (outcome in ("read", "refused")) == (not found.signature)
-    # and it goes on after that
-    assert read_word("fine", reader).outcome == "read"
+def test_unexpected_effects_are_findings(word: str, kind: str, text: str, reader: Reader) -> None:
+    outcome = read_misbehaving_file(word, reader)
+    assert outcome.outcome == kind
+    assert outcome.text.startswith(text)
+    assert outcome.is_expected == (kind in ("read", "refused"))
+    assert bool(outcome.signature) == (not outcome.is_expected)
+    # Further files can be read.
+    assert read_misbehaving_file("fine", reader).outcome == "read"
 
 
-def test_what_hangs_is_ended() -> None:
+def test_a_hanging_process_is_restarted() -> None:
     with Reader(seconds=0.3) as reader:
-        assert read_word("fine", reader).outcome == "read"
-        found = read_word("hang", reader)
-        assert found.outcome == "hang"
-        assert read_word("fine", reader).outcome == "read"
-        assert reader.started == 2
+        assert read_misbehaving_file("fine", reader).outcome == "read"
+        assert read_misbehaving_file("hang", reader).outcome == "hang"
+        assert read_misbehaving_file("fine", reader).outcome == "read"
+        assert reader.start_count == 2
 
 
-def test_the_same_fault_is_one_finding_however_often() -> None:
+def test_findings_with_the_same_cause_are_counted_as_one() -> None:
     tally = importers.Tally("map")
     for k in range(3):
         tally.note(Case({"a": b"x"}), Job("map"), Outcome("error", f"KeyError: {k}", "error-here"))
@@ -96,47 +99,56 @@ def test_the_same_fault_is_one_finding_however_often() -> None:
     assert tally.counts == {"error": 3, "refused": 2}
 
 
-def test_findings_are_made_small() -> None:
-    big = Case({"plan.svg": b"line\n" * 50 + b"some <bad> words\n" + b"more\n" * 50, "beside": b"long\n" * 9})
-    small = shrink(big, lambda case: b"<bad>" in case.files["plan.svg"], 10.0)
-    assert small.files == {"plan.svg": b"<bad>", "beside": b""}
-    assert shrink(big, lambda case: False, 10.0) == big
-    assert shrink(big, lambda case: True, 0.0) == big
+def test_findings_are_shrunk() -> None:
+    plan = b"line\n" * 50 + b"some <bad> text\n" + b"more\n" * 50
+    case = Case({"plan.svg": plan, "other": b"long\n" * 9})
+    shrunk = shrink(case, lambda smaller: b"<bad>" in smaller.files["plan.svg"], 10.0)
+    assert shrunk.files == {"plan.svg": b"<bad>", "other": b""}
+    assert shrink(case, lambda smaller: False, 10.0) == case
+    assert shrink(case, lambda smaller: True, 0.0) == case
 
 
-def test_changes_are_by_chance_and_can_be_had_again() -> None:
+def test_mutations_are_random_and_reproducible() -> None:
+    def mutate_seeds(target: str) -> list[Case]:
+        random = Random(7)
+        seeds = SEEDS[target]
+        return [mutate(random.choice(seeds), target, seeds, random) for _ in range(40)]
+
     for target, seeds in SEEDS.items():
-        made = []
-        for _ in range(2):
-            random = Random(7)
-            made.append([mutate(random.choice(seeds), target, seeds, random) for _ in range(40)])
-        assert made[0] == made[1]
-        assert sum(case not in seeds for case in made[0]) > 25
-        assert all(set(case.files) in [set(seed.files) for seed in seeds] for case in made[0])
+        mutated = mutate_seeds(target)
+        assert mutated == mutate_seeds(target)
+        assert sum(case not in seeds for case in mutated) > 25
+        file_names = [set(seed.files) for seed in seeds]
+        assert all(set(case.files) in file_names for case in mutated)
 
 
-def test_a_finding_is_saved_so_that_it_can_be_read_again(tmp_path: Path) -> None:
+def test_a_saved_finding_can_be_loaded(tmp_path: Path) -> None:
     outcome = Outcome("error", "KeyError: 'x'", "error-KeyError-wkt.py:read", "Traceback ...")
-    place = importers.save(tmp_path, "wkt", SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}), outcome)
-    assert (place / "plan.wkt").read_bytes() == SEEDS["wkt"][0].files["plan.wkt"]
-    assert importers.read_saved(place) == (SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}))
-    assert "Traceback" in (place / "finding.txt").read_text()
+    folder = importers.save(tmp_path, "wkt", SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}), outcome)
+    assert (folder / "plan.wkt").read_bytes() == SEEDS["wkt"][0].files["plan.wkt"]
+    assert importers.read_saved(folder) == (SEEDS["wkt"][0], Job("import", "wkt", {"scale": 2.0}))
+    assert "Traceback" in (folder / "finding.txt").read_text()
 
 
-def test_findings_are_read_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    places = []
+def test_saved_findings_are_read_again_by_an_option(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = []
     for word in ("fine", "error"):
         case = Case({"word.txt": word.encode()})
-        places.append(importers.save(tmp_path, "map", case, Job("misbehaving"), Outcome("error", word, word)))
-    assert importers.main(["--again", *map(str, places)]) == 1
+        outcome = Outcome("error", text=word, signature=word)
+        folders.append(importers.save(tmp_path, "map", case, Job("misbehaving"), outcome))
+    assert importers.main(["--again", *map(str, folders)]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"read     {places[0]}"
-    assert lines[2] == f"error    {places[1]}"
-    assert importers.main(["--again", str(places[0])]) == 0
+    assert lines[0] == f"read     {folders[0]}"
+    assert lines[2] == f"error    {folders[1]}"
+    assert importers.main(["--again", str(folders[0])]) == 0
 
 
 @pytest.mark.slow
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_fuzzes_a_format_and_rejects_unknown_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert importers.main(["map", "--minutes", "0.01", "--seed", "5", "--out", str(tmp_path / "found")]) == 0
     assert capsys.readouterr().out.startswith("map ")
     assert not (tmp_path / "found").exists()
