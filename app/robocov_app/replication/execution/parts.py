@@ -3,7 +3,7 @@
 They are executed in an order in which the results that each part depends on are available.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ from robocov_app.replication.design.contenders import (
 from robocov_app.replication.design.plan import PARTITION_SEED, ROBOTS, Plan
 from robocov_app.replication.design.study_maps import (
     build_baseline_maps,
+    build_claim_maps,
+    build_convex_maps,
     build_density_maps,
     build_generated_maps,
     build_unseen_maps,
@@ -87,16 +89,18 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> FigureRuns:
     InputError
         If a run failed.
     """
-    return _run_figure_studies(studies.build_figure_studies(plan), folder, options)
+    sweeps = studies.build_figure_studies(plan)
+    run_studies(sweeps, folder, options, "paper: figures")
+    return _read_figure_studies(sweeps, folder)
 
 
-def _run_figure_studies(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptions) -> FigureRuns:
-    """Execute the runs of sweeps whose names are "figures-case" or "figures-case-variant"."""
+def _read_figure_studies(names: Iterable[str], folder: Path) -> FigureRuns:
+    """Read the runs of sweeps whose names are "figures-case" or "figures-case-variant"."""
     runs: FigureRuns = {}
-    for name, study in sweeps.items():
+    for name in names:
         _, name_case, *words = name.split("-")
         variant = runs.setdefault("-".join(words), {})
-        for row, run in _read_figure_runs(run_study(study, folder, name, options)):
+        for row, run in _read_figure_runs(get_study_folder(folder, name)):
             case = "other" if row["start"] == "other" else name_case
             variant[f"{case}/{row['controller']}"] = run
     return runs
@@ -116,33 +120,35 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
 
     The gain grids come first, because they determine the best gains of the contenders.
     """
-    figures = run_figures(folder, plan, options)
-    gains, references = _run_gain_grid(studies.build_gains_study(plan), "gains", folder, plan, options)
+    figure_studies = studies.build_figure_studies(plan)
+    gains_study = studies.build_gains_study(plan)
+    maps = (*gains_study.maps, *build_convex_maps(plan), *build_claim_maps(plan))
+    references = find_map_references(maps, folder, plan, options)
+    run_studies({**figure_studies, "gains": gains_study}, folder, options, "paper: figures and gains")
+    gains = read_gain_outcomes(get_study_folder(folder, "gains"), gains_study, references)
     paper_contenders = build_paper_contenders(find_best_gains(gains))
     best_studies = studies.build_best_figure_studies(plan, paper_contenders)
-    figures |= _run_figure_studies(best_studies, folder, options)
-    convex = studies.build_convex_contest(plan, paper_contenders)
-    claims = studies.build_claims_contest(plan, paper_contenders)
-    maps = (*convex.study.maps, *claims.study.maps)
-    references |= find_map_references(maps, folder, plan, options)
-    convex_folder = run_study(convex.study, folder, "convex", options)
-    convex_outcomes = read_outcomes(convex_folder, convex, references)
-    claims_folder = run_study(claims.study, folder, "claims", options)
-    claims_outcomes = read_outcomes(claims_folder, claims, references)
-    limited = studies.build_limited_contest(plan, paper_contenders)
-    limited_folder = run_study(limited.study, folder, "limited", options)
-    limited_outcomes = read_outcomes(limited_folder, limited, references)
-    names = [*studies.build_figure_studies(plan), *best_studies, "gains", "convex", "claims", "limited"]
-    runs, failed = _count_runs(folder, names)
+    contests = {
+        "convex": studies.build_convex_contest(plan, paper_contenders),
+        "claims": studies.build_claims_contest(plan, paper_contenders),
+        "limited": studies.build_limited_contest(plan, paper_contenders),
+    }
+    contest_studies = {name: contest.study for name, contest in contests.items()}
+    run_studies({**best_studies, **contest_studies}, folder, options, "paper: claims")
+    outcomes = {
+        name: read_outcomes(get_study_folder(folder, name), contest, references)
+        for name, contest in contests.items()
+    }
+    runs, failed = _count_runs(folder, [*figure_studies, "gains", *best_studies, *contests])
     return PaperResults(
-        figures=figures,
+        figures=_read_figure_studies([*figure_studies, *best_studies], folder),
         gains=gains,
-        convex=convex_outcomes,
-        claims=claims_outcomes,
-        limited=limited_outcomes,
+        convex=outcomes["convex"],
+        claims=outcomes["claims"],
+        limited=outcomes["limited"],
         contenders=paper_contenders,
         references=references,
-        worst=repeat_worst_runs(claims.study, claims_outcomes, RAPF_SHARED, _WORST_RUNS),
+        worst=repeat_worst_runs(contests["claims"].study, outcomes["claims"], RAPF_SHARED, _WORST_RUNS),
         runs=runs,
         failed=failed,
     )

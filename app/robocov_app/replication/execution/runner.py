@@ -10,6 +10,7 @@ from pathlib import Path
 from robocov.errors import InputError
 from robocov.files.result_folder import report_folder_errors
 from robocov.files.writing import replace_file
+from robocov.kernel_compilation import compile_kernels
 from robocov_app.replication.design.plan import Plan
 from robocov_app.replication.results.references import References, find_references
 from robocov_app.sweep import worker
@@ -155,6 +156,11 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
         for ledger in ledgers[task.input_hash]:
             ledger.store(task, outcome)
 
+    def open_pool() -> LocalPool:
+        # Otherwise all processes would compile the same kernels.
+        compile_kernels()
+        return LocalPool(min(options.workers, len(tasks)))
+
     with ExitStack() as stack:
         for name, study in studies.items():
             ledger = stack.enter_context(open_ledger(get_study_folder(folder, name), study.to_json()))
@@ -166,11 +172,10 @@ def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: Runner
         if not tasks and not notes:
             return
         progress = SweepProgress(len(tasks))
-        workers = min(options.workers, len(tasks))
         reporter = stack.enter_context(report_progress(title, progress, quiet=options.quiet))
         for note in notes:
             reporter.print_line(note)
-        for _ in execute_tasks(tasks.values(), lambda: LocalPool(workers), progress, options.stop, store):
+        for _ in execute_tasks(tasks.values(), open_pool, progress, options.stop, store):
             reporter.update(progress)
 
 
