@@ -1,14 +1,5 @@
 """The smallest study of the paper in which everything is run. Its results mean nothing."""
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
-import pytest
-
-from robocov.errors import OutputError
-from robocov.files.folder_lock import lock_folder
 from robocov_app.replication.design.plan import BeyondPlan, Plan
 from robocov_app.replication.execution.runner import RunnerOptions
 from robocov_app.terminal.interruption import Interruption
@@ -16,6 +7,7 @@ from robocov_app.terminal.interruption import Interruption
 TINY = Plan(
     name="quick",
     duration=6.0,
+    dt=0.05,
     bundled=("blocks-a",),
     generated=(1,),
     families=(),
@@ -44,7 +36,7 @@ TINY = Plan(
         map_starts=("corner",),
         conditions_maps=("rooms",),
         conditions_seeds=1,
-        conditions_duration=3.0,
+        conditions_duration=1.0,
         probe=2.0,
         worst=1,
         warm_up=1,
@@ -57,20 +49,3 @@ TINY = Plan(
 
 def build_options(workers: int = 2) -> RunnerOptions:
     return RunnerOptions(workers=workers, scheduler=None, quiet=True, stop=Interruption())
-
-
-@contextmanager
-def share_folder(factory: pytest.TempPathFactory, name: str) -> Iterator[Path]:
-    """Lock a folder that all workers of a test session share, and yield it."""
-    base = factory.getbasetemp()
-    folder = (base.parent if base.name.startswith("popen-") else base) / name
-    folder.mkdir(exist_ok=True)
-    while True:
-        try:
-            with lock_folder(folder):
-                yield folder
-            return
-        except OutputError as error:
-            if "another process" not in str(error):
-                raise
-            time.sleep(0.2)

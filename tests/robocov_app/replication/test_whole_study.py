@@ -2,7 +2,6 @@
 
 import json
 import os
-import pickle
 import re
 import shutil
 import signal
@@ -16,7 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny_paper import TINY, build_options, share_folder
+from swept import DirectExecutor
+from tiny_paper import TINY, build_options
+from tiny_paper_command import SAVED_FIGURES
 
 from robocov.controllers import CONTROLLERS
 from robocov.cost import CoverageCost
@@ -41,12 +42,14 @@ from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_fig
 from robocov_app.replication.formatting import format_amount
 from robocov_app.replication.pages import study_pages
 from robocov_app.replication.results import controller_speed
+from robocov_app.sweep import sweeping
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import generate_tasks
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
 FIRST = parts.record_partition()
+TINY_COMMAND = Path(__file__).parents[1] / "tiny_paper_command.py"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -57,26 +60,25 @@ def small_parts():
             contenders, "GAIN_GRIDS", {name: (grid[0], grid[-1]) for name, grid in GAIN_GRIDS.items()}
         )
         patch.setattr(controller_speed, "STEPS_PER_BLOCK", 3)
+        # Without starting processes, whose imports take longer than their runs.
+        patch.setattr(runner, "LocalPool", DirectExecutor)
+        patch.setattr(sweeping, "LocalPool", DirectExecutor)
         yield
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """The folder, the results of both parts, and the images of the paper's page."""
-    with share_folder(tmp_path_factory, "tiny-paper") as root:
-        folder = root / "out"
-        kept = root / "images"
-        open_folder(folder, TINY)
-        paper = parts.run_paper(folder, TINY, build_options())
-        if not kept.exists():
-            images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
-            claims = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
-            study_pages.write_claims(folder, claims)
-            page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=claims)
-            study_pages.write_text(folder / study_pages.PAGE_FILE, page)
-            kept.write_bytes(pickle.dumps(images))
-        beyond = parts.run_beyond(folder, TINY, build_options(), paper)
-    return folder, paper, beyond, pickle.loads(kept.read_bytes())
+    folder = tmp_path_factory.mktemp("tiny-paper") / "out"
+    open_folder(folder, TINY)
+    paper = parts.run_paper(folder, TINY, build_options())
+    images = figure_files.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
+    claims = judge_paper_claims(paper.convex, paper.claims, paper.limited, paper.gains)
+    study_pages.write_claims(folder, claims)
+    page = study_pages.build_paper_page(TINY, images, paper.figures, results=paper, claims=claims)
+    study_pages.write_text(folder / study_pages.PAGE_FILE, page)
+    beyond = parts.run_beyond(folder, TINY, build_options(), paper)
+    return folder, paper, beyond, images
 
 
 DRAWN = {
@@ -291,20 +293,10 @@ class TestBeyond:
         assert len(labels) == len(beyond.contenders) - 1
 
 
-TINY_COMMAND = (
-    "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
-    "from tiny_paper import TINY\n"
-    "from robocov_app.replication.design import plan\n"
-    "plan.QUICK = TINY\n"
-    "from robocov_app.cli import main\n"
-    "sys.exit(main(['paper', '--quick', '--without-beyond', *sys.argv[1:]]))\n"
-)
-
-
 def start_study(*words: str) -> subprocess.Popen[str]:
     """Start the command with the tiny study in its own process."""
     return subprocess.Popen(
-        [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parents[1]), *words],
+        [sys.executable, str(TINY_COMMAND), *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -354,8 +346,9 @@ class TestStopping:
         for name in ("gains", "convex", "claims"):
             table = Path("studies") / name / "results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
-        for picture in (folder / "figures").iterdir():
-            assert (out / "figures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
+        assert {path.name for path in (out / "figures").iterdir()} == set(SAVED_FIGURES)
+        for name in SAVED_FIGURES:
+            assert (out / "figures" / name).read_bytes() == (folder / "figures" / name).read_bytes()
 
     def test_no_run_starts_after_ctrl_c(self, folder, tmp_path):
         open_folder(tmp_path / "out", TINY)
@@ -512,7 +505,7 @@ class TestPages:
         for words in (
             f"{paper.runs} runs; 0 failed",
             *(
-                "0.02 s",
+                "0.05 s",
                 "6 s each",
                 "(seeds 101, 102)",
                 "with polygons (seeds 1)",
@@ -638,6 +631,7 @@ class TestPages:
 class TestCommand:
     def test_figures_only(self, tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(planned, "QUICK", TINY)
+        monkeypatch.setattr(figure_files, "save_figure", lambda figure, path: path.touch())
         out = tmp_path / "out"
         assert main(["paper", "--quick", "--figures-only", "--out", str(out), "--json"]) == 0
         answer = json.loads(capsys.readouterr().out)
