@@ -79,15 +79,34 @@ def test_the_source_archive_has_the_tests_and_no_film(tmp_path: Path) -> None:
     assert Path(archive).stat().st_size < 5.5e6
 
 
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    (path,) = WheelBuilder(str(ROOT)).build(directory=str(folder), versions=["standard"])
+    return Path(path)
+
+
 @pytest.mark.slow
+@pytest.mark.xdist_group("wheel")
+def test_the_wheel_contains_all_assets_of_pages(wheel: Path) -> None:
+    packed = set(zipfile.ZipFile(wheel).namelist())
+    assets = {path.name for path in (ROOT / "app/robocov_app/report/assets").iterdir()}
+    assert {"report.html.jinja", "report.css", "replay.js"} <= assets
+    assert {f"robocov_app/report/assets/{name}" for name in assets} <= packed
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("wheel")
 @pytest.mark.skipif(not WITH_SPHINX, reason="needs robocov[docs]")
-def test_the_wheel_carries_maps_entries_and_a_handbook_that_needs_no_sphinx(tmp_path: Path) -> None:
-    (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+def test_the_wheel_carries_maps_entries_and_a_handbook_that_needs_no_sphinx(
+    wheel: Path, tmp_path: Path
+) -> None:
     site = tmp_path / "site"
     empty = tmp_path / "empty"
     with zipfile.ZipFile(wheel) as files:
         files.extractall(site)
-    assert Path(wheel).stat().st_size < 6e6
+    assert wheel.stat().st_size < 6e6
     assert {path.name for path in site.iterdir() if "-" not in path.name} == {"robocov", "robocov_app"}
     assert (site / "robocov/__init__.pyi").is_file(), "the list of public names"
     assert (site / "robocov_app/pages/searchindex.js").is_file() and (

@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +15,6 @@ from reported_results import build_record, save_comparison, save_run
 
 from robocov.files.result_folder import create_result, is_report
 from robocov_app.cli import main
-
-ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -111,17 +108,6 @@ def test_help_loads_nothing_heavy() -> None:
     said, _, loaded = done.stdout.partition("LOADED")
     assert "Example: robocov report" in said and re.search(r"--theme \{auto,light,dark\}", said)
     assert not set(loaded.split()) & {"matplotlib", "jinja2", "pyarrow", "pygame", "scipy"}
-
-
-@pytest.mark.slow
-def test_a_wheel_contains_all_assets_of_pages(tmp_path) -> None:
-    from hatchling.builders.wheel import WheelBuilder
-
-    (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
-    packed = set(zipfile.ZipFile(wheel).namelist())
-    parts = {path.name for path in (ROOT / "app/robocov_app/report/assets").iterdir()}
-    assert {"report.html.jinja", "report.css", "replay.js"} <= parts
-    assert {f"robocov_app/report/assets/{name}" for name in parts} <= packed
 
 
 @pytest.mark.slow
