@@ -28,8 +28,3 @@ def read_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
     output = capsys.readouterr()
     assert output.err == ""
     return json.loads(output.out)
-
-
-# Former names
-read_complaint = read_error
-answer = read_json

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from called import COMMAND, answer, read_complaint
+from called import COMMAND, read_error, read_json
 from driven_browser import CHROMIUM, DRIVER, Browser
 from hypothesis import given
 from hypothesis import strategies as st
@@ -95,7 +95,7 @@ def test_runs_are_rated_verified_and_shown_on_a_page(
     assert verify(tmp_path / "a", sample=1) == (1, [])
     page = str(tmp_path / "page.html")
     folders = [str(tmp_path / name) for name in "ab"]
-    assert answer(capsys, "benchmark", "page", *folders, "--alone", "--out", page)["entries"] == 2
+    assert read_json(capsys, "benchmark", "page", *folders, "--alone", "--out", page)["entries"] == 2
     text = Path(page).read_text()
     assert "RAPF (k_rep 0.5)" in text and "Gap and path length" in text and "<h2" in text
 
@@ -213,7 +213,7 @@ def test_the_page_rejects_gaps_that_do_not_follow_from_costs(
     out = tmp_path / "out"
     run_short_benchmark(out)
     forge(out, lambda result: result["rows"][0].update(gap=0.01))
-    message = read_complaint(
+    message = read_error(
         capsys, "benchmark", "page", str(out), "--alone", "--out", str(tmp_path / "page.html")
     )
     assert "rows[0]: gap: expected" in message
@@ -340,10 +340,10 @@ def test_controllers_in_files_are_verified_only_if_named_and_unchanged(
     mine.write_text(HEAD + PULL)
     run_short_benchmark(out, f"{mine}:Mine")
     assert str(tmp_path) not in (out / RESULT_FILE).read_text()
-    assert "pass --controller FILE.py:CLASS" in read_complaint(capsys, "benchmark", "verify", str(out))
+    assert "pass --controller FILE.py:CLASS" in read_error(capsys, "benchmark", "verify", str(out))
     assert verify(out, sample=1, controller=f"{mine}:Mine") == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
-    message = read_complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
+    message = read_error(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
     assert "is not the source that was rated" in message
 
 
@@ -361,9 +361,7 @@ def test_damaged_results_are_rejected_in_one_line(tmp_path: Path, capsys: pytest
                 whole |= {} if value is None else {name: value}
                 if value is None or name not in ("gains", "set", "entry", "selection", "versions"):
                     (out / RESULT_FILE).write_text(json.dumps(damaged))
-                    assert str(out / RESULT_FILE) in read_complaint(
-                        capsys, "benchmark", "verify", str(out)
-                    ), name
+                    assert str(out / RESULT_FILE) in read_error(capsys, "benchmark", "verify", str(out)), name
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -397,7 +395,7 @@ def test_invalid_commands_are_rejected(
     (tmp_path / "torn.json.gz").write_bytes(gzip.compress(b"{}" * 99)[:-9])
     paths = {"FOREIGN": str(tmp_path), "OTHER": str(tmp_path / "other.json")}
     paths["TORN"] = str(tmp_path / "torn.json.gz")
-    assert message in read_complaint(capsys, "benchmark", *(paths.get(word, word) for word in words))
+    assert message in read_error(capsys, "benchmark", *(paths.get(word, word) for word in words))
 
 
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))

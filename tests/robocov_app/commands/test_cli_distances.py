@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, read_complaint
+from called import SHORT, read_error
 from PIL import Image
 
 from robocov_app.cli import main
@@ -43,7 +43,7 @@ def test_unknown_layers_are_rejected_before_the_run(
     option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    message = read_complaint(capsys, "run", "trap", *SHORT, option, "distanses", "--out", str(out))
+    message = read_error(capsys, "run", "trap", *SHORT, option, "distanses", "--out", str(out))
     assert message.startswith(f"{option}: unknown layer 'distanses': did you mean 'distances'?")
     assert not out.exists()
 
@@ -64,5 +64,5 @@ def test_cost_draws_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 
 def test_an_unwritable_map_is_reported_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("cost", "rooms", "--positions", str(tmp_path / "missing.json"), "--plot")
-    assert "'.jpg'" in read_complaint(capsys, *words, str(tmp_path / "a.jpg"))
-    assert "there is no folder" in read_complaint(capsys, *words, str(tmp_path / "b" / "a.png"))
+    assert "'.jpg'" in read_error(capsys, *words, str(tmp_path / "a.jpg"))
+    assert "there is no folder" in read_error(capsys, *words, str(tmp_path / "b" / "a.png"))

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, answer, read_complaint
+from called import COMMAND, read_error, read_json
 
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import dump_map, list_bundled_maps, load_map
@@ -42,7 +42,7 @@ def test_a_map_is_printed_or_saved(kind: str, tmp_path: Path, capsys: pytest.Cap
 def test_every_option_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "map.json"
     words = "--kind rooms --seed 3 --obstacles 8 --area 0.15 --gap 0.7 --width 12 --height 9"
-    row = answer(capsys, "generate", *words.split(), "--out", str(out))
+    row = read_json(capsys, "generate", *words.split(), "--out", str(out))
     expected = generate_map(3, kind="rooms", obstacles=8, area=0.15, gap=0.7, width=12, height=9)
     assert load_map(out) == expected
     assert row["out"] == str(out)
@@ -66,7 +66,7 @@ def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixt
     for seed, name in enumerate(names, start=8):
         assert load_map(folder / name) == generate_map(seed, kind="mazes")
     assert sheet.read_bytes().startswith(b"\x89PNG")
-    assert read_complaint(capsys, *words).startswith(
+    assert read_error(capsys, *words).startswith(
         f"{folder}: the folder is not empty; choose another --out or"
     )
 
@@ -88,7 +88,7 @@ def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFi
 
 @pytest.mark.slow
 def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
+    rows = read_json(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
     every = *build_claim_maps(QUICK), *build_tuning_maps(QUICK), *build_convex_maps(QUICK)
     maps = {each.name: each.environment for each in every}
     drawn = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
@@ -102,7 +102,7 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
     extra = drawn["generated-2"].extra["generator"]
     words = [f"--{name}={extra[name]}" for name in ("kind", "seed", "obstacles", "area")]
     out = tmp_path / "again.json"
-    answer(
+    read_json(
         capsys, "generate", *words, f"--gap={extra['gap_m']}", f"--side={extra['width_m']}", "-o", str(out)
     )
     assert load_map(out).obstacles == drawn["generated-2"].obstacles
@@ -153,7 +153,7 @@ def test_impossible_maps_are_reported_with_the_option(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert read_complaint(capsys, "generate", *words.split()).startswith(message)
+    assert read_error(capsys, "generate", *words.split()).startswith(message)
     assert not list(tmp_path.iterdir())
 
 
@@ -166,11 +166,11 @@ def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.Cap
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "map.json"
     file.write_text("mine")
-    assert "already exists; choose another --out or pass --overwrite" in read_complaint(
+    assert "already exists; choose another --out or pass --overwrite" in read_error(
         capsys, "generate", "-o", str(file)
     )
     assert file.read_text() == "mine"
-    assert "cannot be used for maps: " in read_complaint(
+    assert "cannot be used for maps: " in read_error(
         capsys, "generate", "--count", "2", "-o", str(file / "x")
     )
 

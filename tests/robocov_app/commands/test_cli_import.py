@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 from raster_files import PLAN, build_pgm, draw_pixels, write_ros_map
 
 from robocov.mapfile import load_map
@@ -42,7 +42,7 @@ def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_the_answer_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
-    row = answer(
+    row = read_json(
         capsys, "import", str(path), "-o", str(tmp_path / "a.json"), "--unknown", "cut", "--simplify", "0"
     )
     assert (row["out"], row["source"], row["format"]) == (str(tmp_path / "a.json"), str(path), "ros")
@@ -60,7 +60,7 @@ def test_the_name_of_the_map_is_that_of_the_file(
     (tmp_path / "maps" / "grid.map").write_text(GRID)
     assert run_command(capsys, "import", "maps/grid.map", "--cell", "0.5")[-1] == "saved in grid.json"
     assert load_map(Path("grid.json")).free_area == 1.25
-    assert "grid.json: already exists; choose another -o or pass --overwrite" in read_complaint(
+    assert "grid.json: already exists; choose another -o or pass --overwrite" in read_error(
         capsys, "import", "maps/grid.map"
     )
     words = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")
@@ -71,12 +71,12 @@ def test_the_name_of_the_map_is_that_of_the_file(
 def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "plan.map"
     path.write_text(GRID)
-    message = read_complaint(capsys, "import", str(path), "--overwrite", "-o", str(path))
+    message = read_error(capsys, "import", str(path), "--overwrite", "-o", str(path))
     assert f"{path}: is the file being read; choose another -o" in message
     picture = tmp_path / "plan.png"
     picture.write_bytes(b"")
     words = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(picture))
-    assert "choose another --preview" in read_complaint(capsys, "import", str(picture), *words)
+    assert "choose another --preview" in read_error(capsys, "import", str(picture), *words)
     assert path.read_text() == GRID
     assert set(tmp_path.iterdir()) == {path, picture}
 
@@ -110,7 +110,7 @@ def test_invalid_options_are_rejected(
     write_ros_map(tmp_path, draw_pixels(PLAN))
     (tmp_path / "grid.map").write_text(GRID)
     out = tmp_path / "out.json"
-    assert expected in read_complaint(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
+    assert expected in read_error(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
     assert not out.exists()
 
 
@@ -131,6 +131,6 @@ def test_a_large_map_is_soon_there(tmp_path: Path, capsys: pytest.CaptureFixture
     for door in range(90, 1200, 300):
         pixels[door : door + 20, ::300] = pixels[::300, door : door + 20] = 254
     path = write_ros_map(tmp_path, build_pgm(pixels), resolution=0.05)
-    row = answer(capsys, "import", str(path), "-o", str(tmp_path / "a.json"))
+    row = read_json(capsys, "import", str(path), "-o", str(tmp_path / "a.json"))
     assert row["vertices_kept"] < row["vertices_read"] / 2
     assert row["area_kept_m2"] == pytest.approx(row["area_read_m2"], rel=0.01)

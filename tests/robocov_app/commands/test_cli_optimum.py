@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import COMMAND, SHORT, answer, read_complaint
+from called import COMMAND, SHORT, read_error, read_json
 from PIL import Image
 
 from robocov.environment import DiscStart, Environment, WallObstacle
@@ -21,7 +21,9 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "best.json"
-    row = answer(capsys, "optimum", "trap", *FAST, "--robots", "3", "--seed", "2", "--positions", str(file))
+    row = read_json(
+        capsys, "optimum", "trap", *FAST, "--robots", "3", "--seed", "2", "--positions", str(file)
+    )
     from robocov.mapfile import load_map
 
     best = find_optimum(load_map("trap"), 3, lattice=24, restarts=3, seed=2)
@@ -37,7 +39,7 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
         "0.005": best.compute_agreement(),
         "0.02": best.compute_agreement(0.02),
     }
-    cost = answer(capsys, "cost", "trap", "--positions", str(file), "--lattice", "24")
+    cost = read_json(capsys, "cost", "trap", "--positions", str(file), "--lattice", "24")
     assert cost["mean_distance_m"] == pytest.approx(best.mean_distance, rel=1e-12)
     assert cost["cost_m3"] == pytest.approx(row["cost_m3"], rel=1e-12)
     # one robot a line
@@ -55,7 +57,7 @@ def test_the_import_is_reported_as_text(capsys: pytest.CaptureFixture[str]) -> N
 
 def test_a_lower_bound_is_proved_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     how = ("optimum", "square", "--lattice", "12", "--restarts", "2", "--robots", "1", "--bound")
-    bound = (row := answer(capsys, *how))["lower_bound"]
+    bound = (row := read_json(capsys, *how))["lower_bound"]
     assert bound["mean_distance_m"] < row["mean_distance_m"]
     assert bound["cost_m3"] == pytest.approx(100.0 * bound["mean_distance_m"])
     assert bound["gap"] == pytest.approx(1.0 - bound["mean_distance_m"] / row["mean_distance_m"])
@@ -70,7 +72,7 @@ def test_the_gap_of_a_run_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtu
     out = tmp_path / "run"
     assert main(["run", "trap", *SHORT, "--robots", "4", "--out", str(out)]) == 0
     capsys.readouterr()
-    row = answer(capsys, "optimum", "--run", str(out), "--lattice", "16", "--restarts", "3")
+    row = read_json(capsys, "optimum", "--run", str(out), "--lattice", "16", "--restarts", "3")
     end = json.loads((out / "run.json").read_bytes())["summary"]["mean_distance_m"]
     (run,) = row["runs"]
     assert row["robots"] == 4
@@ -89,7 +91,7 @@ def test_a_comparison_has_a_gap_for_each_controller(
     out = tmp_path / "both"
     assert main(["compare", "trap", *SHORT, "--controllers", "rapf", "rpf", "--out", str(out)]) == 0
     capsys.readouterr()
-    row = answer(capsys, "optimum", "--run", str(out), *FAST)
+    row = read_json(capsys, "optimum", "--run", str(out), *FAST)
     assert [run["run"] for run in row["runs"]] == ["rapf", "rpf"]
     assert all(run["gap"] > 0.0 for run in row["runs"])
 
@@ -106,7 +108,7 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
     out = tmp_path / "run"
     assert main(["run", str(tmp_path / "halves.json"), *SHORT, "--robots", "2", "--out", str(out)]) == 0
     capsys.readouterr()
-    row = answer(capsys, "optimum", "--run", str(out), *FAST)
+    row = read_json(capsys, "optimum", "--run", str(out), *FAST)
     assert row["uncovered_area_m2"] == 0.0
     assert row["runs"][0]["gap"] is None
     assert main(["optimum", "--run", str(out), *FAST]) == 0
@@ -152,14 +154,14 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_mistakes_are_named(words: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert part in read_complaint(capsys, "optimum", *words)
+    assert part in read_error(capsys, "optimum", *words)
 
 
 def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.json"
     file.write_text("[[1, 1]]")
     words = ("optimum", "trap", *FAST, "--positions", str(file))
-    assert "already exists" in read_complaint(capsys, *words)
+    assert "already exists" in read_error(capsys, *words)
     assert file.read_text() == "[[1, 1]]"
     assert main([*words, "--overwrite"]) == 0
     assert len(json.loads(file.read_bytes())) == 6

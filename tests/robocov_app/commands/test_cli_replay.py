@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 from PIL import Image
 from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, start_session
 from session_records import build_records
@@ -88,7 +88,7 @@ def test_a_comparison_is_shown_side_by_side_with_distances(
     """On one map, although a robot failed at another place in each run."""
     out = tmp_path / "film"
     words = ("--frames", *SMALL, "--show", "distances", "--fps", "5", "--theme", "dark")
-    printed = answer(capsys, "replay", str(saved_results / "both"), *words, "--out", str(out))
+    printed = read_json(capsys, "replay", str(saved_results / "both"), *words, "--out", str(out))
     assert printed == {"out": str(out), "interrupted": False}
     frames = read_pictures(out)
     assert len(frames) == 6 + 5
@@ -99,7 +99,7 @@ def test_a_comparison_is_shown_side_by_side_with_distances(
 def test_the_json_file_does_as_well_as_its_folder(saved_results: Path, tmp_path: Path, capsys) -> None:
     for name, source in (("one", "run/run.json"), ("two", "both/comparison.json")):
         words = ("--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / name))
-        answer(capsys, "replay", str(saved_results / source), *words)
+        read_json(capsys, "replay", str(saved_results / source), *words)
         assert len(read_pictures(tmp_path / name)) == 3
 
 
@@ -108,10 +108,10 @@ def test_an_earlier_video_is_replaced_only_with_overwrite(
 ) -> None:
     out = tmp_path / "film"
     words = ("replay", str(saved_results / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
-    answer(capsys, *words)
+    read_json(capsys, *words)
     (out / "notes.txt").write_text("mine")
-    assert "is not empty" in read_complaint(capsys, *words)
-    answer(capsys, *words, "--overwrite", "--video-speed", "4")
+    assert "is not empty" in read_error(capsys, *words)
+    read_json(capsys, *words, "--overwrite", "--video-speed", "4")
     assert len(read_pictures(out)) == 2 + 2
     assert (out / "notes.txt").read_text() == "mine"
 
@@ -119,7 +119,7 @@ def test_an_earlier_video_is_replaced_only_with_overwrite(
 def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) -> None:
     for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
         words = ("--frames", *SMALL, "--overwrite", "--out", str(out))
-        assert read_complaint(capsys, "replay", str(source), *words).endswith(
+        assert read_error(capsys, "replay", str(source), *words).endswith(
             "expected a folder other than that of the run"
         )
     assert (run / "record.npz").exists()
@@ -131,16 +131,16 @@ def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsy
     (whole,) = build_records(advance_session(start_session(LLOYD), 60))
     short.save(both / "rpf")
     whole.save(both / "lloyd")
-    answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
+    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
     assert len(read_pictures(tmp_path / "film")) == 3 + 2
-    assert read_complaint(capsys, "replay", str(both)) == (
+    assert read_error(capsys, "replay", str(both)) == (
         f"{both}/lloyd: moments: expected 31 as in {both}/rpf, got 61; --frames and --video show both"
     )
 
 
 def test_the_finished_runs_of_a_killed_comparison_can_be_replayed(both: Path, tmp_path: Path, capsys) -> None:
     shutil.rmtree(both / "lloyd")
-    answer(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "film"))
+    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "film"))
     assert len(read_pictures(tmp_path / "film")) == 3
 
 
@@ -183,7 +183,7 @@ def test_the_window_shows_a_comparison(both: Path, opened_sessions: list[Session
 def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
-    printed = read_complaint(capsys, "replay", str(run))
+    printed = read_error(capsys, "replay", str(run))
     assert printed.startswith(
         "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR"
     )
@@ -210,7 +210,7 @@ def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, ca
     ],
 )
 def test_inapplicable_options_are_rejected(run: Path, capsys, words: str, message: str) -> None:
-    assert read_complaint(capsys, "replay", str(run), *words.split()).startswith(message)
+    assert read_error(capsys, "replay", str(run), *words.split()).startswith(message)
 
 
 def edit_json(path: Path, **changes) -> None:
@@ -280,7 +280,7 @@ def edit_arrays(folder: Path, **changes) -> None:
 )
 def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message: str) -> None:
     spoil(run)
-    assert read_complaint(capsys, "replay", str(run)).startswith(message.format(run=run))
+    assert read_error(capsys, "replay", str(run)).startswith(message.format(run=run))
 
 
 @pytest.mark.parametrize(
@@ -324,4 +324,4 @@ def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message
 )
 def test_a_damaged_comparison_is_rejected_in_one_line(both: Path, capsys, spoil, message: str) -> None:
     spoil(both)
-    assert read_complaint(capsys, "replay", str(both)).startswith(message.format(both=both))
+    assert read_error(capsys, "replay", str(both)).startswith(message.format(both=both))

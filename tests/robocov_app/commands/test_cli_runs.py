@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, read_complaint
+from called import SHORT, read_error, read_json
 
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.record import Record
@@ -40,7 +40,7 @@ def test_run_saves_everything_and_prints_the_folder(
 
 @pytest.mark.usefixtures("no_figures")
 def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    row = answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
+    row = read_json(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(row)
     assert row["settled_at_s"] is None
     assert row["interrupted"] is False
@@ -49,7 +49,7 @@ def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture
 @pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):
-        answer(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
+        read_json(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
     for file in FILES:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 
@@ -58,7 +58,7 @@ def test_compare_gives_every_controller_the_same_starts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "compare"
-    rows = answer(
+    rows = read_json(
         capsys, "compare", "rooms", *SHORT, "--set", "k_rep=1", "rpf.k_rep=2", "--video", "--out", str(out)
     )
     assert [row["controller"] for row in rows["runs"]] == ["rapf", "rpf", "lloyd"]
@@ -76,13 +76,13 @@ def test_overwrite_removes_only_the_earlier_result(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    answer(capsys, "run", "square", *SHORT, "--frames", "--out", str(out))
+    read_json(capsys, "run", "square", *SHORT, "--frames", "--out", str(out))
     mine = [out / name for name in ("notes.txt", ".x.part.zip", "frames/2024-holiday.png")]
     for path in mine:
         path.write_text("mine")
-    answer(capsys, "metrics", str(out))
-    assert "not empty" in read_complaint(capsys, "run", "square", *SHORT, "--out", str(out))
-    answer(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
+    read_json(capsys, "metrics", str(out))
+    assert "not empty" in read_error(capsys, "run", "square", *SHORT, "--out", str(out))
+    read_json(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
     assert [path.read_text() for path in mine] == ["mine"] * 3
     assert list((out / "frames").iterdir()) == [mine[2]]
     assert not (out / "metrics.csv").exists(), "it was that of the run which is gone"
@@ -96,34 +96,34 @@ def test_an_obstructed_result_keeps_the_earlier_one(
     out = tmp_path / "run"
     elsewhere = tmp_path / "elsewhere"
     words = ("run", "square", *SHORT, "--video", "--frames", "--out", str(out), "--overwrite")
-    answer(capsys, "run", "square", *SHORT, "--out", str(out))
+    read_json(capsys, "run", "square", *SHORT, "--out", str(out))
     elsewhere.mkdir()
     before = (out / "run.json").read_bytes()
     (out / "run.mp4").mkdir()
-    assert "run.mp4: is in the way" in read_complaint(capsys, *words)
+    assert "run.mp4: is in the way" in read_error(capsys, *words)
     (out / "run.mp4").rmdir()
     (out / "frames").symlink_to(elsewhere)
-    assert "frames: is a link, which is not followed" in read_complaint(capsys, *words)
+    assert "frames: is a link, which is not followed" in read_error(capsys, *words)
     assert (out / "run.json").read_bytes() == before
     assert list(elsewhere.iterdir()) == []
 
 
 @pytest.mark.usefixtures("no_figures")
 def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
+    read_json(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     inner = tmp_path / "run" / "inner"
     inner.mkdir()
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": [".."]}'
     )
-    assert "folders[0]: expected the name of a folder" in read_complaint(capsys, "metrics", str(inner))
-    answer(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
+    assert "folders[0]: expected the name of a folder" in read_error(capsys, "metrics", str(inner))
+    read_json(capsys, "run", "square", *SHORT, "--out", str(inner), "--overwrite")
     assert len(Record.load(tmp_path / "run")) == len(Record.load(inner)) == 61
     (inner / "comparison.json").write_text(
         '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
     )
     (inner / "on").symlink_to(tmp_path / "run")
-    assert "on: expected a folder inside the folder of the comparison, got a link" in read_complaint(
+    assert "on: expected a folder inside the folder of the comparison, got a link" in read_error(
         capsys, "metrics", str(inner)
     )
 
@@ -140,7 +140,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         "        return self.pull * (own.centroid - own.position)\n"
     )
     out = tmp_path / "run"
-    answer(
+    read_json(
         capsys, "run", "square", *SHORT, "--controller", f"{mine}:Mine", "--set", "pull=2", "--out", str(out)
     )
     record = Record.load(out)
@@ -203,7 +203,7 @@ def test_a_class_that_fails_is_named_with_its_line(
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")
     words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_complaint(capsys, *words, status=1 if "ended Python" in part else 2)
+    assert part in read_error(capsys, *words, status=1 if "ended Python" in part else 2)
     assert not out.exists()
 
 
@@ -234,7 +234,7 @@ def test_a_traceback_is_shown_on_request(
     ids=range(9),
 )
 def test_an_unknown_gain_is_rejected(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    said = read_complaint(capsys, "run", "square", "--set", f"k_rep={value}")
+    said = read_error(capsys, "run", "square", "--set", f"k_rep={value}")
     assert said.startswith(message) and len(said) < 200
 
 
@@ -275,7 +275,7 @@ def test_a_controller_that_fails_is_named_with_its_line(
     )
     out = tmp_path / "run"
     words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_complaint(capsys, *words, status=1 if "ended Python" in part else 2)
+    assert part in read_error(capsys, *words, status=1 if "ended Python" in part else 2)
     assert not out.exists(), "a folder with nothing in it is not left behind"
 
 

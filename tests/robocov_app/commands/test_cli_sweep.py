@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 from swept import ROOM, list_run_folders, read_tables, write_controller
 
 from robocov.mapfile import save_map
@@ -55,7 +55,7 @@ def test_a_sweep_answers_in_json(
     study: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(study.parent)
-    found = answer(capsys, "sweep", "study.toml", "--workers", "1")
+    found = read_json(capsys, "sweep", "study.toml", "--workers", "1")
     (versions,) = found.pop("versions")
     assert versions.startswith("robocov ") and ", numpy " in versions and ", pymunk " in versions
     assert found == {
@@ -102,7 +102,7 @@ def test_failures_are_reported_each_time_with_an_exit_status(
 def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(study.parent.rglob("*"))
     out = str(study.parent / "out")
-    found = answer(capsys, "sweep", str(study), "--out", out, "--dry-run", "--workers", "3")
+    found = read_json(capsys, "sweep", str(study), "--out", out, "--dry-run", "--workers", "3")
     assert (found["runs"], found["left"], found["workers"]) == (8, 8, 3)
     assert found["seconds"] == pytest.approx(found["seconds_per_run"] * 8 / 3)
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
@@ -119,7 +119,7 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
 
 def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(study.parent / "out")
-    answer(capsys, "sweep", str(study), "--out", out, "--workers", "1")
+    read_json(capsys, "sweep", str(study), "--out", out, "--workers", "1")
     study.write_text(STUDY.replace("seeds = 2", "seeds = 3"))
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
     assert "runs                      12   (8 of them already done)\n" in capsys.readouterr().out
@@ -136,15 +136,15 @@ def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixtu
 def test_options_are_checked(
     study: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert message in read_complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"), *words)
+    assert message in read_error(capsys, "sweep", str(study), "--out", str(study.parent / "out"), *words)
     assert not (study.parent / "out").exists()
 
 
 def test_mistakes_in_the_study_are_one_line(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study.write_text(STUDY.replace("k_rep", "k_rap"))
-    said = read_complaint(capsys, "sweep", str(study), "--out", str(study.parent / "out"))
+    said = read_error(capsys, "sweep", str(study), "--out", str(study.parent / "out"))
     assert said.startswith(f"{study}: gains.rpf: unknown gain 'k_rap': did you mean 'k_rep'?")
-    assert "no such file" in read_complaint(capsys, "sweep", str(study.parent / "none.toml"))
+    assert "no such file" in read_error(capsys, "sweep", str(study.parent / "none.toml"))
     assert not (study.parent / "out").exists()
 
 
@@ -159,12 +159,12 @@ def test_a_full_disk_is_reported_and_the_sweep_can_be_resumed(
     words = ("sweep", str(study), "--out", str(out), "--workers", "1")
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", fail_as_disk_is_full)
-        said = read_complaint(capsys, *words, "--json")
+        said = read_error(capsys, *words, "--json")
     assert said.endswith("cannot be written: No space left on device")
     assert list_run_folders(out) == []
-    assert answer(capsys, *words)["done"] == 8
+    assert read_json(capsys, *words)["done"] == 8
     again = study.parent / "again"
-    answer(capsys, "sweep", str(study), "--out", str(again), "--workers", "1")
+    read_json(capsys, "sweep", str(study), "--out", str(again), "--workers", "1")
     assert read_tables(again) == read_tables(out)
 
 
@@ -183,19 +183,19 @@ def test_a_foreign_file_with_a_reserved_name_is_rejected_in_one_line(
         (out / name).touch()
     else:
         (out / name / "mine").mkdir(parents=True)
-    assert str(out) in read_complaint(capsys, *words)
+    assert str(out) in read_error(capsys, *words)
     assert (out / name).exists() and (name == "runs" or (out / name / "mine").is_dir())
 
 
 @pytest.mark.slow
 def test_a_run_of_a_sweep_can_be_replayed(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = study.parent / "out"
-    answer(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")
+    read_json(capsys, "sweep", str(study), "--out", str(out), "--workers", "1")
     with (out / "results.csv").open(newline="") as file:
         run = out / "runs" / next(csv.DictReader(file))["run"]
     content = json.loads((run / "run.json").read_text())
     assert content["record_hz"] == 2.0
     frames = study.parent / "frames"
     words = ("replay", str(run), "--frames", "--fps", "4", "--video-speed", "1", "--size", "320x240")
-    assert answer(capsys, *words, "--out", str(frames))["interrupted"] is False
+    assert read_json(capsys, *words, "--out", str(frames))["interrupted"] is False
     assert len(list((frames / "frames").iterdir())) == 4 + 1 + 4, "as many as of a run with all moments"

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, answer, read_complaint
+from called import SHORT, read_error, read_json
 
 from robocov.record import Record
 from robocov_app.cli import main
@@ -32,7 +32,7 @@ def team(tmp_path: Path) -> Path:
 def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
     words = ("run", "rooms", "--team", str(team), "--set", "cells=time", *SHORT, "--out", str(out))
-    said = answer(capsys, *words)
+    said = read_json(capsys, *words)
     assert said["mean_time_s"] > said["mean_distance_m"], "the slow ones take longer than a second a meter"
     record = Record.load(out)
     assert record.team.max_speed.tolist() == [1.0, 0.3, 0.3]
@@ -66,28 +66,26 @@ def test_the_cost_of_positions_in_seconds(tmp_path: Path, capsys: pytest.Capture
     places = tmp_path / "places.json"
     places.write_text("[[1, 1], [9, 5]]")
     words = ("cost", "rooms", "--positions", str(places), "--lattice", "16")
-    plain = answer(capsys, *words)
+    plain = read_json(capsys, *words)
     assert "mean_time_s" not in plain
     sites = tmp_path / "sites.npz"
-    timed = answer(capsys, *words, "--speeds", "1.0", "0.25", "--sites", str(sites))
+    timed = read_json(capsys, *words, "--speeds", "1.0", "0.25", "--sites", str(sites))
     assert timed["mean_distance_m"] == plain["mean_distance_m"]
     assert timed["mean_time_s"] > plain["mean_distance_m"]
     with np.load(sites) as saved:
         assert saved["times"].mean() == pytest.approx(timed["mean_time_s"])
-    half = answer(capsys, *words, "--speeds", "0.5")
+    half = read_json(capsys, *words, "--speeds", "0.5")
     assert half["mean_time_s"] == pytest.approx(2.0 * plain["mean_distance_m"])
-    said = read_complaint(capsys, *words, "--speeds", "1", "1", "1")
+    said = read_error(capsys, *words, "--speeds", "1", "1", "1")
     assert said == "--speeds: expected one, or one for each of 2 robots, got 3 numbers"
-    assert (
-        read_complaint(capsys, *words, "--speeds", "0") == "--speeds: expected a number above 0, got 0.0 m/s"
-    )
+    assert read_error(capsys, *words, "--speeds", "0") == "--speeds: expected a number above 0, got 0.0 m/s"
 
 
 def test_teams_that_are_none(tmp_path: Path, team: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    said = read_complaint(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
+    said = read_error(capsys, "run", "rooms", "--team", str(team), "--robots", "5")
     assert said == f"--robots: expected 3 as in {team}, got 5"
     bad = tmp_path / "bad.toml"
     bad.write_text("[[group]]\ncount = 1\nspeed = 3\n")
     for words in (("run", "rooms"), ("compare", "rooms"), ("demo", "rooms")):
-        said = read_complaint(capsys, *words, "--team", str(bad))
+        said = read_error(capsys, *words, "--team", str(bad))
         assert said.startswith(f"{bad}: group[0]: unknown key 'speed'")

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, SHORT, answer, read_complaint
+from called import COMMAND, SHORT, read_error, read_json
 from sample_sessions import advance_session, start_session
 from session_records import build_records
 
@@ -82,7 +82,7 @@ def test_an_unwritable_file_is_reported_and_unchanged(
     elif "import" in words:
         Path("square.wkt").write_text("POLYGON ((0 0, 9 0, 9 9, 0 9, 0 0))")
     before = sorted(path.lstat().st_mode for path in tmp_path.iterdir())
-    said = read_complaint(capsys, *words.split(), str(target))
+    said = read_error(capsys, *words.split(), str(target))
     assert ("expected a file, got a named pipe" in said) or "File name too long" in said
     assert sorted(path.lstat().st_mode for path in tmp_path.iterdir()) == before
 
@@ -103,7 +103,7 @@ def test_an_unwritable_file_is_reported_and_unchanged(
     ],
 )
 def test_a_name_that_is_too_long_is_one_line(words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "n" * 40 in read_complaint(capsys, *words.split(), "n" * 256)
+    assert "n" * 40 in read_error(capsys, *words.split(), "n" * 256)
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may look anywhere")
@@ -113,7 +113,7 @@ def test_a_folder_without_permission_is_one_line(
 ) -> None:
     tmp_path.chmod(0)
     try:
-        assert "ermission denied" in read_complaint(capsys, *words.split(), str(tmp_path / "x"))
+        assert "ermission denied" in read_error(capsys, *words.split(), str(tmp_path / "x"))
     finally:
         tmp_path.chmod(0o700)
 
@@ -217,7 +217,7 @@ def test_a_controller_for_the_whole_team_needs_no_names(
     )
     out = tmp_path / "out"
     words = ("compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Still", "--out", str(out))
-    assert [row["label"] for row in answer(capsys, *words)["runs"]] == ["RAPF", "Still"]
+    assert [row["label"] for row in read_json(capsys, *words)["runs"]] == ["RAPF", "Still"]
     assert (Record.load(out / "Still").forces == 0).all()
 
 

@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import SHORT, read_complaint
+from called import SHORT, read_error
 
 from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics
 from robocov.record import Record
@@ -47,8 +47,8 @@ def test_json_has_the_figures_of_the_end(folder: Path, capsys: pytest.CaptureFix
 def test_a_folder_without_a_run_is_reported(
     tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert str(tmp_path) in read_complaint(capsys, "metrics", str(tmp_path))
-    assert read_complaint(capsys, "metrics", str(folder), "--rate", "-1").startswith(
+    assert str(tmp_path) in read_error(capsys, "metrics", str(tmp_path))
+    assert read_error(capsys, "metrics", str(folder), "--rate", "-1").startswith(
         "--rate: expected a number from 0 to 10000 Hz, got -1.0"
     )
-    assert "picture.gif" in read_complaint(capsys, "metrics", str(folder), "--plot", "picture.gif")
+    assert "picture.gif" in read_error(capsys, "metrics", str(folder), "--plot", "picture.gif")

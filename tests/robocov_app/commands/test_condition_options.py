@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf
@@ -49,7 +49,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = "run rooms --robots 3 --duration 1 --lattice 16 --loss 0.5 --fail 2@0.5 --join 3@0.3 --seed 4"
-    assert answer(capsys, *words.split(), "--out", str(tmp_path / "a"))["contacts"] == 0
+    assert read_json(capsys, *words.split(), "--out", str(tmp_path / "a"))["contacts"] == 0
     saved = json.loads((tmp_path / "a" / "run.json").read_text())["conditions"]
     assert saved["loss"] == 0.5
     assert saved["failures"] == [{"robot": 2, "time_s": 0.5}]
@@ -63,7 +63,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_folder(
 
 
 def test_errors_are_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    said = read_complaint(capsys, "run", "rooms", "--fail", "3@x")
+    said = read_error(capsys, "run", "rooms", "--fail", "3@x")
     assert said == "--fail: expected ROBOT@SECONDS, as in 3@20, got '3@x'"
 
 
@@ -71,7 +71,7 @@ def test_errors_are_reported_in_one_line(capsys: pytest.CaptureFixture[str]) -> 
 def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "x"
     words = "run forklifts --robots 2 --duration 0.4 --lattice 12 --frames --fps 3 --size 320x240"
-    said = answer(capsys, *words.split(), "--video-speed", "1", "--show", "distances", "--out", str(out))
+    said = read_json(capsys, *words.split(), "--video-speed", "1", "--show", "distances", "--out", str(out))
     assert said["mean_distance_m"] > 0.0
     assert len(list((out / "frames").iterdir())) > 2
 
@@ -80,7 +80,7 @@ def test_a_robot_that_joins_outside_the_map_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    said = read_complaint(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
+    said = read_error(capsys, "run", "rooms", "--join", "6@30:100,100", "--out", str(out))
     assert said.startswith("--join: expected a position inside the boundary of map 'Rooms' (x from 0 to 12 m")
     assert said.endswith("got [100, 100] for robot 6")
     assert not out.exists()

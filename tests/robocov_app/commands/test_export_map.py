@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 
 from robocov.mapfile import load_map
 from robocov_app.cli import main
@@ -15,7 +15,7 @@ from robocov_app.cli import main
 )
 def test_every_format(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / name
-    found = answer(capsys, "export", "square", "-o", str(out))
+    found = read_json(capsys, "export", "square", "-o", str(out))
     assert found["files"][0] == str(out)
     assert found["area_written_m2"] == pytest.approx(100.0, rel=0.1)
     assert set(map(str, tmp_path.iterdir())) == set(found["files"])
@@ -27,10 +27,10 @@ def test_every_format(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_options_reach_the_format(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "plan.txt"
-    answer(capsys, "export", "office", "-o", str(out), "--format", "wkt", "--digits", "0")
+    read_json(capsys, "export", "office", "-o", str(out), "--format", "wkt", "--digits", "0")
     assert "." not in out.read_text()
     here = tmp_path / "plan.geojson"
-    answer(capsys, "export", "office", "-o", str(here), "--origin", "8.4", "49")
+    read_json(capsys, "export", "office", "-o", str(here), "--origin", "8.4", "49")
     assert json.loads(here.read_text())["origin"] == [8.4, 49.0]
 
 
@@ -60,7 +60,7 @@ def test_errors_are_reported_in_one_line_and_leave_no_files(
         ("export nowhere -o x.svg", "nowhere"),
         ("export square -o x.svg --digits 99", "digits: expected a number from 0 to 12, got 99"),
     ):
-        assert part in read_complaint(capsys, *words.split())
+        assert part in read_error(capsys, *words.split())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -69,11 +69,11 @@ def test_no_file_is_overwritten_without_the_option(
 ) -> None:
     out = tmp_path / "plan.json"
     out.write_text("precious")
-    assert "already exists" in read_complaint(capsys, "export", "square", "-o", str(out), "--format", "wkt")
+    assert "already exists" in read_error(capsys, "export", "square", "-o", str(out), "--format", "wkt")
     assert out.read_text() == "precious"
     from robocov.mapfile import save_map
 
     save_map(load_map("square"), out)
-    line = read_complaint(capsys, "export", str(out), "-o", str(out), "--format", "wkt", "--overwrite")
+    line = read_error(capsys, "export", str(out), "-o", str(out), "--format", "wkt", "--overwrite")
     assert "is the map being read" in line
     assert load_map(out) == load_map("square")

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from called import read_complaint
+from called import read_error
 from swept import ROOM, DirectExecutor, write_controller
 
 from robocov.mapfile import save_map
@@ -164,7 +164,5 @@ def test_the_controller_of_a_run_is_loaded_only_on_request(
     assert session.timeline.is_live and session.timeline.end_time == 0.0, "it has begun anew"
     assert not (shared / "marker").exists()
     capsys.readouterr()
-    message = read_complaint(
-        capsys, "replay", str(shared / "run"), "--controller", name.replace("Mine", "Other")
-    )
+    message = read_error(capsys, "replay", str(shared / "run"), "--controller", name.replace("Mine", "Other"))
     assert "safe.py: unknown class 'Other' (known: Mine)" in message

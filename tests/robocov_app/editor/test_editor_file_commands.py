@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from called import read_complaint
+from called import read_error
 from drawn_sketches import renumber
 from driven_editor import EditorDriver, build_sheet, open_editor, rewrite_file
 from PIL import Image
@@ -349,7 +349,7 @@ def test_screenshots_need_no_display(folders: Path, capsys: pytest.CaptureFixtur
 def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, capsys) -> None:
     for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    line = read_complaint(capsys, "edit", "rooms")
+    line = read_error(capsys, "edit", "rooms")
     assert line.startswith("no display: the editor needs one") and "--screenshot" in line
 
 
@@ -366,12 +366,12 @@ def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, c
 def test_invalid_options_are_reported_in_one_line(
     folders: Path, capsys, words: list[str], message: str
 ) -> None:
-    assert message in read_complaint(capsys, "edit", *words)
+    assert message in read_error(capsys, "edit", *words)
 
 
 def test_a_broken_file_is_reported_before_a_window_opens(folders: Path, capsys) -> None:
     (folders / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundery": []}')
-    assert "boundery" in read_complaint(capsys, "edit", str(folders / "bad.json"))
+    assert "boundery" in read_error(capsys, "edit", str(folders / "bad.json"))
     (folders / "draft.json").write_text(
         json.dumps({"format": "robocov-map", "version": 1, "name": "d", "boundary": [[0, 0], [1, 1]]})
     )

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from called import answer, read_complaint
+from called import read_error, read_json
 from drawn_run import SQUARE
 from reported_results import build_record, save_comparison, save_run
 
@@ -36,7 +36,9 @@ def test_a_page_is_in_the_folder_of_the_run(run, capsys) -> None:
 def test_the_answer_as_json(run, tmp_path, capsys) -> None:
     save_comparison(tmp_path / "both")
     out = tmp_path / "page.html"
-    said = answer(capsys, "report", str(run), str(tmp_path / "both"), "--out", str(out), "--title", "<Two>")
+    said = read_json(
+        capsys, "report", str(run), str(tmp_path / "both"), "--out", str(out), "--title", "<Two>"
+    )
     assert said["path"] == str(out) and said["bytes"] == out.stat().st_size
     assert [(each["kind"], each["runs"], each["shown"]) for each in said["results"]] == [
         ("run", 1, 1),
@@ -48,7 +50,7 @@ def test_the_answer_as_json(run, tmp_path, capsys) -> None:
 
 def test_foreign_files_are_not_replaced(run, capsys) -> None:
     (run / "report.html").write_text("mine")
-    said = read_complaint(capsys, "report", str(run))
+    said = read_error(capsys, "report", str(run))
     assert said.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
     assert (run / "report.html").read_text() == "mine"
     assert main(["report", str(run), "--overwrite", "--theme", "dark"]) == 0
@@ -78,7 +80,7 @@ def test_a_report_is_replaced_with_its_results_unlike_foreign_files(run) -> None
 def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) -> None:
     monkeypatch.chdir(tmp_path)
     if words:
-        assert message in read_complaint(capsys, "report", *words)
+        assert message in read_error(capsys, "report", *words)
     else:
         assert main(["report"]) == 2
         assert message in capsys.readouterr().err
@@ -89,7 +91,7 @@ def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) 
 def test_a_folder_that_cannot_be_written_to_is_named(run, capsys) -> None:
     run.chmod(0o500)
     try:
-        assert "cannot be written" in read_complaint(capsys, "report", str(run))
+        assert "cannot be written" in read_error(capsys, "report", str(run))
     finally:
         run.chmod(0o700)
 
@@ -116,7 +118,7 @@ def test_an_unfinished_comparison_is_reported(tmp_path, capsys) -> None:
     content = json.loads((tmp_path / "both/comparison.json").read_text())
     content |= {"folders": ["rapf", "rpf", "lloyd"], "runs": []}
     (tmp_path / "both/comparison.json").write_text(json.dumps(content))
-    said = answer(capsys, "report", str(tmp_path / "both"))
+    said = read_json(capsys, "report", str(tmp_path / "both"))
     assert said["results"][0]["missing"] == 1
     assert "Not finished: 1 of 3 runs is missing." in (tmp_path / "both/report.html").read_text()
 
@@ -131,7 +133,7 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
     page = (tmp_path / "both/report.html").read_text()
     assert "1 run cannot be read and is left out: rpf (" in page
     assert "Runs that failed or cannot be read" in page
-    told = answer(capsys, "report", str(tmp_path / "both"))["results"][0]
+    told = read_json(capsys, "report", str(tmp_path / "both"))["results"][0]
     assert (told["runs"], told["damaged"][0]["folder"], told["missing"]) == (1, "rpf", 0)
     # beside another result that is whole, one that is not is named, too
     (run / "record.npz").write_bytes(b"PK")
@@ -141,7 +143,7 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
 
 def test_without_readable_runs_nothing_is_written(run, capsys) -> None:
     (run / "record.npz").write_bytes(b"PK")
-    said = read_complaint(capsys, "report", str(run))
+    said = read_error(capsys, "report", str(run))
     assert "no runs remain to report" in said and not (run / "report.html").exists()
 
 

@@ -10,7 +10,7 @@ from functools import partial
 import matplotlib
 import numpy as np
 import pytest
-from called import read_complaint
+from called import read_error
 from matplotlib.figure import Figure
 
 from robocov_app.cli import main
@@ -174,7 +174,7 @@ def test_robots_of_the_benchmark_move_a_little_and_stay_free():
 @pytest.mark.slow
 def test_without_the_baseline_the_message_says_how_to_install_it(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "skfmm", None)
-    assert "pip install 'robocov[bench]'" in read_complaint(capsys, "bench", "cost")
+    assert "pip install 'robocov[bench]'" in read_error(capsys, "bench", "cost")
     shrink_parts(monkeypatch)
     monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
     for other in (step, render, window):
@@ -202,8 +202,8 @@ def test_an_interruption_leaves_the_measured_rows(monkeypatch, capsys):
 
 
 def test_an_invalid_plot_file_is_rejected_before_anything_is_measured(capsys, tmp_path):
-    assert "'.gif'" in read_complaint(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
-    assert "there is no folder" in read_complaint(
+    assert "'.gif'" in read_error(capsys, "bench", "step", "--plot", str(tmp_path / "ratios.gif"))
+    assert "there is no folder" in read_error(
         capsys, "bench", "step", "--plot", str(tmp_path / "a" / "b.png")
     )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from called import answer
+from called import read_json
 from swept import build_small_study, read_tables, write_controller
 
 from robocov.errors import OutputError, RobocovError
@@ -52,7 +52,7 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
         file = tmp_path / "study.toml"
         file.write_text('maps = "square"\ncontrollers = "rapf"\nduration = 0.1\nlattice = 8\n')
         words = ("sweep", str(file), "--dry-run", "--scheduler", address)
-        assert answer(capsys, *words)["workers"] == 2
+        assert read_json(capsys, *words)["workers"] == 2
     assert read_tables(tmp_path / "there") == read_tables(tmp_path / "here")
 
 

@@ -13,7 +13,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from called import COMMAND, read_complaint
+from called import COMMAND, read_error
 from PIL import Image
 from sample_sessions import start_session
 
@@ -39,7 +39,7 @@ def test_a_missing_display_is_reported_in_one_line(
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
-    assert read_complaint(capsys, "demo", "square") == NO_DISPLAY
+    assert read_error(capsys, "demo", "square") == NO_DISPLAY
 
 
 @pytest.mark.slow
@@ -110,7 +110,7 @@ def test_frames_neither_read_nor_write_settings(tmp_path: Path, monkeypatch: pyt
 
 def test_existing_frames_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "000000.png").write_text("mine")
-    message = read_complaint(capsys, "demo", "square", *SHORT, "--frames", "2", "--out", str(tmp_path))
+    message = read_error(capsys, "demo", "square", *SHORT, "--frames", "2", "--out", str(tmp_path))
     assert str(tmp_path) in message
     assert (tmp_path / "000000.png").read_text() == "mine"
 
@@ -151,7 +151,7 @@ def test_invalid_options_are_reported_in_one_line(
     monkeypatch.delenv("SDL_VIDEODRIVER")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.setenv(name, ":987654")  # a display that cannot be opened
-    assert part in read_complaint(capsys, "demo", *arguments)
+    assert part in read_error(capsys, "demo", *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
