@@ -93,6 +93,7 @@ STUDY_MEANINGS = {
     "conditions.failure_rate": "Failures per second of each robot",
     "conditions.fail": "Failures, as in `3@20 5@40`",
     "conditions.join": "Late robots, as in `6@30:2.5,1`",
+    "conditions.density": "`known`, or `sensed` if robots have to measure the density (default: known)",
     "gains": "Gains to try; all others have their defaults",
     "gains.NAME": "Gains of a controller, by its name",
     "gains.NAME.NAME": 'A gain; `{low = 3, high = 100, scale = "log"}` is a range to sample',

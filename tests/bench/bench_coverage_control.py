@@ -55,6 +55,7 @@ THEIR_CONTROLLERS = {
 """Controllers of CoverageControl, with what a robot knows."""
 OUR_CONTROLLERS = {
     "exploring-lloyd": "what robots have sensed and told each other",
+    "gp-ucb": "the density where robots have been, and measurements of others",
     "adaptive": "the same, but senses only at its position",
     "atlas-shared": "the density, and positions that robots told each other",
     "rapf": "the density, and positions within range",

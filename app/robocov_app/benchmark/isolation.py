@@ -15,6 +15,9 @@ shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
+If the density is unknown, no process receives it: its sensor repeats the measurements that the robot has made
+in the run, and raises an error for all others.
+
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
 an empty scan. Only the oracle, whose robots decide together, receives the observations of all robots. Its
 check shows that the decisions follow from the observations and the map, but ignores the limits of
@@ -32,7 +35,7 @@ import numpy as np
 from robocov.arrays import Array, BoolArray
 from robocov.controllers.base import Information
 from robocov.environment import Environment
-from robocov.observation import Message, Observations, Scans, Snapshot
+from robocov.observation import Message, Observations, RecordedDensitySensor, Scans, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov_app.sweep.tasks import Task
@@ -153,6 +156,8 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
         hidden.scans = _hide_scans(observations.scans, is_own)
     if observations.messages:
         hidden.messages = [observations.messages[k] if k == robot else () for k in range(robot_count)]
+    if observations.density_sensor is not None:
+        hidden.density_sensor = RecordedDensitySensor(observations.density_sensor.log, robot)
     if observations.send_limits is not None:
         hidden.send_limits = _freeze(np.where(is_own, observations.send_limits, 0))
     return _hide_links(hidden, robot)
@@ -230,6 +235,7 @@ def build_replay(
     -------
     Replay
     """
+    task = task.hide_unknown_density()
     environment = None
     if information == "whole map":
         environment = task.build_environment().static

@@ -142,6 +142,13 @@ TRACKS: Mapping[str, Track] = {
     "unicycle": Track("robots on two wheels, which turn before driving", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
     "density": Track("two hot spots count 20 times as much", OTHER_FAMILIES["density"]),
+    "unknown-density": Track(
+        "the same hot spots, which robots have to find: the density can only be measured",
+        OTHER_FAMILIES["density"],
+        seeds=(0, 1),
+        changes={"conditions": {"density": "sensed"}},
+        ranking="",
+    ),
     "moving": Track("obstacles move", OTHER_FAMILIES["moving"]),
     "large-team": Track("24 robots on 20 x 20 m", OTHER_FAMILIES["large"], robots=24, duration=90.0),
     "one-robot": Track("one robot", robots=1),

@@ -161,6 +161,8 @@ class ConditionOptions:
     """Robots that fail, with their times: --fail 3@20 5@40. They stop, and become obstacles."""
     join: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROBOT@S[:X,Y] ...")] = ()
     """Robots that join late, with their times, and positions if not their starts: --join 6@30:2.5,1."""
+    density: Literal["known", "sensed"] = "known"
+    """Whether robots know the density, or can only measure it within their sensing range."""
 
     def build_conditions(self, seed: int, robots: int) -> Conditions | None:
         """Build the conditions for a team.
@@ -191,6 +193,7 @@ class ConditionOptions:
             **values,
             failures=_parse_events("--fail", Failure, self.fail),
             joins=_parse_events("--join", Join, self.join),
+            density=self.density,
             seed=seed,
         )
         conditions.check_team(robots)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
@@ -87,6 +87,14 @@ class Task:
         controller = self.controller.rpartition(":")[2]
         parts = [_to_file_name(part) for part in (self.map, controller, self.robots, self.start, self.seed)]
         return "-".join([*parts, self.input_hash[:_NAME_HASH_CHARS]])
+
+    def hide_unknown_density(self) -> Task:
+        """Return the task without the density of its map, if robots do not know it."""
+        if self.team.get("density") != "sensed":
+            return self
+        document = json.loads(self.document)
+        document.pop("density", None)
+        return replace(self, document=json.dumps(document, ensure_ascii=False, allow_nan=False))
 
     def build_environment(self) -> Environment:
         """Build the map; the latest maps are kept in memory."""

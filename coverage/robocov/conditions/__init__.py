@@ -13,6 +13,7 @@ from robocov.conditions.conditions import (
     TIME_TOLERANCE_S,
     UNITS,
     Conditions,
+    DensityKnowledge,
 )
 from robocov.conditions.events import Failure, Join, JoinedRobot, parse_event
 from robocov.conditions.random_streams import (
@@ -33,6 +34,7 @@ __all__ = [
     "TIME_TOLERANCE_S",
     "UNITS",
     "Conditions",
+    "DensityKnowledge",
     "Failure",
     "Join",
     "JoinedRobot",

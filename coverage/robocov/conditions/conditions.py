@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Integral
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from robocov.errors import ParameterError, is_number, quote, require_number
 
 TIME_TOLERANCE_S = 1e-9
 """Maximum difference between two times that count as equal: sums of steps have rounding errors."""
+
+
+DensityKnowledge: TypeAlias = Literal["known", "sensed"]
+"""Whether robots know the density φ from the start, or have to measure it within their sensing range."""
 
 
 class ConditionParameter(NamedTuple):
@@ -88,6 +92,10 @@ class Conditions:
     joins : tuple of Join
         Robots that join during the run, at most once each; also accepted as ``(robot, time)`` or
         ``(robot, time, position)``.
+    density : str
+        "known": all robots know the density of the map. "sensed": they do not, and can only measure it within
+        their sensing range, see `Observations.measure_density`. The map that a controller with the
+        information "whole map" receives has no density then.
     seed : int
         Seed of the random numbers.
 
@@ -120,6 +128,7 @@ class Conditions:
     failures: tuple[Failure, ...] = ()
     joins: tuple[Join, ...] = ()
     seed: int = 0
+    density: DensityKnowledge = "known"
 
     def __post_init__(self) -> None:
         for name, parameter in PARAMETERS.items():
@@ -133,6 +142,8 @@ class Conditions:
         object.__setattr__(self, "joins", build_events("joins", Join, self.joins))
         if not is_number(self.seed, Integral) or self.seed < 0:
             raise ParameterError(f"conditions.seed: expected a whole number from 0, got {quote(self.seed)}")
+        if self.density not in get_args(DensityKnowledge):
+            raise ParameterError(f"conditions.density: expected known or sensed, got {quote(self.density)}")
         self._check_forget_after()
         self._check_event_order()
 
@@ -159,13 +170,19 @@ class Conditions:
     @property
     def is_ideal(self) -> bool:
         """Whether these conditions have no effect."""
-        return not (self.uses_messages or self.sensing_noise or self.has_team_changes)
+        is_exact = not (self.uses_messages or self.sensing_noise or self.hides_density)
+        return is_exact and not self.has_team_changes
 
     @property
     def uses_messages(self) -> bool:
         """Whether robots know each other's positions only from messages."""
         is_limited = self.message_rate is not None or self.bandwidth is not None
         return bool(self.loss or self.delay or is_limited or self.position_noise)
+
+    @property
+    def hides_density(self) -> bool:
+        """Whether robots have to measure the density, because they do not know it."""
+        return self.density == "sensed"
 
     @property
     def has_team_changes(self) -> bool:
@@ -314,6 +331,8 @@ class Conditions:
             for join in self.joins
         ]
         document["seed"] = int(self.seed)
+        if self.hides_density:
+            document["density"] = self.density
         return document
 
     @classmethod
@@ -341,7 +360,8 @@ class Conditions:
             failures = [(failure["robot"], failure["time_s"]) for failure in document["failures"]]
             joins = [(join["robot"], join["time_s"], join["place_m"]) for join in document["joins"]]
             arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
-            return cls(**arguments, seed=document["seed"])
+            density = document.get("density", "known")
+            return cls(**arguments, seed=document["seed"], density=density)
         except (KeyError, TypeError) as error:
             raise ParameterError(f"conditions: cannot be read ({error!r})") from error
 

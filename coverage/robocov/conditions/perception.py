@@ -15,7 +15,7 @@ from robocov.conditions.random_streams import (
     SENSING_STREAM,
     create_generator,
 )
-from robocov.observation import Decision, Observations, Scans
+from robocov.observation import Decision, DensitySensor, Observations, Scans
 from robocov.team import Team
 
 MIN_MEASURED_DISTANCE_M = 1e-3
@@ -39,6 +39,7 @@ class Perception:
         self._conditions = conditions
         self._dt = dt
         self._robot_count = len(team)
+        self._sensing_ranges = team.sensing_range
         self._radio = Radio(conditions, team.communication_range, dt)
 
     def create_inbox(self) -> Inbox | None:
@@ -84,6 +85,14 @@ class Perception:
             obstacle_points=obstacle_points,
             scans=self._add_scanning_noise(step, ideal.scans),
         )
+        if self._conditions.hides_density:
+            observations.density = None
+            observations.density_sensor = DensitySensor.build(
+                ideal.density,
+                positions=ideal.positions,
+                known_positions=positions,
+                sensing_ranges=self._sensing_ranges,
+            )
         if inbox is None or not self._conditions.uses_messages:
             neighbors = ideal.neighbors.restrict_to_working(working)
             return replace(observations, neighbors=neighbors), inbox

@@ -5,13 +5,14 @@
 - `gains`: gains as dataclass fields, with units and ranges
 - `registry`: controllers by name
 - `user_modules`: controllers in files of users
-- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`: controllers without
-  a map of the region
+- `repulsion`, `lloyd`, `barrier`, `tangentbug`, `visibility`, `boosting`, `adaptive`, `gp_ucb`:
+  controllers without a map of the region
 - `geodesic_lloyd`, `diffeomorphism`: controllers that know the whole map
 - `placement`: controllers that place the whole team on the known map
 - `exploration`: controllers that build the map while they cover the region
 - `known_cells`, `known_map`, `convex_chart`, `driving`: cells, maps, velocities and forces, for several
   controllers
+- `gaussian_process`: a Gaussian process of the density, given measurements
 - `density_exchange`: messages with measurements of the density
 """
 
@@ -28,6 +29,7 @@ from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.controllers.gains import get_gain_values, get_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
+from robocov.controllers.gp_ucb import GpUcb
 from robocov.controllers.individual import IndividualController, IndividualControllerAdapter, OwnView
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.placement.exemplar import Exemplar
@@ -60,6 +62,7 @@ __all__ = [
     "ExploringLloyd",
     "FrontierMedian",
     "GeodesicLloyd",
+    "GpUcb",
     "GreedySubmodular",
     "Howard",
     "IndividualController",

@@ -326,9 +326,7 @@ def _solve(matrices: Array, right_sides: Array) -> Array:
 
 def _measure(seen: Observations) -> Array:
     """Return φ at the positions of the robots, (n,). A robot may use no other values of φ."""
-    if seen.density is None:
-        return np.ones(len(seen.positions))
-    return seen.density.evaluate(seen.positions)
+    return seen.measure_density(np.arange(len(seen.positions)), seen.positions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,7 @@ from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.controllers.gains import Option, Value, get_gains, instantiate_controller, update_spelling
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
+from robocov.controllers.gp_ucb import GpUcb
 from robocov.controllers.individual import to_team_controller
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.placement.exemplar import Exemplar
@@ -42,7 +43,7 @@ CONTROLLERS: dict[str, type[Any]] = {
         # The default comparison comes first, in this order.
         *(Rapf, Rpf, Lloyd, Atlas),
         *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
-        *(Visibility, Boosting, Adaptive, ExploringLloyd, Diffeomorphism),
+        *(Visibility, Boosting, Adaptive, GpUcb, ExploringLloyd, Diffeomorphism),
         *(FrontierMedian, GreedySubmodular, VoronoiGraphCoverage, AtlasShared),
         *(LocalSearch, Exemplar),
     )

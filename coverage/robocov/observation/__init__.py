@@ -9,6 +9,7 @@ control is distributed and that the obstacles are unknown.
 - `neighbors`: the communication graph
 - `messages`: messages that robots send each other, in addition to their positions
 - `decisions`, `cells`: the decision of a controller, and the cells that it uses
+- `density_sensor`: measurements of a density that the robots do not know
 - `snapshot`: the observations and the decision of one step
 - `scanned_view`: the free space that is visible in a scan
 - `close_pairs`, `bins`: pairs of points that are close to each other
@@ -16,6 +17,7 @@ control is distributed and that the obstacles are unknown.
 
 from robocov.observation.cells import Cells
 from robocov.observation.decisions import Decision, check_decision, check_forces, copy_decision, to_numbers
+from robocov.observation.density_sensor import DensitySensor, RecordedDensitySensor
 from robocov.observation.messages import Message, ReceivedMessage
 from robocov.observation.observations import NearNeighbors, Observations
 from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_ray_directions
@@ -25,10 +27,12 @@ __all__ = [
     "MAX_RAYS",
     "Cells",
     "Decision",
+    "DensitySensor",
     "Message",
     "NearNeighbors",
     "Observations",
     "ReceivedMessage",
+    "RecordedDensitySensor",
     "Scanning",
     "Scans",
     "Snapshot",

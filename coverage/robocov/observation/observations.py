@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from robocov.arrays import Array, IntArray, compute_point_distances
 from robocov.density.base import Density
 from robocov.observation.close_pairs import find_close_pairs
+from robocov.observation.density_sensor import DensitySensor
 from robocov.observation.messages import ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
@@ -54,7 +57,8 @@ class Observations:
     report_ages : (m,) array or None, s
         The ages of these messages. None if `reported_positions` is None.
     density : Density or None
-        φ, the importance of each point: part of the task, known to all. None: 1 everywhere.
+        φ, the importance of each point: part of the task, known to all. None: 1 everywhere, or unknown if
+        there is a `density_sensor`.
     scans : Scans or None
         A range scan of each robot, in the steps in which the controller requests one.
     steering : (n, 2) array or None, rad and rad/s
@@ -66,6 +70,8 @@ class Observations:
     send_limits : (n,) array or None, bytes
         The total size of the messages that each robot can send in this step. It is 0 if earlier messages
         still wait in its queue, or if no messages are sent in this step. None: unlimited.
+    density_sensor : DensitySensor or None
+        The sensor with which robots measure a density that they do not know. None: they know it.
 
     See Also
     --------
@@ -101,6 +107,48 @@ class Observations:
     steering: Array | None = None
     messages: Sequence[Sequence[ReceivedMessage]] = ()
     send_limits: Array | None = None
+    density_sensor: DensitySensor | None = None
+
+    @property
+    def has_known_uniform_density(self) -> bool:
+        """Whether the robots know that the density is the same everywhere."""
+        if self.density_sensor is not None:
+            return False
+        return self.density is None or self.density.is_uniform
+
+    def measure_density(self, robots: Any, points: Any) -> Array:
+        """Measure the density at points near robots.
+
+        Parameters
+        ----------
+        robots : int or (k,) int array
+            Index of the robot that measures at each point, from 0.
+        points : (k, 2) array, m
+            Points within the sensing range of these robots. A known density can be evaluated everywhere.
+
+        Returns
+        -------
+        (k,) array
+            φ at each point.
+
+        Raises
+        ------
+        ParameterError
+            If the density is unknown, and a point is not within the sensing range of its robot.
+
+        Examples
+        --------
+        >>> import robocov as rc
+        >>> rooms = rc.load_map("rooms")
+        >>> seen = rc.Simulation(rooms, rc.Rapf(), rooms.start().sample(3, seed=0)).observe()
+        >>> seen.measure_density([0, 1, 2], seen.positions)
+        array([1., 1., 1.])
+        """
+        if self.density_sensor is not None:
+            return self.density_sensor.measure(robots, points)
+        if self.density is None:
+            return np.ones(len(points))
+        return self.density.evaluate(points)
 
     def get_messages(self, robot: int) -> Sequence[ReceivedMessage]:
         """Return the messages that have arrived at a robot in this step.

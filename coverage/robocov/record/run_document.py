@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, create_model
 
-from robocov.conditions import PARAMETERS
+from robocov.conditions import PARAMETERS, DensityKnowledge
 from robocov.files.documents import Document, expect
 from robocov.team import MAX_ROBOTS
 
@@ -52,6 +52,7 @@ def _build_conditions_model() -> Any:
         "failures": (list[_Failure], ...),
         "joins": (list[_Join], ...),
         "seed": (Seed, ...),
+        "density": (DensityKnowledge, "known"),
     }
     for name, parameter in PARAMETERS.items():
         fields[parameter.json_key] = _build_number_field(

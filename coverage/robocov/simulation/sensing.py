@@ -1,7 +1,8 @@
-"""Observations of robots with exact sensors."""
+"""Observations of robots with exact sensors, and the map that robots know."""
 
 from __future__ import annotations
 
+from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.observation import Observations, Scanning, Scans
 from robocov.observation.neighbors import Neighbors
@@ -55,6 +56,27 @@ def build_observations(
         scans=scans,
         steering=world.steering,
     )
+
+
+def get_known_map(environment: Environment, conditions: Conditions | None) -> Environment:
+    """Return the map that a controller with the information "whole map" receives.
+
+    Parameters
+    ----------
+    environment : Environment
+        The map of the simulation.
+    conditions : Conditions or None
+        None if they are ideal.
+
+    Returns
+    -------
+    Environment
+        The map at rest, without its density if robots do not know it.
+    """
+    known_map = environment.static
+    if conditions is not None and conditions.hides_density:
+        return known_map.with_density(None)
+    return known_map
 
 
 def is_scan_due(scanning: Scanning | None, step: int, dt: float) -> bool:

@@ -31,7 +31,7 @@ from robocov.simulation.checks import (
     count_steps,
 )
 from robocov.simulation.controller_caller import ControllerCaller
-from robocov.simulation.sensing import build_observations, is_scan_due
+from robocov.simulation.sensing import build_observations, get_known_map, is_scan_due
 from robocov.simulation.team_state import TeamState, to_team_state
 from robocov.team import Team
 from robocov.world import MAX_PENETRATION_M, ChangingWorld, World
@@ -132,7 +132,8 @@ class Simulation:
         if not state.is_computed:
             check_joins(environment, self.conditions)
             _check_robots_fit(environment, self.team, state, self.conditions, self.time)
-        self._controller_caller = ControllerCaller(controller, environment.static, self.time)
+        known_map = get_known_map(environment, self.conditions)
+        self._controller_caller = ControllerCaller(controller, known_map, self.time)
         self._world = self._build_world(state)
         self.sensor = RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
         has_team_changes = self.conditions is not None and self.conditions.has_team_changes
@@ -468,7 +469,8 @@ class Simulation:
         """
         changed = self.copy()
         changed.environment = environment
-        changed._controller_caller = ControllerCaller(self.controller, environment.static, self.time)
+        known_map = get_known_map(environment, self.conditions)
+        changed._controller_caller = ControllerCaller(self.controller, known_map, self.time)
         return changed
 
     def with_memory(self, memory: Any, inbox: Inbox | None = None) -> Simulation:

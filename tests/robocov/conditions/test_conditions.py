@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.conditions import Conditions, Failure, Join, parse_event
+from robocov.conditions import Conditions, DensityKnowledge, Failure, Join, parse_event
 from robocov.errors import ParameterError
 
 
@@ -149,6 +149,7 @@ times = st.floats(0, 1e5, allow_nan=False)
     st.dictionaries(st.integers(1, 9), times, max_size=3),
     st.dictionaries(st.integers(10, 19), st.tuples(times, st.one_of(st.none(), st.tuples(times, times)))),
     st.integers(0, 2**62),
+    st.sampled_from(["known", "sensed"]),
 )
 def test_conditions_are_unchanged_by_json(
     loss: float,
@@ -156,6 +157,7 @@ def test_conditions_are_unchanged_by_json(
     fails: dict[int, float],
     joins: dict[int, tuple[float, object]],
     seed: int,
+    density: DensityKnowledge,
 ) -> None:
     conditions = Conditions(
         loss=loss,
@@ -163,6 +165,7 @@ def test_conditions_are_unchanged_by_json(
         failures=tuple(Failure(*each) for each in fails.items()),
         joins=tuple(Join(robot, *rest) for robot, rest in joins.items()),  # type: ignore[arg-type]
         seed=seed,
+        density=density,
     )
     assert Conditions.from_dict(json.loads(json.dumps(conditions.to_dict(), allow_nan=False))) == conditions
 
@@ -172,6 +175,19 @@ def test_conditions_of_earlier_versions_have_no_bandwidth() -> None:
     assert Conditions.from_dict(data).bandwidth == 1e4
     del data["bandwidth_bytes_per_s"]
     assert Conditions.from_dict(data) == Conditions()
+
+
+def test_a_known_density_does_not_change_files_of_earlier_versions() -> None:
+    assert "density" not in Conditions().to_dict()
+    assert Conditions(density="sensed").to_dict()["density"] == "sensed"
+
+
+def test_an_unknown_density_is_not_ideal() -> None:
+    assert not Conditions(density="sensed").is_ideal
+    conditions = Conditions(density="sensed", failures=((1, 2.0),))
+    assert conditions.drop_team_changes() == Conditions(density="sensed")
+    with pytest.raises(ParameterError, match=r"conditions\.density: expected known or sensed, got 'hidden'"):
+        Conditions(density="hidden")  # type: ignore[arg-type]
 
 
 def test_unreadable_conditions_are_rejected() -> None:

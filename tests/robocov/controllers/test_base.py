@@ -28,6 +28,7 @@ def test_each_controller_states_its_information() -> None:
         "adaptive",
         "atlas-shared",
         "exploring-lloyd",
+        "gp-ucb",
         "frontier-median",
         "greedy-submodular",
         "voronoi-graph",

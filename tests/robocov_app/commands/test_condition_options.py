@@ -30,6 +30,10 @@ def test_options_become_conditions() -> None:
     )
 
 
+def test_an_unknown_density_is_a_condition() -> None:
+    assert ConditionOptions(density="sensed").build_conditions(7, 6) == Conditions(density="sensed", seed=7)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

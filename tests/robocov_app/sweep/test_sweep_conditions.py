@@ -56,6 +56,7 @@ def test_a_run_is_under_its_conditions() -> None:
         ({"loss": [0.1, 0.1]}, r"conditions.loss\[1\]"),
         ({"fail": 3}, "conditions.fail: expected a string"),
         ({"fail": ["3@1", "3"]}, r"conditions.fail\[1\]: expected ROBOT@SECONDS, as in 3@20, got '3'"),
+        ({"density": ["known", "no"]}, r"conditions.density\[1\]: expected known or sensed, got 'no'"),
         ({"delay": "null"}, "conditions.delay: expected a number"),
     ],
 )
@@ -91,6 +92,6 @@ def test_a_file_says_it_in_a_table() -> None:
 
 
 def test_all_conditions_can_be_swept() -> None:
-    usual = {"fail": "1@1", "join": "2@1", "message_rate": 2.0}
+    usual = {"fail": "1@1", "join": "2@1", "message_rate": 2.0, "density": "sensed"}
     for name in CONDITIONS:
         assert parse_condition_axes({name: usual.get(name, 1.0)})[name] == [usual.get(name, 1.0)]

@@ -27,7 +27,7 @@ from robocov_app.viewer.sharing.values import format_number
 STEPS = 40
 ROOMS = load_map("rooms")
 GAINS = ControllerChoice("rapf", {"k_rep": 0.3, "attraction_limit": None})
-CONDITIONS = Conditions(loss=0.1, position_noise=0.01, delay=0.1, message_rate=20.0, seed=4)
+CONDITIONS = Conditions(loss=0.1, position_noise=0.01, delay=0.1, message_rate=20.0, density="sensed", seed=4)
 
 SESSIONS: dict[str, dict[str, Any]] = {
     "plain": {},

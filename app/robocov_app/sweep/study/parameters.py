@@ -7,9 +7,9 @@ import math
 import re
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast, get_args
 
-from robocov.conditions import PARAMETERS, Conditions, Failure, Join, parse_event
+from robocov.conditions import PARAMETERS, Conditions, DensityKnowledge, Failure, Join, parse_event
 from robocov.conditions import UNITS as CONDITION_UNITS
 from robocov.defaults import DEFAULT_TURNING_RATE_RAD_S
 from robocov.errors import JsonPath, ParameterError, describe_unknown_name, format_path, quote, require_type
@@ -38,9 +38,11 @@ KINEMATIC_DEFAULTS = {
 """Further parameters of the robots, with their defaults. A task contains only values that differ."""
 EVENT_TYPES = {"fail": Failure, "join": Join}
 """Conditions that are given as text, for example ``3@20 5@40`` for two events in the same run."""
-CONDITIONS = (*PARAMETERS, *EVENT_TYPES)
+CHOICES = {"kinematics": KINEMATICS, "density": get_args(DensityKnowledge)}
+"""Parameters whose values are words, with these words."""
+CONDITIONS = (*PARAMETERS, *EVENT_TYPES, "density")
 """Conditions that a study may vary."""
-TEXT_PARAMETERS = (*EVENT_TYPES, "kinematics")
+TEXT_PARAMETERS = (*EVENT_TYPES, *CHOICES)
 """Parameters whose values are text."""
 GROUPS = "groups"
 """Parameter for a team of different robots: the groups as in a team file, as JSON text."""
@@ -159,8 +161,8 @@ def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
     ParameterError
         If the value is invalid.
     """
-    if name == "kinematics":
-        return _parse_kinematics(value, path)
+    if name in CHOICES:
+        return _parse_choice(name, value, path)
     if name in EVENT_TYPES:
         return _parse_events(name, value, path)
     if value in _NO_LIMIT_VALUES.get(name, ()):
@@ -170,9 +172,10 @@ def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
     return _parse_team_number(name, value, path)
 
 
-def _parse_kinematics(value: object, path: JsonPath) -> str:
-    if value not in KINEMATICS:
-        raise ParameterError(f"{format_path(path)}: expected {' or '.join(KINEMATICS)}, got {quote(value)}")
+def _parse_choice(name: str, value: object, path: JsonPath) -> str:
+    if value not in CHOICES[name]:
+        expected = " or ".join(CHOICES[name])
+        raise ParameterError(f"{format_path(path)}: expected {expected}, got {quote(value)}")
     return str(value)
 
 
@@ -235,6 +238,7 @@ def build_conditions(parameters: Mapping[str, ParameterValue], seed: int, robots
         **values,
         failures=tuple(parse_event(Failure, text) for text in failures),
         joins=tuple(parse_event(Join, text) for text in joins),
+        density=cast(DensityKnowledge, parameters.get("density", "known")),
         seed=seed,
     )
     conditions.check_team(robots)

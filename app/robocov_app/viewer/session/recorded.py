@@ -13,6 +13,7 @@ from robocov.errors import InputError
 from robocov.files.result_names import RECORD_FILE
 from robocov.observation import Decision
 from robocov.record import Record
+from robocov.simulation.sensing import get_known_map
 from robocov_app.runs.saved_runs import SavedRun, build_roster
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
@@ -276,7 +277,7 @@ def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
         controller = choice.build()
         if not has_memory(controller):
             return [None] * len(record)
-        controller = inform_controller(controller, record.environment.static)
+        controller = inform_controller(controller, get_known_map(record.environment, record.conditions))
         memory = controller.begin(record.environment.region, record.team)
         for index in range(len(record)):
             memories.append(deepcopy(memory))

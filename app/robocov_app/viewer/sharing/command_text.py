@@ -151,6 +151,8 @@ def _list_condition_options(scenario: SessionScenario) -> Iterator[str]:
         value = getattr(conditions, name)
         if value != getattr(_IDEAL, name):
             yield from (_name_option(name), format_number(value))
+    if conditions.hides_density:
+        yield from ("--density", conditions.density)
 
 
 def _name_option(name: str) -> str:

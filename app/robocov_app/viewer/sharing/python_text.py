@@ -125,6 +125,8 @@ def _format_conditions(conditions: Conditions) -> str:
         events = getattr(conditions, name)
         if events:
             arguments.append(f"{name}={_format_events(events)}")
+    if conditions.hides_density:
+        arguments.append(f"density={conditions.density!r}")
     arguments.append(f"seed={conditions.seed}")
     return f"rc.Conditions({', '.join(arguments)})"
 

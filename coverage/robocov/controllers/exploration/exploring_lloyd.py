@@ -20,7 +20,6 @@ from robocov.controllers.density_exchange import (
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.exploration.sightings import Sightings
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.density import Density
 from robocov.observation import Decision, Message, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
@@ -205,9 +204,9 @@ class ExploringLloyd(BaseController):
         grid = memory.grid
         measurements = np.ones_like(memory.measurements)
         measurement_exchange = memory.measurement_exchange
-        # Without a density, φ is 1 everywhere, which all robots know.
-        if seen.density is not None and not seen.density.is_uniform:
-            measurements = _measure(seen, seen.density, memory)
+        # If the density is known to be uniform, φ is 1 everywhere: a factor changes no centroid.
+        if not seen.has_known_uniform_density:
+            measurements = _measure(seen, memory)
             measurement_exchange = measurement_exchange.start_period(measurements)
         sightings = memory.sightings.update(seen, memory.team)
         robots, other_positions = sightings.list_pairs()
@@ -253,7 +252,7 @@ class ExploringLloyd(BaseController):
         return np.maximum(masses, _MIN_RELATIVE_MASS * unknown_mass)
 
 
-def _measure(seen: Observations, density: Density, memory: ExploringMemory) -> Array:
+def _measure(seen: Observations, memory: ExploringMemory) -> Array:
     """Return the measurements, (n, s), including those that the robots make in this step.
 
     A robot measures φ only at the centers of the squares within its sensing range.
@@ -263,7 +262,7 @@ def _measure(seen: Observations, density: Density, memory: ExploringMemory) -> A
     for robot, position in enumerate(seen.positions):
         squared_distances = ((centers - position) ** 2).sum(axis=1)
         is_sensed = squared_distances <= memory.team.sensing_range[robot] ** 2
-        measurements[robot, is_sensed] = density.evaluate(centers[is_sensed])
+        measurements[robot, is_sensed] = seen.measure_density(robot, centers[is_sensed])
     return measurements
 
 

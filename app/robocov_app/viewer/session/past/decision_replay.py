@@ -18,6 +18,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.sensor import RangeSensor
+from robocov.simulation.sensing import get_known_map
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
@@ -127,7 +128,8 @@ def _is_usable(decision: object, shape: tuple[int, ...]) -> bool:
 def _build_controller(setup: PaneSetup) -> Controller | None:
     """Build the controller of a pane; None if it cannot be built, for example if it no longer exists."""
     with suppress(ParameterError):
-        return inform_controller(setup.controller.build(), setup.sensed_environment.static)
+        known_map = get_known_map(setup.sensed_environment, setup.conditions)
+        return inform_controller(setup.controller.build(), known_map)
     return None
 
 

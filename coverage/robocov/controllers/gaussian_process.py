@@ -1,0 +1,219 @@
+"""Gaussian process of a density: its posterior on a grid of squares, given measurements in some of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
+from robocov.observation.region import Region
+
+NOISE_VARIANCE = 1e-2
+"""Variance of a measurement, relative to that of the prior. It includes changes of φ within a square."""
+SAMPLES_PER_SQUARE = 2
+"""Number of samples along each side of a square."""
+_ROUNDING_TOLERANCE = 1e-9
+"""Fraction of a square by which the region may exceed the grid because of rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProcessGrid:
+    """Squares in which robots measure a density, and finer samples at which they need it."""
+
+    squares: Array
+    """(s, 2) m, centers of the squares, row by row from the lowest."""
+    prior_correlations: Array
+    """(s, s) Correlations of φ at the centers of the squares, before any measurement."""
+    samples: Array
+    """(k, 2) m, samples of the region."""
+    corners: IntArray
+    """(k, 4) Indices of the squares between whose centers each sample lies."""
+    corner_weights: Array
+    """(k, 4) Weights of these squares in the bilinear interpolation."""
+
+    @classmethod
+    def build(cls, region: Region, squares: int, correlation: float) -> ProcessGrid:
+        """Build the grid of a region.
+
+        Parameters
+        ----------
+        region : Region
+        squares : int
+            Number of squares along the longer side of the bounding box.
+        correlation : float
+            Correlation length of the process, relative to this side.
+        """
+        low_x, low_y, high_x, high_y = region.bounds
+        longer_side = max(high_x - low_x, high_y - low_y)
+        side = longer_side / squares
+        columns = int(np.ceil((high_x - low_x) / side - _ROUNDING_TOLERANCE))
+        rows = int(np.ceil((high_y - low_y) / side - _ROUNDING_TOLERANCE))
+        low = np.array([low_x, low_y])
+        centers = low + side * (_list_cells(rows, columns) + 0.5)
+        sample_cells = _list_cells(SAMPLES_PER_SQUARE * rows, SAMPLES_PER_SQUARE * columns)
+        # Coordinates of the samples in squares, from the lower left corner of the grid.
+        coordinates = (sample_cells + 0.5) / SAMPLES_PER_SQUARE
+        samples = low + side * coordinates
+        is_inside = region.contains(samples)
+        corners, corner_weights = _find_corners(coordinates[is_inside], rows, columns)
+        squared_distances = ((centers[:, None] - centers) ** 2).sum(axis=2)
+        return cls(
+            squares=centers,
+            prior_correlations=np.exp(-squared_distances / (2.0 * (correlation * longer_side) ** 2)),
+            samples=samples[is_inside],
+            corners=corners,
+            corner_weights=corner_weights,
+        )
+
+    def find_square(self, position: Array) -> int:
+        """Return the index of the square whose center is nearest to a position, (2,) m."""
+        return int(((self.squares - position) ** 2).sum(axis=1).argmin())
+
+    def interpolate(self, values: Array) -> Array:
+        """Interpolate values of the squares, (s,), to the samples, (k,)."""
+        return np.asarray((values[self.corners] * self.corner_weights).sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posterior:
+    """The correlations of φ in the squares, given that it has been measured in some of them. Immutable.
+
+    They do not depend on the measured values, and are updated whenever another square is measured.
+
+    Attributes
+    ----------
+    correlations : (s, s) array
+        Covariances of φ in the squares, relative to the variance of the prior.
+    is_measured : (s,) bool array
+        The squares with a measurement.
+
+    Examples
+    --------
+    >>> region = Region(np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]))
+    >>> grid = ProcessGrid.build(region, squares=4, correlation=0.1)
+    >>> measurements = np.full(16, np.nan)
+    >>> measurements[0] = 3.0
+    >>> posterior = Posterior.build_prior(grid).add_squares(~np.isnan(measurements))
+    >>> mean = posterior.compute_mean(measurements, prior_mean=1.0)
+    >>> deviations = posterior.compute_deviations()
+    >>> mean[[0, 15]].round(2), deviations[[0, 15]].round(2)
+    (array([2.98, 1.  ]), array([0.1, 1. ]))
+    """
+
+    correlations: Array
+    is_measured: BoolArray
+
+    @classmethod
+    def build_prior(cls, grid: ProcessGrid) -> Posterior:
+        """Build the posterior without any measurement."""
+        square_count = len(grid.squares)
+        return cls(grid.prior_correlations, np.zeros(square_count, dtype=bool))
+
+    def add_squares(self, is_measured: BoolArray) -> Posterior:
+        """Return the posterior after further squares have been measured.
+
+        Parameters
+        ----------
+        is_measured : (s,) bool array
+            All squares with a measurement, including the previous ones.
+
+        Returns
+        -------
+        Posterior
+        """
+        new_squares = np.flatnonzero(is_measured & ~self.is_measured)
+        if not len(new_squares):
+            return self
+        correlations = _add_squares(self.correlations, new_squares, NOISE_VARIANCE)
+        return Posterior(correlations, is_measured.copy())
+
+    def compute_mean(self, measurements: Array, prior_mean: float) -> Array:
+        """Compute the posterior mean of φ in each square.
+
+        Parameters
+        ----------
+        measurements : (s,) array
+            The measurements in the measured squares; nan in the others.
+        prior_mean : float
+            Mean of φ before any measurement.
+
+        Returns
+        -------
+        (s,) array
+        """
+        known = np.flatnonzero(self.is_measured)
+        residuals = (measurements[known] - prior_mean) / NOISE_VARIANCE
+        return prior_mean + _multiply_columns(self.correlations, known, residuals)
+
+    def compute_deviations(self) -> Array:
+        """Compute the standard deviation of φ in each square, (s,), relative to that of the prior."""
+        return np.sqrt(np.maximum(np.diagonal(self.correlations), 0.0))
+
+
+def _list_cells(rows: int, columns: int) -> Array:
+    """Return the column and the row of each cell of a grid, (rows * columns, 2)."""
+    row_numbers, column_numbers = np.indices((rows, columns))
+    return np.column_stack([column_numbers.ravel(), row_numbers.ravel()])
+
+
+def _find_corners(coordinates: Array, rows: int, columns: int) -> tuple[IntArray, Array]:
+    """Return the four squares around each point, and their weights in the bilinear interpolation.
+
+    The coordinates, (k, 2), are in squares, from the lower left corner of the grid. Points that are not
+    between the centers of squares get the values of the nearest ones.
+    """
+    limits = np.array([columns - 1, rows - 1])
+    from_centers = np.clip(coordinates - 0.5, 0.0, limits)
+    lower = np.minimum(from_centers.astype(np.intp), np.maximum(limits - 1, 0))
+    upper = np.minimum(lower + 1, limits)
+    fraction_x, fraction_y = (from_centers - lower).T
+    corners = np.column_stack(
+        [
+            lower[:, 1] * columns + lower[:, 0],
+            lower[:, 1] * columns + upper[:, 0],
+            upper[:, 1] * columns + lower[:, 0],
+            upper[:, 1] * columns + upper[:, 0],
+        ]
+    )
+    weights = np.column_stack(
+        [
+            (1.0 - fraction_x) * (1.0 - fraction_y),
+            fraction_x * (1.0 - fraction_y),
+            (1.0 - fraction_x) * fraction_y,
+            fraction_x * fraction_y,
+        ]
+    )
+    return corners, weights
+
+
+@kernel
+def _add_squares(correlations: Array, new_squares: IntArray, noise_variance: float) -> Array:
+    """Return the correlations after the new squares have been measured, one after another.
+
+    The results have the same bits on all processors, unlike those of a factorization by LAPACK.
+    """
+    correlations = correlations.copy()
+    count = len(correlations)
+    for square in new_squares:
+        row = correlations[square].copy()
+        variance = row[square] + noise_variance
+        for i in range(count):
+            factor = row[i] / variance
+            # Far squares are hardly correlated, and do not change.
+            if factor != 0.0:
+                for j in range(count):
+                    correlations[i, j] -= factor * row[j]
+    return correlations
+
+
+@kernel
+def _multiply_columns(matrix: Array, columns: IntArray, factors: Array) -> Array:
+    """Return the sum of some columns of a symmetric matrix, each multiplied by a factor."""
+    result = np.zeros(len(matrix))
+    for k in range(len(columns)):
+        row = matrix[columns[k]]
+        for i in range(len(result)):
+            result[i] += row[i] * factors[k]
+    return result

@@ -1,0 +1,196 @@
+"""On the track of an unknown density, no controller gets the density, not even one that cheats."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from swept import HEAD
+
+from robocov.controllers import CONTROLLERS
+from robocov.controllers.base import Information
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.guarded_runs import _decide_again
+from robocov_app.benchmark.isolation import Transcript, build_replay, find_difference
+from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov_app.benchmark.running import run_benchmark
+from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
+from robocov_app.sweep.tasks import Task, generate_tasks
+from robocov_app.sweep.worker import Outcome, perform
+from robocov_app.terminal.interruption import Interruption
+
+TRACK = "unknown-density"
+MAP = "dense-polygons-7001"
+IMPORTS = HEAD.partition("@dataclass")[0] + "import numpy as np\nimport robocov as rc\n"
+
+HONEST = """
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        assert seen.density is None
+        robots = np.arange(len(seen.positions))
+        values = seen.measure_density(robots, seen.positions + [0.1, 0.0])
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+
+FAR = """
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        values = seen.measure_density(np.arange(len(seen.positions)), seen.positions + [30.0, 0.0])
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+"""Robots measure far beyond their sensing range."""
+
+CLOSURE = """
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        values = np.ones(len(seen.positions))
+        for cell in seen.density_sensor._measure.__closure__ or ():
+            if isinstance(cell.cell_contents, rc.Density):
+                values = values * cell.cell_contents.max_value
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+"""Robots look for the density in the variables of their sensor."""
+
+MEMORY = """
+import gc
+
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        values = np.ones(len(seen.positions))
+        for thing in gc.get_objects():
+            if isinstance(thing, rc.Gaussians):
+                values = values * thing.max_value
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+"""Robots look for the density among all objects of the process."""
+
+OTHERS = """
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, region, team):
+        return None
+
+    def decide(self, seen, memory):
+        robots = np.roll(np.arange(len(seen.positions)), 1)
+        values = seen.measure_density(robots, seen.positions[robots])
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+"""Robots use what others measure, which nobody has sent them."""
+
+
+@pytest.fixture(autouse=True)
+def _short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    track = replace(suite.TRACKS[TRACK], duration=0.5, seeds=(0,), maps=(MAP,))
+    monkeypatch.setitem(suite.TRACKS, TRACK, track)  # type: ignore[arg-type]
+
+
+def build_task(controller: str) -> Task:
+    studies = dict(RatedController(controller, {}).build_studies(Selection(tracks=(TRACK,), maps=(MAP,))))
+    return next(iter(generate_tasks(studies[TRACK])))
+
+
+def record(controller: str) -> tuple[Outcome, Transcript]:
+    """Run a controller; return the outcome, and the transcript as the verification receives it."""
+    transcript = Transcript()
+    outcome = perform(build_task(controller), transcript.add)
+    return outcome, pickle.loads(pickle.dumps(transcript))
+
+
+def isolate(controller: str, information: Information) -> str | None:
+    """Return how the decisions of a robot differ if it gets only its own measurements."""
+    outcome, transcript = record(controller)
+    assert outcome.error is None
+    task = build_task(controller)
+    replay = build_replay(task, transcript, information, 2, np.random.default_rng(0))
+    replay = pickle.loads(pickle.dumps(replay))
+    return find_difference(transcript, replay, _decide_again(replay))
+
+
+def write_controller(folder: Path, code: str) -> str:
+    (folder / "mine.py").write_text(IMPORTS + code)
+    return f"{folder / 'mine.py'}:Mine"
+
+
+def verify(folder: Path, code: str) -> Verification:
+    """Rate a controller, and verify its result in processes of their own."""
+    name = write_controller(folder, code)
+    selection = Selection(tracks=(TRACK,), maps=(MAP,))
+    options = VerificationOptions(sample=1, robots=1, new_maps=0)
+    out = folder / "out"
+    with Interruption() as stop:
+        run_benchmark(RatedController(name, {}), selection, out, stop=stop, workers=1, quiet=True)
+        return verify_result(out, controller=name, options=options, stop=stop, quiet=True)
+
+
+def test_the_track_is_in_no_ranking_and_hides_the_density() -> None:
+    track = suite.TRACKS[TRACK]
+    assert all(TRACK not in tracks for tracks in suite.RANKED_TRACKS.values())
+    assert track.changes["conditions"] == {"density": "sensed"}
+    environment = build_task("lloyd").build_environment()
+    assert environment.density is not None
+    assert not environment.density.is_uniform
+    assert build_task("lloyd").hide_unknown_density().build_environment().density is None
+
+
+@pytest.mark.parametrize("controller", ["lloyd", "local-search", "adaptive", "exploring-lloyd", "gp-ucb"])
+def test_robots_decide_by_their_own_measurements(controller: str) -> None:
+    assert isolate(controller, CONTROLLERS[controller].information) is None
+
+
+@pytest.mark.parametrize("controller", ["lloyd", "rapf", "atlas-shared", "local-search"])
+def test_controllers_that_do_not_measure_decide_as_without_a_density(controller: str) -> None:
+    _, transcript = record(controller)
+    plain_task = build_task(controller).hide_unknown_density()
+    plain = Transcript()
+    perform(plain_task, plain.add)
+    for forces, plain_forces in zip(transcript.forces, plain.forces, strict=True):
+        np.testing.assert_array_equal(forces, plain_forces)
+
+
+def test_recorded_observations_do_not_contain_the_density(tmp_path: Path) -> None:
+    _, transcript = record(write_controller(tmp_path, HONEST))
+    data = pickle.dumps(transcript)
+    assert b"Gaussians" not in data
+    assert b"RecordedDensitySensor" in data
+
+
+def test_robots_cannot_measure_beyond_their_sensing_range(tmp_path: Path) -> None:
+    outcome, _ = record(write_controller(tmp_path, FAR))
+    assert outcome.error is not None
+    assert "expected a point within its sensing range of 3 m, got a point at 30.000 m" in outcome.error
+
+
+@pytest.mark.parametrize("code", [CLOSURE, OTHERS], ids=["closure", "others"])
+def test_a_hidden_density_changes_the_decisions_of_an_isolated_robot(code: str, tmp_path: Path) -> None:
+    difference = isolate(write_controller(tmp_path, code), "own")
+    assert difference is not None
+    assert "robot 3 decides differently from" in difference
+
+
+@pytest.mark.parametrize(("code", "is_honest"), [(HONEST, True), (MEMORY, False)], ids=["honest", "memory"])
+def test_only_controllers_that_measure_are_verified(code: str, is_honest: bool, tmp_path: Path) -> None:
+    verification = verify(tmp_path, code)
+    assert verification.runs == 1
+    if is_honest:
+        assert verification.differences == []
+    else:
+        assert any("decides differently" in difference for difference in verification.differences)
