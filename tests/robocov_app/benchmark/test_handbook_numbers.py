@@ -51,6 +51,11 @@ PLAN_ROWS = [
     ),
 ]
 """Controllers and tracks with runs on large plans."""
+UNKNOWN_DENSITY_ROWS = [
+    (controller, "unknown-density")
+    for controller in ("exploring-lloyd", "atlas-shared", "rapf", "gp-ucb", "adaptive", "lloyd")
+]
+"""Controllers with runs on the track of an unknown density."""
 ROWS = [
     *(
         (controller, track)
@@ -60,6 +65,7 @@ ROWS = [
     *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
     *((controller, "ideal") for controller in ("local-search", "exemplar")),
     *PLAN_ROWS,
+    *UNKNOWN_DENSITY_ROWS,
 ]
 
 
