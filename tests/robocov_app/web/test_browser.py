@@ -1,4 +1,4 @@
-"""The served windows in a real browser."""
+"""Served windows in a real browser: input, passing of control, phones, and saved files."""
 
 import json
 import time
@@ -13,6 +13,7 @@ from sub_path_proxy import PREFIX, SubPathProxy
 pytest.importorskip("websockets")
 
 MAPS = Path(__file__).parents[3] / "maps"
+ENTER = "\ue007"
 DOWNLOADS_HEIGHT = 32
 """Height of the bar of saved files on pages without touch, CSS px."""
 EMPTY_MAP = json.dumps(
@@ -39,8 +40,8 @@ def browser(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def blank(browser):
-    """Leave the page of a test before, which would look for its window."""
+def _close_previous_page(browser):
+    """Leave the page of the previous test, which would try to reconnect."""
     browser.driver.get("about:blank")
     browser.read_console()
 
@@ -63,75 +64,74 @@ def read_picture(browser):
     return browser.run_script("return document.querySelector('canvas').toDataURL()")
 
 
-def wait_for_rest(browser):
-    """Wait until the picture stays as it is."""
-    seen = [""]
+def wait_for_unchanged_picture(browser):
+    """Wait until the picture does not change any more, and return it."""
+    pictures = [""]
 
-    def is_same():
-        before = seen[0]
-        seen[0] = read_picture(browser)
-        return before == seen[0] and browser.run_script("return work.then(() => true)")
+    def is_unchanged():
+        pictures.append(read_picture(browser))
+        return pictures[-1] == pictures[-2] and browser.run_script("return work.then(() => true)")
 
-    browser.wait_until(is_same)
-    return seen[0]
+    browser.wait_until(is_unchanged)
+    return pictures[-1]
 
 
-def test_the_demo_follows_hands_page_and_colors(browser, tmp_path):
+def test_the_window_follows_input_the_page_size_and_the_color_scheme(browser, tmp_path):
     set_size(browser, 1280, 720)
     browser.set_preferences(color_scheme="light")
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         assert "token" not in browser.driver.current_url
-        begun = wait_for_rest(browser)
+        first = wait_for_unchanged_picture(browser)
         mouse = {"button": "left", "buttons": 1, "clickCount": 1}
         for kind, x in (("mousePressed", 60), ("mouseMoved", 160), ("mouseReleased", 160)):
             event = {"type": kind, "x": x, "y": 240, **mouse}
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
-        browser.wait_until(lambda: read_picture(browser) != begun)
-        panned = wait_for_rest(browser)
+        browser.wait_until(lambda: read_picture(browser) != first)
+        panned = wait_for_unchanged_picture(browser)
         browser.press_keys("f")
         browser.wait_until(lambda: read_picture(browser) != panned)
-        browser.press_keys("/")  # the palette, without the letter
+        browser.press_keys("/")  # Open the palette.
         browser.press_keys("seed 7")
-        typed = wait_for_rest(browser)
-        browser.press_keys("\ue007")
+        typed = wait_for_unchanged_picture(browser)
+        browser.press_keys(ENTER)
         browser.wait_until(lambda: read_picture(browser) != typed)
         set_size(browser, 390, 844, 3.0)
         browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
-        light = wait_for_rest(browser)
+        light = wait_for_unchanged_picture(browser)
         browser.set_preferences(color_scheme="dark")
         browser.wait_until(lambda: read_picture(browser) != light)
-        browser.driver.refresh()  # the cookie is enough
+        browser.driver.refresh()  # The page is opened by its cookie.
         browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
         assert not browser.read_console()
 
 
 def press_with_control(browser, key, command=""):
-    """Press a key with Ctrl, which makes the browser execute a command of its own as well."""
+    """Press a key with Ctrl; the browser also executes its own command, such as ``copy``."""
     event = {"key": key, "modifiers": 2, "commands": [command] if command else []}
     for kind in ("rawKeyDown", "keyUp"):
         browser.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, **event})
 
 
-def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tmp_path):
+def test_a_class_watches_the_teacher_who_uploads_and_downloads_files(browser, tmp_path):
     set_size(browser, 1280, 720)
     (tmp_path / "down").mkdir()
-    place = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
-    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", place)
+    download = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
+    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", download)
     (tmp_path / "files").mkdir()
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        begun = wait_for_rest(browser)
-        upload = (
+        first = wait_for_unchanged_picture(browser)
+        drop_file = (
             "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
             "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
         )
-        browser.run_script(upload, (MAPS / "trap.json").read_text())
-        browser.wait_until(lambda: read_picture(browser) != begun)
-        assert not browser.find_all("#downloads a"), "what was dropped has not been saved"
-        wait_for_rest(browser)
+        browser.run_script(drop_file, (MAPS / "trap.json").read_text())
+        browser.wait_until(lambda: read_picture(browser) != first)
+        assert not browser.find_all("#downloads a"), "a dropped file is not a saved one"
+        wait_for_unchanged_picture(browser)
         press_with_control(browser, "s")
         browser.wait_until(lambda: browser.find_all("#downloads a"))
         message = browser.find("#status").get_property("textContent")
@@ -156,7 +156,7 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         browser.run_script("prompt = () => 'Ada'")
         browser.find_all("#here button")[1].click()
         browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
-        browser.find("#here button").click()  # a second window of the teacher's takes control
+        browser.find("#here button").click()  # The second page of the teacher takes control.
         browser.wait_until(lambda: get_classes(browser) == {"saved"})
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
@@ -164,7 +164,7 @@ def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tm
         assert not browser.read_console()
 
 
-def test_the_teacher_shows_a_qr_code(browser, tmp_path):
+def test_the_invitation_shows_a_link_and_a_qr_code(browser, tmp_path):
     with serve_window("demo", "square", "--host", "0.0.0.0", cwd=tmp_path) as link:
         set_size(browser, 1280, 720)
         browser.driver.get(link)
@@ -182,14 +182,20 @@ def test_the_teacher_shows_a_qr_code(browser, tmp_path):
 
 
 def record_messages(browser):
-    """Let the page keep what it tells; the result returns that, and forgets it."""
+    """Record the messages that the page sends; return a function that returns the new ones."""
     browser.run_script(
-        "window.kept = []; const tells = tell; tell = (one) => { kept.push(one); tells(one); }"
+        "window.recorded = []; const send = tell;"
+        "tell = (message) => { recorded.push(message); send(message); }"
     )
-    return lambda: [each for each in browser.run_script("return kept.splice(0)") if each["kind"] != "shown"]
+
+    def take_messages():
+        messages = browser.run_script("return recorded.splice(0)")
+        return [message for message in messages if message["kind"] != "shown"]
+
+    return take_messages
 
 
-def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_path):
+def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser, tmp_path):
     set_size(browser, 1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
@@ -233,7 +239,7 @@ def test_a_phone_shows_the_map_and_controls_the_projectors_window(browser, tmp_p
         assert not browser.read_console()
 
 
-def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(browser, tmp_path):
+def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
     set_size(browser, 900, 600)
     with (
         serve_window("demo", "rooms", "--folder", str(tmp_path)) as link,
@@ -248,19 +254,22 @@ def test_below_a_path_of_a_proxy_and_after_its_line_broke_the_page_is_the_same(b
         assert browser.run_script("return controls")
         browser.driver.refresh()
         browser.wait_until(lambda: get_canvas_size(browser) == [900, 600])
-        # a slow line misses pictures, and nothing that is done
-        browser.run_script("window.seen = 0; const shows = show; show = (...all) => (seen++, shows(...all))")
+        # On a slow connection, the page misses frames but no input.
+        browser.run_script(
+            "window.frameCount = 0; const showFrame = show;"
+            "show = (...values) => { frameCount++; return showFrame(...values); }"
+        )
         proxy.bytes_per_s = 20_000.0
         time.sleep(1.0)
-        before = browser.run_script("return seen")
+        count_before = browser.run_script("return frameCount")
         time.sleep(2.0)
-        assert browser.run_script("return seen") - before < 30
-        browser.press_keys(" " * 9)  # which pauses in the end
+        assert browser.run_script("return frameCount") - count_before < 30
+        browser.press_keys(" " * 9)  # The last key pauses.
         time.sleep(1.0)
         proxy.bytes_per_s = 0.0
-        still = wait_for_rest(browser)
+        paused = wait_for_unchanged_picture(browser)
         browser.press_keys(" ")
-        browser.wait_until(lambda: read_picture(browser) != still)
+        browser.wait_until(lambda: read_picture(browser) != paused)
 
 
 def test_text_is_pasted_once_and_copied(browser, tmp_path):
@@ -271,40 +280,39 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         browser.driver.execute_cdp_cmd("Browser.grantPermissions", {"origin": origin, **allowed})
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        wait_for_rest(browser)
+        wait_for_unchanged_picture(browser)
 
-        put = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
-        browser.driver.execute_async_script(put)
-        for kind in ("mousePressed", "mouseReleased"):  # the map's name
+        write_clipboard = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
+        browser.driver.execute_async_script(write_clipboard)
+        for kind in ("mousePressed", "mouseReleased"):  # the field of the map's name
             event = {"type": kind, "x": 1150, "y": 99, "button": "left", "clickCount": 1}
             browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
         press_with_control(browser, "a")
         press_with_control(browser, "v", "paste")
-        wait_for_rest(browser)
+        wait_for_unchanged_picture(browser)
         browser.press_keys("!")
         press_with_control(browser, "a")
         press_with_control(browser, "c", "copy")
-        copied = "navigator.clipboard.readText().then(arguments[0])"
-        browser.wait_until(lambda: browser.driver.execute_async_script(copied) == "Große Halle!")
-        for press in (
-            lambda: browser.press_keys("\ue007"),
-            lambda: press_with_control(browser, "s"),
-            lambda: browser.press_keys("\ue007"),
-        ):
-            press()
-            wait_for_rest(browser)
+        read_clipboard = "navigator.clipboard.readText().then(arguments[0])"
+        browser.wait_until(lambda: browser.driver.execute_async_script(read_clipboard) == "Große Halle!")
+        browser.press_keys(ENTER)
+        wait_for_unchanged_picture(browser)
+        press_with_control(browser, "s")
+        wait_for_unchanged_picture(browser)
+        browser.press_keys(ENTER)
+        wait_for_unchanged_picture(browser)
         browser.wait_until(lambda: list(tmp_path.glob("*.json")))
         assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle!"
         press_with_control(browser, "z")  # what is not saved does not keep a process that is to stop
-        wait_for_rest(browser)
+        wait_for_unchanged_picture(browser)
 
 
-def test_shift_and_alt_work_in_the_browser_too(browser, tmp_path):
+def test_drags_with_shift_select_and_with_alt_copy(browser, tmp_path):
     set_size(browser, 1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        wait_for_rest(browser)
+        wait_for_unchanged_picture(browser)
 
         def drag(modifiers, *points):
             for number, (x, y) in enumerate(points):
@@ -320,14 +328,14 @@ def test_shift_and_alt_work_in_the_browser_too(browser, tmp_path):
 
         alt = 1
         shift = 8
-        drag(alt, (699, 160), (690, 190), (680, 215))  # the round table
+        drag(alt, (699, 160), (690, 190), (680, 215))  # Copy the round table.
         wait_for_message("copied")
-        drag(shift, (600, 90), (700, 200), (785, 248))  # the floor of its room
+        drag(shift, (600, 90), (700, 200), (785, 248))  # Select from the floor of its room.
         wait_for_message("2 obstacles selected")
         assert browser.read_console() == []
 
 
-def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, tmp_path):
+def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser, tmp_path):
     touch = {"enabled": True, "maxTouchPoints": 2}
     browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
     try:
@@ -335,7 +343,7 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2376])
-            narrow = wait_for_rest(browser)
+            narrow = wait_for_unchanged_picture(browser)
             box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
             assert browser.run_script(f"{box} return [box.left, box.top, box.width, box.height]") == [
                 0,
@@ -350,20 +358,23 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
             browser.find("#panel").click()
             browser.wait_until(lambda: read_picture(browser) != narrow)
             browser.wait_until(lambda: browser.run_script("return scrollBox"))
-            told = record_messages(browser)
+            take_messages = record_messages(browser)
 
-            def touch(*moments):
-                for moment in moments:
-                    points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(moment)]
-                    event = {"type": "touchMove" if moment is not moments[0] else "touchStart"}
+            def touch(*steps):
+                """Move fingers through steps with their positions; return the sent messages."""
+                for number, positions in enumerate(steps):
+                    points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(positions)]
+                    event = {"type": "touchMove" if number else "touchStart"}
                     browser.driver.execute_cdp_cmd(
                         "Input.dispatchTouchEvent", event | {"touchPoints": points}
                     )
                     time.sleep(0.05)
                 event = {"type": "touchEnd", "touchPoints": []}
                 browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
-                found = [each for each in told() if each["kind"] in ("button", "wheel")]
-                return [(each["kind"], each.get("button"), round(each["x"] / 3)) for each in found]
+                messages = [message for message in take_messages() if message["kind"] in ("button", "wheel")]
+                return [
+                    (message["kind"], message.get("button"), round(message["x"] / 3)) for message in messages
+                ]
 
             dragged = touch(*([(40 + 10 * k, 300)] for k in range(5)))
             assert dragged == [("button", 1, 40), ("button", 1, 80)]
@@ -374,14 +385,14 @@ def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, t
             assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
             scrolled = touch(*([(60, 700 - 20 * k)] for k in range(6)))
             assert {kind for kind, *_ in scrolled} == {"wheel"}, "up and down, a finger scrolls the panel"
-            slid = touch(*([(60 + 10 * k, 700)] for k in range(6)))
-            assert {kind for kind, *_ in slid} == {"button"}, "to the side, it moves a slider"
+            moved_slider = touch(*([(60 + 10 * k, 700)] for k in range(6)))
+            assert {kind for kind, *_ in moved_slider} == {"button"}, "to the side, it moves a slider"
             assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
-def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
+def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
     touch = {"enabled": True, "maxTouchPoints": 2}
     browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
     try:
@@ -389,7 +400,7 @@ def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: get_classes(browser) == {"phone"})
-            wait_for_rest(browser)
+            wait_for_unchanged_picture(browser)
             shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
             assert [button.text for button in shown] == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
             assert all(min(button.size.values()) >= 48 for button in shown)
@@ -416,7 +427,7 @@ def test_the_bar_of_a_telephone_plays_undoes_chooses_tools_and_opens_the_lesson(
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
-def test_the_editor_on_a_telephone_is_used_by_fingers_alone(browser, tmp_path):
+def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
     touch = {"enabled": True, "maxTouchPoints": 2}
     browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
     try:
@@ -427,7 +438,7 @@ def test_the_editor_on_a_telephone_is_used_by_fingers_alone(browser, tmp_path):
             browser.driver.get(link)
             browser.wait_until(lambda: get_classes(browser) == {"phone"})
             browser.wait_until(lambda: browser.find("#try").is_displayed())
-            wait_for_rest(browser)
+            wait_for_unchanged_picture(browser)
             shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
             labels = [button.text for button in shown]
             assert labels == ["Try it", "Undo", "Tools", "Delete", "Save", "More"]
@@ -498,10 +509,10 @@ def test_saved_files_cover_the_window_only_when_the_user_opens_them(
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: "blank" not in get_classes(browser))
-            wait_for_rest(browser)
+            wait_for_unchanged_picture(browser)
             browser.run_script("tell({kind: 'command', name: 'save:session'})")
             browser.wait_until(lambda: "saved" in get_classes(browser))
-            wait_for_rest(browser)
+            wait_for_unchanged_picture(browser)
             assert find_covering_elements(browser) == []
             if not has_touch:
                 assert browser.find("#downloads a").is_displayed()
@@ -516,7 +527,7 @@ def test_saved_files_cover_the_window_only_when_the_user_opens_them(
             assert find_covering_elements(browser) == []
             button.click()
             browser.find("#to-tools").click()
-            assert find_covering_elements(browser) == [], "another sheet takes its place"
+            assert find_covering_elements(browser) == [], "another sheet replaces it"
             assert browser.read_console() == []
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
