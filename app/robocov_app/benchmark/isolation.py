@@ -166,7 +166,7 @@ def hide_others(observations: Observations, robot: int, substitutes: Array) -> O
 def _hide_scans(scans: Scans, is_own: BoolArray) -> Scans:
     """Return scans in which other robots measure nothing: all their rays have length 0."""
     distances = np.where(is_own[:, None], scans.distances, 0.0)
-    return Scans(_freeze(distances), _freeze(scans.hit & is_own[:, None]))
+    return Scans(_freeze(distances), _freeze(scans.is_hit & is_own[:, None]))
 
 
 def _hide_links(observations: Observations, robot: int) -> Observations:

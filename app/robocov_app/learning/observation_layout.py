@@ -162,7 +162,7 @@ class ObservationLayout:
             rows[:, blocks["neighbor"]] = self._find_neighbors(seen).reshape(n, -1)
         if self.rays:
             scans = self._check_scans(seen.scans if scans is None else scans)
-            rows[:, blocks["rays"]] = np.where(scans.hit, scans.distances / sensing_range, 1.0)
+            rows[:, blocks["rays"]] = np.where(scans.is_hit, scans.distances / sensing_range, 1.0)
         if self.centroid:
             centroids = compute_known_cells(seen, "distance", None).centroids
             rows[:, blocks["centroid"]] = (centroids - seen.positions) / unit
@@ -174,11 +174,11 @@ class ObservationLayout:
         n = len(seen.positions)
         unit = seen.region.diameter
         # Noisy positions may be farther apart than the diameter, but not by much.
-        robot, _, offset, distance = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
+        pairs = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
         nearest = np.zeros((n, self.neighbors, _NEIGHBOR_SIZE))
         distances = np.full((n, self.neighbors), np.inf)
-        # `offset` points from the neighbor to the robot; the layout needs the opposite direction.
-        _insert_nearest(robot, -offset / unit, distance, distances, nearest)
+        # The offsets point from the neighbor to the robot; the layout needs the opposite direction.
+        _insert_nearest(pairs.robots, -pairs.offsets / unit, pairs.distances, distances, nearest)
         return nearest
 
     def _check_scans(self, scans: Scans | None) -> Scans:

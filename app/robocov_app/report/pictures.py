@@ -159,7 +159,7 @@ def draw_run(
     has_numbers : bool
         Whether to number the robots.
     is_hidden : bool
-        Whether to hide the picture from screen readers, because text next to it says the same.
+        Whether to hide the picture from screen readers, because the text next to it has the same content.
 
     Returns
     -------

@@ -210,7 +210,7 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
         meter = CommunicationMeter(simulation)
 
         def measure_step(step: int) -> bool:
-            # Automatic garbage collection is off during a run, see `perform`.
+            # Automatic garbage collection is off during a run (see `perform`).
             if step and step % _COLLECTION_STEPS == 0:
                 gc.collect(0)
             if step and task.metrics:

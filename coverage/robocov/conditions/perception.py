@@ -145,7 +145,7 @@ class Perception:
         rng = create_generator(self._conditions.seed, SCANNING_STREAM, step)
         noise = rng.normal(scale=sigma, size=scans.distances.shape)
         measured = np.maximum(scans.distances + noise, MIN_MEASURED_DISTANCE_M)
-        distances = np.where(scans.hit, measured, scans.distances)
+        distances = np.where(scans.is_hit, measured, scans.distances)
         distances.setflags(write=False)
         return replace(scans, distances=distances)
 

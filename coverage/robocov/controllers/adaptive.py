@@ -187,8 +187,8 @@ class Adaptive(BaseController):
         """Return the memory with new estimates, and with the centroids of the cells as goals."""
         samples = memory.lattice.samples
         pairs = seen.find_near_neighbors(np.inf)
-        neighbor_positions = seen.positions[pairs.robot] - pairs.offset
-        is_own = find_own_samples(samples, seen.positions, pairs.robot, neighbor_positions)
+        neighbor_positions = seen.positions[pairs.robots] - pairs.offsets
+        is_own = find_own_samples(samples, seen.positions, pairs.robots, neighbor_positions)
         if self.estimate == "gp":
             memory = self._learn_by_gaussian_process(seen, memory)
         else:

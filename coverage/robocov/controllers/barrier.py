@@ -142,7 +142,7 @@ class Barrier(BaseController):
         returns = update_returns(seen, memory.returns)
         near = self._find_near_neighbors(seen, team)
         reports = _collect_reports(near, seen)
-        neighbor_velocities = _derive_velocities(reports, memory.reports, team.max_speed[near.neighbor])
+        neighbor_velocities = _derive_velocities(reports, memory.reports, team.max_speed[near.neighbors])
         robot_planes = self._build_robot_planes(seen, team, near, neighbor_velocities)
         obstacle_points = collect_obstacle_points(seen, returns)
         obstacle_planes = self._build_obstacle_planes(seen, team, obstacle_points)
@@ -245,8 +245,8 @@ class Barrier(BaseController):
 
 def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
     """Return the reported positions of near neighbors."""
-    pairs = near.robot * len(seen.positions) + near.neighbor
-    return NeighborReports(seen.time, pairs, seen.positions[near.robot] - near.offset)
+    pairs = near.robots * len(seen.positions) + near.neighbors
+    return NeighborReports(seen.time, pairs, seen.positions[near.robots] - near.offsets)
 
 
 def _derive_velocities(reports: NeighborReports, previous: NeighborReports | None, max_speed: Array) -> Array:

@@ -337,9 +337,9 @@ class Boosting(BaseController):
         boosted_weight = self._compute_boosted_weight(samples)
         boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, max_distances)
         if self.boost == "neighbors":
-            repulsion = self.kappa / np.maximum(pairs.distance, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
+            repulsion = self.kappa / np.maximum(pairs.distances, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
-                pairs.robot, repulsion[:, None] * pairs.offset, len(max_distances)
+                pairs.robots, repulsion[:, None] * pairs.offsets, len(max_distances)
             )
         return Contributions(
             value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
@@ -364,7 +364,7 @@ class Boosting(BaseController):
         points = seen.positions[:, None, None, :] + offsets
         spacings = view.distances / _SAMPLES_PER_RAY
         areas = depths * (spacings * sector_angle)[:, :, None]
-        wall_distances = np.where(view.hit, view.distances, np.inf)
+        wall_distances = np.where(view.is_hit, view.distances, np.inf)
         undetected = compute_undetected(depths, wall_distances, directions, pairs, max_distances, self.decay)
         return _ViewSamples(
             depths=depths,
@@ -396,10 +396,10 @@ class Boosting(BaseController):
         integrand = weight * samples.detection
         # p at the sensing range, times the length of the arc there, for each ray that hits no obstacle.
         range_detection = np.exp(-self.decay * max_distances)[:, None]
-        arcs = ~view.hit * range_detection * max_distances[:, None] * sector_angle
+        arcs = ~view.is_hit * range_detection * max_distances[:, None] * sector_angle
         ray_terms = self.decay * (integrand * samples.areas).sum(axis=2) + weight[..., -1] * arcs
         growth = integrate_over_windows(windows, view, samples.depths, integrand)
-        window_terms = sum_by_robot(windows.robot, growth, len(max_distances))
+        window_terms = sum_by_robot(windows.robots, growth, len(max_distances))
         return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + window_terms)
 
 
@@ -435,12 +435,12 @@ def compute_undetected(
     (n, rays, k) array
     """
     undetected = np.ones(depths.shape)
-    for pair in range(len(pairs.robot)):
-        robot = pairs.robot[pair]
+    for pair in range(len(pairs.robots)):
+        robot = pairs.robots[pair]
         # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
-        neighbor_x = -pairs.offset[pair, 0]
-        neighbor_y = -pairs.offset[pair, 1]
-        neighbor_range = max_distances[pairs.neighbor[pair]]
+        neighbor_x = -pairs.offsets[pair, 0]
+        neighbor_y = -pairs.offsets[pair, 1]
+        neighbor_range = max_distances[pairs.neighbors[pair]]
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):

@@ -129,13 +129,13 @@ def _compute_chart_centroids(seen: Observations, chart: ConvexChart, chart_posit
     """
     pairs = seen.find_near_neighbors(np.inf)
     if seen.reported_positions is None:
-        neighbor_chart_positions = chart_positions[pairs.neighbor]
+        neighbor_chart_positions = chart_positions[pairs.neighbors]
     else:
         # Robots know their neighbors' positions as reported, which may differ from one receiver to the next.
         # The offset leads from the reported position to the robot.
-        reported_positions = seen.positions[pairs.robot] - pairs.offset
+        reported_positions = seen.positions[pairs.robots] - pairs.offsets
         neighbor_chart_positions, _ = chart.map_to_chart(reported_positions)
-    is_own = find_own_samples(chart.samples, chart_positions, pairs.robot, neighbor_chart_positions)
+    is_own = find_own_samples(chart.samples, chart_positions, pairs.robots, neighbor_chart_positions)
     return compute_sample_centroids(is_own, chart.samples, chart.mass, chart_positions)
 
 

@@ -140,7 +140,7 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
     scans = seen.scans
     if scans is None:
         return previous
-    distances = np.where(scans.hit, scans.distances, np.nan)
+    distances = np.where(scans.is_hit, scans.distances, np.nan)
     return np.asarray(seen.positions[:, None] + distances[:, :, None] * scans.directions)
 
 
@@ -359,7 +359,7 @@ def list_neighbor_offsets(seen: Observations, max_distance: float) -> Array:
         Row i belongs to robot i; nan at the end of rows with fewer neighbors.
     """
     pairs = seen.find_near_neighbors(max_distance)
-    return arrange_in_rows(pairs.robot, len(seen.positions), pairs.offset, np.nan)
+    return arrange_in_rows(pairs.robots, len(seen.positions), pairs.offsets, np.nan)
 
 
 def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:

@@ -181,8 +181,8 @@ class GpUcb(BaseController):
                 bound = compute_bound(posterior, memory.measurements[robot], beta)
                 bounds[robot] = memory.grid.interpolate(bound)
         pairs = seen.find_near_neighbors(np.inf)
-        neighbor_positions = seen.positions[pairs.robot] - pairs.offset
-        is_own = find_own_samples(samples, seen.positions, pairs.robot, neighbor_positions)
+        neighbor_positions = seen.positions[pairs.robots] - pairs.offsets
+        is_own = find_own_samples(samples, seen.positions, pairs.robots, neighbor_positions)
         goals = compute_sample_centroids(is_own, samples, bounds, seen.positions)
         return replace(memory, goals=goals, plan_time=seen.time)
 

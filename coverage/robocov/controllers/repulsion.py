@@ -70,9 +70,9 @@ def _compute_potential_forces(
 def _find_separated_neighbors(seen: Observations, max_distance: float) -> NearNeighbors:
     """Find near neighbors, and give robots at the same position a small offset from each other."""
     pairs = seen.find_near_neighbors(max_distance)
-    is_same = pairs.distance < _MIN_DISTANCE_M
-    directions = compute_separations(pairs.robot[is_same], pairs.neighbor[is_same])
-    pairs.offset[is_same] = _MIN_DISTANCE_M * directions
+    is_same = pairs.distances < _MIN_DISTANCE_M
+    directions = compute_separations(pairs.robots[is_same], pairs.neighbors[is_same])
+    pairs.offsets[is_same] = _MIN_DISTANCE_M * directions
     return pairs
 
 
@@ -290,7 +290,7 @@ class Howard(BaseController):
         returns = update_returns(seen, memory.returns)
         pairs = _find_separated_neighbors(seen, 2.0 * seen.region.diameter)
         robot_forces = sum_by_robot(
-            pairs.robot, self.k_robots * _compute_inverse_squares(pairs.offset), len(seen.positions)
+            pairs.robots, self.k_robots * _compute_inverse_squares(pairs.offsets), len(seen.positions)
         )
         if returns is None:
             offsets = np.nan_to_num(seen.positions - seen.obstacle_points)
@@ -370,13 +370,13 @@ class Poduri(BaseController):
         n = len(seen.positions)
         links, link_ranges = self._find_links(seen, memory.team)
         is_critical = self._find_critical_links(seen, links, link_ranges)
-        directions = links.offset / np.maximum(links.distance, _MIN_DISTANCE_M)[:, None]
-        cover = self.k_cover / np.maximum(links.distance, CONTACT_DISTANCE) ** 2
-        slack = link_ranges - np.minimum(links.distance, _MAX_LINK_STRETCH * link_ranges)
+        directions = links.offsets / np.maximum(links.distances, _MIN_DISTANCE_M)[:, None]
+        cover = self.k_cover / np.maximum(links.distances, CONTACT_DISTANCE) ** 2
+        slack = link_ranges - np.minimum(links.distances, _MAX_LINK_STRETCH * link_ranges)
         k_degree = self.k_cover * (1.0 / self.eta - 1.0) ** 2
         degree = np.where(is_critical, k_degree / slack**2, 0.0)
-        repulsion = sum_by_robot(links.robot, directions * cover[:, None], n)
-        attraction = sum_by_robot(links.robot, directions * -degree[:, None], n)
+        repulsion = sum_by_robot(links.robots, directions * cover[:, None], n)
+        attraction = sum_by_robot(links.robots, directions * -degree[:, None], n)
         gains = PotentialGains(
             k_rep=float(self.k_obs), rho_0=float(self.rho_obs), k_att=0.0, max_attraction=np.inf
         )
@@ -392,13 +392,13 @@ class Poduri(BaseController):
         """Return the links of all robots, and the range R_c of each, (m,) m."""
         max_ranges = np.minimum(team.communication_range, self.link_range)
         pairs = _find_separated_neighbors(seen, float(max_ranges.max()))
-        link_ranges = np.minimum(max_ranges[pairs.robot], max_ranges[pairs.neighbor])
-        is_linked = pairs.distance <= link_ranges
+        link_ranges = np.minimum(max_ranges[pairs.robots], max_ranges[pairs.neighbors])
+        is_linked = pairs.distances <= link_ranges
         links = NearNeighbors(
-            robot=pairs.robot[is_linked],
-            neighbor=pairs.neighbor[is_linked],
-            offset=pairs.offset[is_linked],
-            distance=pairs.distance[is_linked],
+            robots=pairs.robots[is_linked],
+            neighbors=pairs.neighbors[is_linked],
+            offsets=pairs.offsets[is_linked],
+            distances=pairs.distances[is_linked],
         )
         return links, link_ranges[is_linked]
 
@@ -406,10 +406,10 @@ class Poduri(BaseController):
         """Return a mask of the links that are critical for the robot or, as far as it knows, the neighbor."""
         n = len(seen.positions)
         is_near = np.zeros((n, n), dtype=bool)
-        is_near[links.robot, links.neighbor] = links.distance <= self.eta * link_ranges
-        rank = _rank_by_distance(links.robot, links.distance)
+        is_near[links.robots, links.neighbors] = links.distances <= self.eta * link_ranges
+        rank = _rank_by_distance(links.robots, links.distances)
         has_few_near = is_near.sum(axis=1) <= self._min_degree
-        is_critical: BoolArray = has_few_near[links.robot] & (rank < self._min_degree)
+        is_critical: BoolArray = has_few_near[links.robots] & (rank < self._min_degree)
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
             is_critical[others] = self._is_critical_for_neighbor(seen, links, is_near, others)
@@ -429,16 +429,16 @@ class Poduri(BaseController):
         # Entry (i, j) is the number of robots near j that robot i knows. Products of float matrices are much
         # faster than those of integers.
         near_counts = knows.astype(np.float32) @ is_near.astype(np.float32).T
-        has_few_near = near_counts[links.robot, links.neighbor][selected] <= self._min_degree
+        has_few_near = near_counts[links.robots, links.neighbors][selected] <= self._min_degree
         # The second condition needs n distances for each link, so it is tested only for these links.
         candidates = selected[has_few_near]
         distances = np.full(knows.shape, np.inf)
-        distances[links.robot, links.neighbor] = links.distance
+        distances[links.robots, links.neighbors] = links.distances
         # In all (c, n) arrays, row c belongs to candidate c, and column k to robot k.
-        neighbor_distances = distances[links.neighbor[candidates]]
-        own_distance = links.distance[candidates, None]
+        neighbor_distances = distances[links.neighbors[candidates]]
+        own_distance = links.distances[candidates, None]
         is_nearer = neighbor_distances < own_distance
-        is_known = knows[links.robot[candidates]]
+        is_known = knows[links.robots[candidates]]
         nearer_counts = (is_nearer & is_known).sum(axis=1)
         is_critical = np.zeros(len(selected), dtype=bool)
         is_critical[has_few_near] = nearer_counts < self._min_degree
@@ -454,16 +454,16 @@ class Poduri(BaseController):
         """
         is_critical = np.zeros(len(selected), dtype=bool)
         for k, link in enumerate(selected.tolist()):
-            robot = links.robot[link]
+            robot = links.robots[link]
             neighbor_positions = seen.get_neighbor_positions(robot)
-            index = int(np.flatnonzero(seen.neighbors.list_neighbors(robot) == links.neighbor[link])[0])
+            index = int(np.flatnonzero(seen.neighbors.list_neighbors(robot) == links.neighbors[link])[0])
             # The distances of the robot's other neighbors from this one. The robot itself is near it as well
             # if the link is short enough.
             offsets = np.delete(neighbor_positions, index, axis=0) - neighbor_positions[index]
             distances = np.hypot(*offsets.T)
             near_range = self.eta * link_ranges[link]
-            near_count = (distances <= near_range).sum() + (links.distance[link] <= near_range)
-            nearer_count = (distances < links.distance[link]).sum()
+            near_count = (distances <= near_range).sum() + (links.distances[link] <= near_range)
+            nearer_count = (distances < links.distances[link]).sum()
             is_critical[k] = near_count <= self._min_degree and nearer_count < self._min_degree
         return is_critical
 
@@ -545,11 +545,11 @@ class Dispersion(BaseController):
         """Return the velocities of the behaviors disperse and explore, (n, 2) m/s."""
         n = len(seen.positions)
         pairs = _find_separated_neighbors(seen, self.reach)
-        rate = self.k_disperse * (self.reach / np.maximum(pairs.distance, _MIN_DISTANCE_M) - 1.0)
-        velocities = sum_by_robot(pairs.robot, pairs.offset * rate[:, None], n)
+        rate = self.k_disperse * (self.reach / np.maximum(pairs.distances, _MIN_DISTANCE_M) - 1.0)
+        velocities = sum_by_robot(pairs.robots, pairs.offsets * rate[:, None], n)
         if self.explore_speed > 0.0:
             speed = np.hypot(*seen.velocities.T)
-            is_exploring = (np.bincount(pairs.robot, minlength=n) == 0) & (speed > _MIN_EXPLORING_SPEED)
+            is_exploring = (np.bincount(pairs.robots, minlength=n) == 0) & (speed > _MIN_EXPLORING_SPEED)
             factor = self.explore_speed / speed[is_exploring]
             velocities[is_exploring] = seen.velocities[is_exploring] * factor[:, None]
         speed = np.hypot(*velocities.T)

@@ -135,17 +135,17 @@ class Visibility(BaseController):
         robot_count, ray_count = view.distances.shape
         directions = compute_ray_directions(ray_count)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
-        wall_distances = np.where(view.hit, view.distances, np.inf)
+        wall_distances = np.where(view.is_hit, view.distances, np.inf)
         pairs = seen.find_near_neighbors(2.0 * float(max_distances.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
         weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, max_distances)
         # The weight at the sensing range, times the length of the arc there, for rays that hit no obstacle.
-        arcs = ~view.hit * weight[..., -1] * max_distances[:, None] * (2.0 * np.pi / ray_count)
+        arcs = ~view.is_hit * weight[..., -1] * max_distances[:, None] * (2.0 * np.pi / ray_count)
         windows = find_windows(view, directions, max_distances, self.jump)
         # The last sample is the end of the ray, which only the arcs need.
         growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
-        window_terms = sum_by_robot(windows.robot, growth, robot_count)
+        window_terms = sum_by_robot(windows.robots, growth, robot_count)
         return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
 
 
@@ -174,12 +174,12 @@ def find_cells_in_view(
         Whether no neighbor that sees the point has a lower power |q - p|² - R² there.
     """
     is_own = np.ones(depths.shape, dtype=np.bool_)
-    for pair in range(len(pairs.robot)):
-        robot = pairs.robot[pair]
+    for pair in range(len(pairs.robots)):
+        robot = pairs.robots[pair]
         # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
-        neighbor_x = -pairs.offset[pair, 0]
-        neighbor_y = -pairs.offset[pair, 1]
-        neighbor_range = max_distances[pairs.neighbor[pair]]
+        neighbor_x = -pairs.offsets[pair, 0]
+        neighbor_y = -pairs.offsets[pair, 1]
+        neighbor_range = max_distances[pairs.neighbors[pair]]
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):

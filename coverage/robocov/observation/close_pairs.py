@@ -20,7 +20,7 @@ class ClosePairs(NamedTuple):
     """(m,) Index of the first point of each pair."""
     second: IntArray
     """(m,) Index of the second point."""
-    distance: Array
+    distances: Array
     """(m,) m"""
 
 
@@ -40,7 +40,7 @@ def find_close_pairs(positions: Array, max_distance: float) -> ClosePairs:
     Examples
     --------
     >>> pairs = find_close_pairs(np.array([[0.0, 0.0], [1.0, 0.0], [5.0, 0.0]]), 2.0)
-    >>> pairs.first, pairs.second, pairs.distance
+    >>> pairs.first, pairs.second, pairs.distances
     (array([0, 1]), array([1, 0]), array([1., 1.]))
     """
     _, pairs = find_pairs_in_range(positions, np.full(len(positions), max_distance))

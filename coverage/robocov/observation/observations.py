@@ -21,13 +21,13 @@ from robocov.observation.scans import Scans
 class NearNeighbors(NamedTuple):
     """Directed pairs of a robot and a near neighbor, sorted by robot, then neighbor."""
 
-    robot: IntArray
-    """(m,)"""
-    neighbor: IntArray
-    """(m,)"""
-    offset: Array
+    robots: IntArray
+    """(m,) Index of the robot of each pair."""
+    neighbors: IntArray
+    """(m,) Index of the neighbor."""
+    offsets: Array
     """(m, 2) m, from the known position of the neighbor to the robot."""
-    distance: Array
+    distances: Array
     """(m,) m"""
 
 
@@ -199,14 +199,14 @@ class Observations:
         """
         if self.reported_positions is None and self.neighbors.is_complete:
             pairs = find_close_pairs(self.positions, max_distance)
-            offset = self.positions[pairs.first] - self.positions[pairs.second]
-            return NearNeighbors(pairs.first, pairs.second, offset, pairs.distance)
-        robot, neighbor = self.neighbors.list_pairs()
+            offsets = self.positions[pairs.first] - self.positions[pairs.second]
+            return NearNeighbors(pairs.first, pairs.second, offsets, pairs.distances)
+        robots, neighbors = self.neighbors.list_pairs()
         if self.reported_positions is None:
-            known_positions = self.positions[neighbor]
+            known_positions = self.positions[neighbors]
         else:
             known_positions = self.reported_positions
-        offset = self.positions[robot] - known_positions
-        distance = compute_point_distances(self.positions[robot], known_positions)
-        is_near = distance <= max_distance
-        return NearNeighbors(robot[is_near], neighbor[is_near], offset[is_near], distance[is_near])
+        offsets = self.positions[robots] - known_positions
+        distances = compute_point_distances(self.positions[robots], known_positions)
+        is_near = distances <= max_distance
+        return NearNeighbors(robots[is_near], neighbors[is_near], offsets[is_near], distances[is_near])

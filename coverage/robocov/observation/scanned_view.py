@@ -28,7 +28,7 @@ class View(NamedTuple):
 
     distances: Array
     """(n, rays) m, at most the range of the view."""
-    hit: BoolArray
+    is_hit: BoolArray
     """(n, rays) Whether the ray ends at an obstacle."""
 
 
@@ -40,13 +40,13 @@ class Windows(NamedTuple):
     away from the obstacle. The view thus grows by t (s - ρ)/ρ per meter of edge and per meter of motion.
     """
 
-    robot: IntArray
-    """(w,)"""
-    ray: IntArray
+    robots: IntArray
+    """(w,) Index of the robot."""
+    rays: IntArray
     """(w,) Index of the first ray that passes the corner."""
-    across: Array
+    directions: Array
     """(w, 2) t, the direction in which the robot has to move to see more."""
-    corner_distance: Array
+    corner_distances: Array
     """(w,) m, ρ."""
 
 
@@ -69,11 +69,11 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
     View
     """
     if seen.scans is not None:
-        return View(np.minimum(seen.scans.distances, max_distances[:, None]), seen.scans.hit)
+        return View(np.minimum(seen.scans.distances, max_distances[:, None]), seen.scans.is_hit)
     if previous is not None:
         return previous
     shape = (len(max_distances), scanning.rays)
-    return View(distances=np.broadcast_to(max_distances[:, None], shape), hit=np.zeros(shape, dtype=bool))
+    return View(distances=np.broadcast_to(max_distances[:, None], shape), is_hit=np.zeros(shape, dtype=bool))
 
 
 def find_windows(view: View, directions: Array, max_distances: Array, min_jump: float) -> Windows:
@@ -97,28 +97,28 @@ def find_windows(view: View, directions: Array, max_distances: Array, min_jump: 
     -------
     Windows
     """
-    robots = []
-    rays = []
-    across = []
+    robots_by_side = []
+    rays_by_side = []
+    motion_directions = []
     corner_distances = []
     # Compare each ray with the one before it, counter-clockwise and clockwise.
     for side in (1, -1):
-        previous_depth = np.roll(view.distances, side, axis=1)
-        previous_hit = np.roll(view.hit, side, axis=1)
+        previous_depths = np.roll(view.distances, side, axis=1)
+        is_previous_hit = np.roll(view.is_hit, side, axis=1)
         is_deeper = view.distances > _predict_depth(view, max_distances, side) + min_jump
-        robot, ray = np.nonzero(previous_hit & is_deeper)
-        robots.append(robot)
-        rays.append(ray)
+        robots, rays = np.nonzero(is_previous_hit & is_deeper)
+        robots_by_side.append(robots)
+        rays_by_side.append(rays)
         # The direction of the ray, turned by a right angle.
-        across.append(side * directions[ray][:, ::-1] * [-1.0, 1.0])
-        corner_distances.append(previous_depth[robot, ray])
-    robot = np.concatenate(robots)
-    order = np.argsort(robot, kind="stable")
+        motion_directions.append(side * directions[rays][:, ::-1] * [-1.0, 1.0])
+        corner_distances.append(previous_depths[robots, rays])
+    all_robots = np.concatenate(robots_by_side)
+    order = np.argsort(all_robots, kind="stable")
     return Windows(
-        robot=robot[order],
-        ray=np.concatenate(rays)[order],
-        across=np.concatenate(across)[order],
-        corner_distance=np.concatenate(corner_distances)[order],
+        robots=all_robots[order],
+        rays=np.concatenate(rays_by_side)[order],
+        directions=np.concatenate(motion_directions)[order],
+        corner_distances=np.concatenate(corner_distances)[order],
     )
 
 
@@ -141,12 +141,12 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
         along the edge beyond the corner, times t. For the symbols, see `Windows`.
     """
     part_count = depths.shape[2]
-    edge_depths = depths[windows.robot, windows.ray]
-    beyond_corner = np.maximum(edge_depths - windows.corner_distance[:, None], 0.0)
-    integral = (weight[windows.robot, windows.ray] * beyond_corner).sum(axis=1)
-    integral /= np.maximum(windows.corner_distance, _MIN_CORNER_DISTANCE_M)
-    integral *= view.distances[windows.robot, windows.ray] / part_count
-    return np.asarray(integral[:, None] * windows.across)
+    edge_depths = depths[windows.robots, windows.rays]
+    beyond_corner = np.maximum(edge_depths - windows.corner_distances[:, None], 0.0)
+    integral = (weight[windows.robots, windows.rays] * beyond_corner).sum(axis=1)
+    integral /= np.maximum(windows.corner_distances, _MIN_CORNER_DISTANCE_M)
+    integral *= view.distances[windows.robots, windows.rays] / part_count
+    return np.asarray(integral[:, None] * windows.directions)
 
 
 def _predict_depth(view: View, max_distances: Array, side: int) -> Array:
@@ -162,7 +162,7 @@ def _predict_depth(view: View, max_distances: Array, side: int) -> Array:
     predicted_inverse = factor * first_before - second_before
     wall_depth = 1.0 / np.maximum(predicted_inverse, 1.0 / max_distances[:, None])
     previous_depth = np.roll(view.distances, side, axis=1)
-    has_second_hit = np.roll(view.hit, 2 * side, axis=1)
+    has_second_hit = np.roll(view.is_hit, 2 * side, axis=1)
     return np.where(has_second_hit, np.maximum(wall_depth, previous_depth), previous_depth)
 
 

@@ -71,7 +71,7 @@ class Scans:
     ----------
     distances : (n, rays) array, m
         Distance to the first obstacle along each ray; the robot's sensing range if there is none.
-    hit : (n, rays) bool array
+    is_hit : (n, rays) bool array
         Whether there is an obstacle within the sensing range.
 
     See Also
@@ -80,7 +80,7 @@ class Scans:
     """
 
     distances: Array
-    hit: BoolArray
+    is_hit: BoolArray
 
     @property
     def rays(self) -> int:

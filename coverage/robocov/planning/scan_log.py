@@ -104,7 +104,7 @@ def number_scans(
     step_m = region.diameter / _DISTANCE_STEPS
     distances = np.rint(np.minimum(scans.distances, region.diameter) / step_m).astype(np.uint16)
     positions = np.array(positions)
-    is_hit = np.array(scans.hit)
+    is_hit = np.array(scans.is_hit)
     for array in (distances, positions, is_hit):
         array.setflags(write=False)
     return [

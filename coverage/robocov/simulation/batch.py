@@ -256,7 +256,7 @@ class SimulationBatch:
         rows = self._rows[run]
         scans = observations.scans
         if scans is not None:
-            scans = Scans(scans.distances[rows], scans.hit[rows])
+            scans = Scans(scans.distances[rows], scans.is_hit[rows])
         return replace(
             observations,
             positions=observations.positions[rows],

@@ -198,9 +198,9 @@ def test_scans_are_noisy_where_they_hit_an_obstacle() -> None:
     noisy = Simulation(HALL, TangentBug(), STARTS, team, DT, conditions=conditions).observe().scans
     assert exact is not None
     assert noisy is not None
-    np.testing.assert_array_equal(noisy.hit, exact.hit)
-    np.testing.assert_array_equal(noisy.distances[~exact.hit], exact.distances[~exact.hit])
-    errors = (noisy.distances - exact.distances)[exact.hit]
+    np.testing.assert_array_equal(noisy.is_hit, exact.is_hit)
+    np.testing.assert_array_equal(noisy.distances[~exact.is_hit], exact.distances[~exact.is_hit])
+    errors = (noisy.distances - exact.distances)[exact.is_hit]
     assert len(errors) > 100
     assert abs(errors.mean()) < 5 * 0.04 / np.sqrt(len(errors))
     assert abs(errors.std() / 0.04 - 1.0) < 5 / np.sqrt(2 * len(errors))
@@ -211,7 +211,7 @@ def test_noisy_scans_measure_positive_distances() -> None:
     conditions = Conditions(sensing_noise=50.0, seed=6)
     scans = Simulation(HALL, TangentBug(), STARTS, team, DT, conditions=conditions).observe().scans
     assert scans is not None
-    assert scans.distances[scans.hit].min() == MIN_MEASURED_DISTANCE_M
+    assert scans.distances[scans.is_hit].min() == MIN_MEASURED_DISTANCE_M
 
 
 def test_records_contain_true_positions() -> None:

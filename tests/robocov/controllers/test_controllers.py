@@ -161,7 +161,7 @@ def change_others(seen: Observations, i: int, reach: float, rng: np.random.Gener
         return changed
     distances = rng.uniform(0.3, 3.0, seen.scans.distances.shape)
     distances = np.where(is_other, distances, seen.scans.distances)
-    return replace(changed, scans=Scans(distances, seen.scans.hit ^ is_other))
+    return replace(changed, scans=Scans(distances, seen.scans.is_hit ^ is_other))
 
 
 @pytest.mark.parametrize("controller", PARAMETERS)

@@ -47,7 +47,7 @@ def scan_room(position: np.ndarray, rays: int, reach: float) -> View:
         fraction = (offsets[:, 0] * directions[..., 1] - offsets[:, 1] * directions[..., 0]) / cross
     is_hit = (distance > 0.0) & (fraction >= 0.0) & (fraction <= 1.0)
     nearest = np.where(is_hit, distance, np.inf).min(axis=1)
-    return View(distances=np.minimum(nearest, reach)[None], hit=(nearest < reach)[None])
+    return View(distances=np.minimum(nearest, reach)[None], is_hit=(nearest < reach)[None])
 
 
 def observe(positions: np.ndarray, density: Gaussians | None = None) -> Observations:
@@ -147,8 +147,8 @@ def test_a_wall_at_a_low_angle_is_no_window() -> None:
     directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
-    view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
-    assert len(find_windows(view, directions, np.array([20.0]), 0.3).robot) == 0
+    view = View(distances=np.minimum(wall, 20.0)[None], is_hit=(wall < 20.0)[None])
+    assert len(find_windows(view, directions, np.array([20.0]), 0.3).robots) == 0
 
 
 def test_the_end_of_a_wall_is_a_window() -> None:
@@ -157,18 +157,21 @@ def test_the_end_of_a_wall_is_a_window() -> None:
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     wall = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
-    view = View(distances=np.minimum(wall, 20.0)[None], hit=(wall < 20.0)[None])
+    view = View(distances=np.minimum(wall, 20.0)[None], is_hit=(wall < 20.0)[None])
     windows = find_windows(view, directions, np.array([20.0]), 0.3)
-    assert len(windows.robot) == 1
-    assert windows.corner_distance[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
-    assert windows.across[0] @ [0.3, 1.0] > 0.0
+    assert len(windows.robots) == 1
+    assert windows.corner_distances[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
+    assert windows.directions[0] @ [0.3, 1.0] > 0.0
 
 
 def test_the_view_grows_along_the_edge_beyond_a_corner() -> None:
     """For a constant weight, the integral of (s - ρ)/ρ from ρ to D is (D - ρ)²/(2 ρ)."""
-    view = View(distances=np.full((1, 4), 5.0), hit=np.zeros((1, 4), dtype=bool))
+    view = View(distances=np.full((1, 4), 5.0), is_hit=np.zeros((1, 4), dtype=bool))
     windows = Windows(
-        robot=np.array([0]), ray=np.array([2]), across=np.array([[0.0, 1.0]]), corner_distance=np.array([2.0])
+        robots=np.array([0]),
+        rays=np.array([2]),
+        directions=np.array([[0.0, 1.0]]),
+        corner_distances=np.array([2.0]),
     )
     depths = view.distances[..., None] * (np.arange(100) + 0.5) / 100
     growth = integrate_over_windows(windows, view, depths, np.full(depths.shape, 3.0))

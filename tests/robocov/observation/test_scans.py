@@ -26,7 +26,7 @@ class ScanCollector:
 
     def decide(self, seen: Observations, memory: tuple[float, ...]) -> Decision:
         if seen.scans is not None:
-            assert seen.scans.distances.shape == seen.scans.hit.shape == (len(seen.positions), 8)
+            assert seen.scans.distances.shape == seen.scans.is_hit.shape == (len(seen.positions), 8)
             assert not seen.scans.distances.flags.writeable
             memory = (*memory, round(seen.time, 9))
         return Decision(np.zeros_like(seen.positions), memory=memory)

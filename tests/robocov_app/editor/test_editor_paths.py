@@ -53,7 +53,7 @@ def test_waypoints_are_moved_and_removed() -> None:
     assert paths.remove_waypoint(fewer, 0, 1).sketch.get_item(0).shape.path is None
     with pytest.raises(MapError, match="no longer exists"):
         paths.move_waypoint(sketch, 0, 3, (1.0, 1.0))
-    with pytest.raises(MapError, match="in one place"):
+    with pytest.raises(MapError, match="at the same point"):
         paths.move_waypoint(fewer, 0, 0, (8.0, 6.0))
     with pytest.raises(MapError, match="too far away"):
         paths.move_waypoint(sketch, 0, 0, (float("nan"), 0.0))

@@ -48,7 +48,7 @@ def compute_row(layout: ObservationLayout, seen: Observations, robot: int, reach
             row += [0.0] * 3
     if layout.rays:
         distances = seen.scans.distances[robot]
-        hit = seen.scans.hit[robot]
+        hit = seen.scans.is_hit[robot]
         row += [d / 2.0 if h else 1.0 for d, h in zip(distances, hit, strict=True)]
     if layout.centroid:
         row += [*(partition(seen.positions, REGION, seen.neighbors).centroids[robot] - [x, y]) / 10.0]
@@ -98,7 +98,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
     for name in ("velocities", "obstacle_points"):
         getattr(other, name)[i] = getattr(seen, name)[i]
     other.scans.distances[i] = seen.scans.distances[i]
-    other.scans.hit[i] = seen.scans.hit[i]
+    other.scans.is_hit[i] = seen.scans.is_hit[i]
     assert layout.build_rows(other, team)[i].tobytes() == before.tobytes()
 
 

@@ -169,7 +169,7 @@ def _edit_paths(sketch: Sketch, selection: Selection, edit: PathEdit, descriptio
 
 def _set_path(sketch: Sketch, key: int, path: ObstaclePath, description: str) -> Change:
     extent = np.ptp(path.points, axis=0).max()
-    require(extent >= MIN_SIZE_M, "the waypoints lie in one place: click somewhere else")
+    require(extent >= MIN_SIZE_M, "all waypoints are at the same point: click somewhere else")
     shape = replace(sketch.get_item(key).shape, path=path)
     changed = sketch.with_objects({key: shape})
     return Change(changed, Selection.of(key), f"{sketch.display_name(key)}: {description}")

@@ -170,7 +170,7 @@ def restack(sketch: Sketch, selection: Selection, end: Literal["top", "bottom"])
 
 
 def make_default_start(sketch: Sketch, name: str) -> Change:
-    """Make a start the default by moving it to the first place."""
+    """Make a start the default by moving it to the first position."""
     require(name in dict(sketch.starts), f"there is no start “{to_one_line(name)}”")
     # False sorts before True, and the others keep their order.
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))

@@ -30,7 +30,7 @@ __all__ = ["Problem", "ProblemKind", "find_problems", "format_position", "transl
 
 
 def find_problems(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Find the errors in a map, and what may be a mistake.
+    """Find the errors and the likely mistakes in a map.
 
     Parameters
     ----------

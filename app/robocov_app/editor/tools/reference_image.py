@@ -40,7 +40,7 @@ class ReferenceImageTool(EditorTool):
         self.pressed = event
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Ignore the second press of a double click, because two points in one place have no distance."""
+        """Ignore the second press of a double click, because the distance of two equal points is 0."""
 
     def move(self, context: EditorContext, event: EditorPointerEvent) -> None:
         """Drag the image."""

@@ -139,7 +139,7 @@ class EditorPointer(Pointer):
             editor.tool.guides = ()
 
     def move_tool(self, event: pygame.event.Event) -> None:
-        """Tell the tool that the mouse has moved."""
+        """Pass a move of the mouse to the tool."""
         editor = self.editor
         pointer = self._build_event(event.pos)
         revision = editor.revision
@@ -148,7 +148,7 @@ class EditorPointer(Pointer):
         editor.revision = revision
 
     def release_tool(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Tell the tool that the button was released."""
+        """Pass the release of the button to the tool."""
         editor = self.editor
         pointer = self._build_event(event.pos)
         editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))

@@ -129,8 +129,8 @@ def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list
     for line in lines:
         wrapped += _wrap_line(page, line, max_width)
     if len(wrapped) > _MAX_LINES:
-        shown = wrapped[: _MAX_LINES - 1]
-        wrapped = [*shown, f"and {len(wrapped) - len(shown)} more lines"]
+        first_lines = wrapped[: _MAX_LINES - 1]
+        wrapped = [*first_lines, f"and {len(wrapped) - len(first_lines)} more lines"]
     return wrapped
 
 

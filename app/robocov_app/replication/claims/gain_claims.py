@@ -82,7 +82,7 @@ def judge_gains_every(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
         "gains-every",
         2,
         "In a non-convex environment RAPF ends at a lower cost than RPF with the same potential parameters, "
-        "whichever of the grid they are.",
+        "whichever set of the grid is used.",
         "VI, “the same values for the parameters of the potentials”",
         gains="every set of the grid",
     )

@@ -124,8 +124,8 @@ def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str 
     lines: list[str | Command] = []
     for group in groups:
         lines.append(group)
-        shown = [command for command in commands if command.keys and not command.hidden]
-        lines += [command for command in shown if command.group == group]
+        with_keys = [command for command in commands if command.keys and not command.hidden]
+        lines += [command for command in with_keys if command.group == group]
     return lines
 
 

@@ -105,11 +105,11 @@ class Question(Dialog):
     def handle_key(self, name: str, ui: Ui) -> bool:
         """Highlight an answer (arrow keys, Tab), or give one (Enter or its key)."""
         self.highlighted = (self.highlighted + _KEY_STEPS.get(name, 0)) % len(self.answers)
-        given = next((answer for answer in self.answers if answer.key == name), None)
+        chosen = next((answer for answer in self.answers if answer.key == name), None)
         if name in ENTER_KEYS:
-            given = self.answers[self.highlighted]
-        if given is not None:
-            self._give(given)
+            chosen = self.answers[self.highlighted]
+        if chosen is not None:
+            self._give(chosen)
         return True
 
     def handle_cancel(self) -> None:

@@ -187,9 +187,9 @@ def draw_text(
         return
     pixels = page.px(size)
     image = render_text(shorten_to_width(text, pixels, rect.width, bold), pixels, color, bold)
-    place = image.get_rect(midleft=rect.midleft)
+    box = image.get_rect(midleft=rect.midleft)
     if align == "center":
-        place = image.get_rect(center=rect.center)
+        box = image.get_rect(center=rect.center)
     elif align == "right":
-        place = image.get_rect(midright=rect.midright)
-    page.surface.blit(image, place)
+        box = image.get_rect(midright=rect.midright)
+    page.surface.blit(image, box)

@@ -51,14 +51,14 @@ def fit_chips(
             return remaining, shown_presets
     standard = [chip for chip in remaining if chip.command in standard_commands]
     other = [chip for chip in remaining if chip.command not in standard_commands]
-    shown = {chip.command: chip for chip in remaining}
+    chips_by_command = {chip.command: chip for chip in remaining}
     for group in (standard, other):
         for chip in reversed(group):
-            shown[chip.command] = replace(chip, has_text=False)
-            if fits(list(shown.values()), []):
-                return list(shown.values()), []
+            chips_by_command[chip.command] = replace(chip, has_text=False)
+            if fits(list(chips_by_command.values()), []):
+                return list(chips_by_command.values()), []
         for chip in reversed(group):
-            del shown[chip.command]
-            if fits(list(shown.values()), []):
-                return list(shown.values()), []
+            del chips_by_command[chip.command]
+            if fits(list(chips_by_command.values()), []):
+                return list(chips_by_command.values()), []
     return [], []

@@ -91,10 +91,10 @@ class SharedCamera:
             for painter in self._painters:
                 painter.fit()
             return
-        shown = other._painters[0].camera
+        camera = other._painters[0].camera
         view = self._painters[0].camera.view
-        shrinkage = min(view[2] / shown.view[2], view[3] / shown.view[3])
-        self._show(replace(shown, zoom=shrinkage * shown.zoom))
+        scale = min(view[2] / camera.view[2], view[3] / camera.view[3])
+        self._show(replace(camera, zoom=scale * camera.zoom))
 
     @property
     def is_moving(self) -> bool:

@@ -80,8 +80,8 @@ def _describe_pushed(situation: RobotSituation) -> str:
 
 def _describe_arrival(goal: NearbyObject) -> str:
     distance = abs(goal.offset)
-    place = "on" if distance <= SETTLED_DISTANCE_M else f"{format_length(distance)} from"
-    text = f"arrived: at rest {place} {goal.name}"
+    relation = "on" if distance <= SETTLED_DISTANCE_M else f"{format_length(distance)} from"
+    text = f"arrived: at rest {relation} {goal.name}"
     if goal.obstruction:
         return f"{text}, which is {goal.obstruction}"
     return text

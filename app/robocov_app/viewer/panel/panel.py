@@ -419,7 +419,7 @@ def show_report(ui: Ui, report: RobotReport) -> None:
         ui.space(3)
 
 
-def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
+def _draw_force(ui: Ui, line: ReportLine, max_force: float) -> None:
     """Draw an arrow to the left of the text of a force; its length increases with the force.
 
     Parameters
@@ -428,7 +428,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
         The page of the panel.
     line : ReportLine
         The sentence about the force.
-    largest : float
+    max_force : float
         Magnitude of the largest force in the report, N.
     """
     if ui.surface is None or line.vector is None:
@@ -436,7 +436,7 @@ def _draw_force(ui: Ui, line: ReportLine, largest: float) -> None:
     size = float(np.hypot(*line.vector))
     if size < MIN_FORCE_N:
         return
-    fraction = _MIN_ARROW_FRACTION + (1 - _MIN_ARROW_FRACTION) * size / max(largest, MIN_FORCE_N)
+    fraction = _MIN_ARROW_FRACTION + (1 - _MIN_ARROW_FRACTION) * size / max(max_force, MIN_FORCE_N)
     length = _ARROW_PX * ui.scale * fraction
     # On the screen, y points down.
     half = np.array(line.vector) / size * (length, -length)

@@ -107,8 +107,8 @@ class Node:
                 try:
                     run.apply(edit)
                 except InputError as error:
-                    place = f"edits[{self.number}], “{self.description}”"
-                    raise InputError(f"{place}: {error}") from None
+                    location = f"edits[{self.number}], “{self.description}”"
+                    raise InputError(f"{location}: {error}") from None
 
 
 class Branch(NamedTuple):

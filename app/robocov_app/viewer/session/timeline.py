@@ -16,6 +16,7 @@ from robocov_app.viewer.session.seek import Seek
 from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 STEPS_BETWEEN_SETTLED_CHECKS = 12
+"""Number of steps from one check whether the team has settled to the next."""
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -166,10 +167,10 @@ class Timeline:
         If the past was thinned, this takes several calls, so that it plays at the same speed.
         """
         assert self.shown_index is not None
-        shown = self.history[self.shown_index]
-        following = self.history[self.shown_index + 1]
+        displayed = self.history[self.shown_index]
+        next_state = self.history[self.shown_index + 1]
         self._calls_at_shown_state += 1
-        if self._calls_at_shown_state >= following.step - shown.step:
+        if self._calls_at_shown_state >= next_state.step - displayed.step:
             self.show(self.shown_index + 1)
 
     def advance(self) -> None:

@@ -148,8 +148,8 @@ def _place_maps(
         free -= 2 * (arrow + gap)
         # The thumbnails fill the whole width.
         width = (free - (fitting - 1) * gap) // fitting
-    shown = min(fitting, count)
-    return tuple(Rect(left + k * (width + gap), top, width, height) for k in range(shown)), arrows
+    visible_count = min(fitting, count)
+    return tuple(Rect(left + k * (width + gap), top, width, height) for k in range(visible_count)), arrows
 
 
 def _place_buttons(right: int, scale: float) -> tuple[Rect, ...]:

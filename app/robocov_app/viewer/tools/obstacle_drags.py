@@ -170,11 +170,11 @@ class BoxDrag(ObstacleDrag):
 
     def end(self, session: Session, inspection: Inspection) -> str | None:
         """Select the obstacles in the box."""
-        found = self._find_obstacles()
-        inspection.select_obstacles(found)
-        if not found:
+        selected = self._find_obstacles()
+        inspection.select_obstacles(selected)
+        if not selected:
             return None
-        return f"{describe_obstacles(found)} selected: arrow keys move, Delete deletes"
+        return f"{describe_obstacles(selected)} selected: arrow keys move, Delete deletes"
 
     def _find_obstacles(self) -> tuple[Obstacle, ...]:
         (x, y), (end_x, end_y) = self._start, self._end
@@ -186,7 +186,7 @@ class BoxDrag(ObstacleDrag):
 def exchange_obstacles(
     session: Session, before: tuple[Obstacle, ...], after: tuple[Obstacle, ...], description: str
 ) -> str:
-    """Exchange obstacles of the map for others; return the message.
+    """Replace obstacles of the map by others; return the message.
 
     Parameters
     ----------

@@ -277,7 +277,7 @@ class Atlas(BaseController):
         states = []
         for robot, state in enumerate(memory.states):
             scanned = state.known_map.add_scan(
-                seen.positions[robot], seen.scans.distances[robot], seen.scans.hit[robot]
+                seen.positions[robot], seen.scans.distances[robot], seen.scans.is_hit[robot]
             )
             # Cells at the positions of other robots are free.
             neighbors = seen.get_neighbor_positions(robot)

@@ -69,8 +69,8 @@ class Sightings:
         positions = self.positions.copy()
         times = self.times.copy()
         pairs = seen.find_near_neighbors(np.inf)
-        positions[pairs.robot, pairs.neighbor] = seen.positions[pairs.robot] - pairs.offset
-        times[pairs.robot, pairs.neighbor] = seen.time
+        positions[pairs.robots, pairs.neighbors] = seen.positions[pairs.robots] - pairs.offsets
+        times[pairs.robots, pairs.neighbors] = seen.time
         distances = np.sqrt(((positions - seen.positions[:, None]) ** 2).sum(axis=2))
         is_silent = seen.time - times > MAX_SILENCE_S
         certain_ranges = CERTAIN_RANGE_FRACTION * team.communication_range

@@ -28,10 +28,10 @@ FIRST_UPDATE_S = 0.01
 
 
 class PlayTopBar(TopBar):
-    """The top bar of the viewer in play mode, which has a button that leads back to the editor."""
+    """The top bar of the viewer in play mode, which has a button that returns to the editor."""
 
     def list_left_cells(self, ui: Ui, width: float) -> list[BarCell]:
-        """Return the cells at the left end: the way back, undo, redo and the file."""
+        """Return the cells at the left end: back to the editor, undo, redo and the file."""
         back = self.build_wide_button(ui, "back", "Editor", command=BACK_COMMAND)
         return [back, *super().list_left_cells(ui, width - measure_cells([back]))]
 

@@ -244,7 +244,7 @@ def describe_lost_passages(environment: Environment, grid: CellGrid, free: BoolA
 
 
 def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) -> str:
-    """Describe how many parts of the free space the cells lose, and whether they divide any.
+    """Describe how many parts of the free space the cells lose, and how many they divide.
 
     The result is empty if the cells have the same parts as the map.
     """

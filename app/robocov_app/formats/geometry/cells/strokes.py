@@ -32,13 +32,13 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
 
     Returns
     -------
-    kept : (rows, columns) array of bool
+    wide : (rows, columns) array of bool
         The cells of wider shapes.
     """
     if width <= 1:
         return solid.copy()
-    kept = np.empty_like(solid)
-    # Tiles overlap by as much as the result of a cell depends on its surroundings.
+    wide = np.empty_like(solid)
+    # Tiles overlap by the distance from which surroundings affect the result of a cell.
     halo = 3 * width
     size = max(_TILE_CELLS, halo)
     for top in range(0, solid.shape[0], size):
@@ -51,8 +51,8 @@ def remove_thin_strokes(solid: BoolArray, width: int) -> BoolArray:
             opened = _open(window, width)
             inner_rows = slice(top - low_row, rows.stop - low_row)
             inner_columns = slice(left - low_column, columns.stop - low_column)
-            kept[rows, columns] = opened[inner_rows, inner_columns]
-    return kept
+            wide[rows, columns] = opened[inner_rows, inner_columns]
+    return wide
 
 
 def _open(solid: BoolArray, width: int) -> BoolArray:

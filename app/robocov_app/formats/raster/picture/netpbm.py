@@ -144,15 +144,15 @@ def _decode_raw(data: bytes, header: _Header, source_name: str) -> Any:
 
 def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16]:
     """Parse `count` levels that are written as text, piece by piece to limit the memory."""
-    shortest = 2 * count - 1  # one digit for each level, with blanks between them
-    if len(text) < shortest:
+    min_bytes = 2 * count - 1  # one digit for each level, with blanks between them
+    if len(text) < min_bytes:
         raise MapError(f"{source_name}: expected {count} pixels, got only {len(text)} bytes")
     if b"#" in text:
         text = re.sub(rb"#[^\r\n]*", b" ", text)
     values = np.empty(count, np.uint16)
-    done = 0
+    parsed_count = 0
     position = 0
-    while done < count and position < len(text):
+    while parsed_count < count and position < len(text):
         blank = _BLANK.search(text, position + _PIECE_BYTES)
         piece = text[position:]
         next_piece = len(text)
@@ -163,15 +163,15 @@ def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16
         position = next_piece
         if numbers is None:
             raise MapError(f"{source_name}: expected {count} whole numbers as pixels, got other text")
-        numbers = numbers[: count - done]
+        numbers = numbers[: count - parsed_count]
         invalid = numbers[(numbers < 0) | (numbers > _MAX_LEVEL)]
         if len(invalid):
             worst = max(invalid)
             if min(invalid) < 0:
                 worst = min(invalid)
             raise MapError(f"{source_name}: expected pixels from 0 to {_MAX_LEVEL}, got {worst}")
-        values[done : done + len(numbers)] = numbers
-        done += len(numbers)
-    if done < count:
-        raise MapError(f"{source_name}: expected {count} pixels, got {done}")
+        values[parsed_count : parsed_count + len(numbers)] = numbers
+        parsed_count += len(numbers)
+    if parsed_count < count:
+        raise MapError(f"{source_name}: expected {count} pixels, got {parsed_count}")
     return values

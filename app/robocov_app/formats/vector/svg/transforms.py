@@ -30,10 +30,10 @@ def compose(outer: Array, inner: Array) -> Array:
     ValueError
         If an element of the matrix is larger than `MAX_NUMBER`.
     """
-    both = outer @ inner
-    if not (np.abs(both) <= MAX_NUMBER).all():
+    product = outer @ inner
+    if not (np.abs(product) <= MAX_NUMBER).all():
         raise ValueError(f"a transform to coordinates beyond {MAX_NUMBER:g}")
-    return np.asarray(both)
+    return np.asarray(product)
 
 
 def compute_stretch(matrix: Array) -> tuple[float, float]:

@@ -140,12 +140,12 @@ def _check_draft(draft: autosave.Draft) -> autosave.Draft | None:
 
 def describe_draft(draft: autosave.Draft) -> str:
     """Describe a draft for the question whether to recover it."""
-    place = "never saved" if draft.path is None else f"not saved to {draft.path.name}"
+    status = "never saved" if draft.path is None else f"not saved to {draft.path.name}"
     session = draft.content["session"]
     nodes = session["touches"] if "touches" in session else session["edits"]  # the former in old drafts
     count = len(nodes) - 1
     unit = "edit" if count == 1 else "edits"
-    return f"session from {draft.when:%H:%M}, {count} {unit}, {place}"
+    return f"session from {draft.when:%H:%M}, {count} {unit}, {status}"
 
 
 def recover_draft(
