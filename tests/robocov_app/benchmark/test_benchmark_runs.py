@@ -48,7 +48,7 @@ MAPS = ("blocks-a", "blocks-b")
 
 @pytest.fixture
 def short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs of one second, in this process."""
+    """Limit two tracks to two maps and runs of one second, and run them in this process."""
     for name in ("ideal", "lossy"):
         track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,), maps=MAPS)
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
@@ -71,7 +71,7 @@ def verify(out: Path, sample: int, controller: str | None = None) -> tuple[int, 
     return verification.runs, verification.differences
 
 
-def forge(out: Path, change: Any) -> None:
+def change_result(out: Path, change: Any) -> None:
     result = json.loads((out / RESULT_FILE).read_text())
     change(result)
     (out / RESULT_FILE).write_text(json.dumps(result))
@@ -101,7 +101,7 @@ def test_runs_are_rated_verified_and_shown_on_a_page(
 
 
 def test_bundled_results_are_complete() -> None:
-    """Each has all runs of the core tracks, with gaps that agree with its costs."""
+    """Each result has all runs of the core tracks, with gaps that agree with the costs."""
     results = load_bundled_results()
     assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
     runs = set()
@@ -201,7 +201,7 @@ def test_forged_results_are_detected(tmp_path: Path) -> None:
         (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
     ):
         (out / RESULT_FILE).write_text(honest)
-        forge(out, change)
+        change_result(out, change)
         _, differences = verify(out, sample=9 if "work_J" in message else 0)
         assert any(message in difference for difference in differences), message
 
@@ -212,14 +212,14 @@ def test_the_page_rejects_gaps_that_do_not_follow_from_costs(
 ) -> None:
     out = tmp_path / "out"
     run_short_benchmark(out)
-    forge(out, lambda result: result["rows"][0].update(gap=0.01))
+    change_result(out, lambda result: result["rows"][0].update(gap=0.01))
     message = read_error(
         capsys, "benchmark", "page", str(out), "--alone", "--out", str(tmp_path / "page.html")
     )
     assert "rows[0]: gap: expected" in message
 
 
-def test_entries_without_messages_are_named() -> None:
+def test_entries_made_with_an_earlier_version_are_marked() -> None:
     results = load_bundled_results()
     rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
     adaptive = next(result for result in results if result["entry"]["controller"] == "adaptive")
@@ -230,15 +230,15 @@ def test_entries_without_messages_are_named() -> None:
     assert "made with an earlier version" not in build_page([rapf, current], "Test")
 
 
-def test_an_incomplete_entry_is_not_ranked_and_changes_no_other_entry(tmp_path: Path) -> None:
+def test_an_incomplete_entry_is_listed_separately(tmp_path: Path) -> None:
     results = load_bundled_results()
     rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
-    few = {**rapf, "rows": rapf["rows"][:3], "entry": {**rapf["entry"], "label": "Few"}}
+    few_result = {**rapf, "rows": rapf["rows"][:3], "entry": {**rapf["entry"], "label": "Few"}}
     ratings_alone = ratings.build_ratings(results)
-    ratings_with_few = ratings.build_ratings([*results, few])
+    ratings_with_few = ratings.build_ratings([*results, few_result])
     for track, track_ratings in ratings_alone.items():
         assert track_ratings == ratings_with_few[track][: len(track_ratings)]
-    tables = [build_tables(results), build_tables([*results, few])]
+    tables = [build_tables(results), build_tables([*results, few_result])]
     assert tables[0].overview == tables[1].overview[:-1]
     assert tables[1].overview[-1][:4] == ("Few", "–", "–", "3 of 345")
     assert [row[0] for row in tables[1].ideal] == [row[0] for row in tables[0].ideal]
@@ -256,9 +256,9 @@ def test_runs_on_other_tracks_do_not_change_the_overview(track: str) -> None:
     results = load_bundled_results()
     rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
     row = {**rapf["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
-    more = {**rapf, "rows": [*rapf["rows"], row]}
-    with_more = [more if result is rapf else result for result in results]
-    assert build_tables(with_more).overview == build_tables(results).overview
+    extended = {**rapf, "rows": [*rapf["rows"], row]}
+    extended_results = [extended if result is rapf else result for result in results]
+    assert build_tables(extended_results).overview == build_tables(results).overview
 
 
 def test_large_plans_have_a_ranking_of_their_own() -> None:
@@ -300,11 +300,12 @@ def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:
     assert two_runs.score == 0.4
 
 
-def test_intervals_are_given_from_12_maps_on() -> None:
+def test_intervals_require_at_least_12_maps() -> None:
     rows = [{"map": str(k), "gap": 0.1 * k} for k in range(ratings.MIN_INTERVAL_MAPS)]
     assert np.isfinite(ratings.Rating("", "ideal", rows, 0).gap.low)
-    few = ratings.Rating("", "ideal", rows[1:], 0).gap
-    assert np.isnan(few.low) and few.estimate == pytest.approx(0.6)
+    gap = ratings.Rating("", "ideal", rows[1:], 0).gap
+    assert np.isnan(gap.low)
+    assert gap.estimate == pytest.approx(0.6)
 
 
 def test_teams_that_never_move_or_end_far_above_rapf_are_found() -> None:
@@ -347,21 +348,28 @@ def test_controllers_in_files_are_verified_only_if_named_and_unchanged(
     assert "is not the source that was rated" in message
 
 
+def select_part(result: dict[str, Any], part: str) -> dict[str, Any]:
+    """Return the result itself, one of its objects, or its first row."""
+    if part == "rows":
+        return result["rows"][0]
+    return result[part] if part else result
+
+
 @pytest.mark.usefixtures("short_runs")
 def test_damaged_results_are_rejected_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     run_short_benchmark(out)
     honest = json.loads((out / RESULT_FILE).read_text())
     for part in ("", "entry", "selection", "rows"):
-        for name in honest["rows"][0] if part == "rows" else honest[part] if part else honest:
-            for value in (None, {"x": []}):
-                damaged = json.loads(json.dumps(honest))
-                whole = damaged["rows"][0] if part == "rows" else damaged[part] if part else damaged
-                whole.pop(name)
-                whole |= {} if value is None else {name: value}
-                if value is None or name not in ("gains", "set", "entry", "selection", "versions"):
-                    (out / RESULT_FILE).write_text(json.dumps(damaged))
-                    assert str(out / RESULT_FILE) in read_error(capsys, "benchmark", "verify", str(out)), name
+        for name in select_part(honest, part):
+            damaged = json.loads(json.dumps(honest))
+            select_part(damaged, part).pop(name)
+            (out / RESULT_FILE).write_text(json.dumps(damaged))
+            assert str(out / RESULT_FILE) in read_error(capsys, "benchmark", "verify", str(out)), name
+            if name not in ("gains", "set", "entry", "selection", "versions"):
+                select_part(damaged, part)[name] = {"x": []}
+                (out / RESULT_FILE).write_text(json.dumps(damaged))
+                assert str(out / RESULT_FILE) in read_error(capsys, "benchmark", "verify", str(out)), name
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -372,7 +380,7 @@ def test_finished_runs_are_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (("--controller", "rapff"), "--controller: unknown controller 'rapff': did you mean 'rapf'"),
         (("--controller", "rapf", "--set", "k_re=1"), "unknown gain 'k_re'"),
@@ -388,14 +396,16 @@ def test_finished_runs_are_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     ],
 )
 def test_invalid_commands_are_rejected(
-    words: tuple[str, ...], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "letter.txt").write_text("Dear")
     (tmp_path / "other.json").write_text("{}")
     (tmp_path / "torn.json.gz").write_bytes(gzip.compress(b"{}" * 99)[:-9])
     paths = {"FOREIGN": str(tmp_path), "OTHER": str(tmp_path / "other.json")}
     paths["TORN"] = str(tmp_path / "torn.json.gz")
-    assert message in read_error(capsys, "benchmark", *(paths.get(word, word) for word in words))
+    assert message in read_error(
+        capsys, "benchmark", *(paths.get(argument, argument) for argument in arguments)
+    )
 
 
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
@@ -427,19 +437,10 @@ def test_no_point_dominates_the_pareto_front(points: list[tuple[int, int]]) -> N
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 def test_a_killed_benchmark_is_resumed(tmp_path: Path) -> None:
-    words = (
-        "benchmark",
-        "--controller",
-        "lloyd",
-        "--track",
-        "one-robot",
-        "--workers",
-        "1",
-        "--json",
-        "--maps",
-    )
+    options = "--controller lloyd --track one-robot --workers 1 --json"
     maps = ("blocks-a", "blocks-b", "polygons-7001", "polygons-7002", "plants-7001", "yards-7001")
-    command = [*COMMAND, *words, *maps, "--out", str(tmp_path / "killed")]
+    arguments = ["benchmark", *options.split(), "--maps", *maps]
+    command = [*COMMAND, *arguments, "--out", str(tmp_path / "killed")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         runs = tmp_path / "killed" / TRACKS_FOLDER / "one-robot" / "runs"
         end = time.monotonic() + 120.0
@@ -448,8 +449,8 @@ def test_a_killed_benchmark_is_resumed(tmp_path: Path) -> None:
             time.sleep(0.02)
         process.kill()
     assert not (tmp_path / "killed" / RESULT_FILE).exists()
-    assert main([*words, *maps, "--out", str(tmp_path / "killed")]) == 0
-    assert main([*words, *maps, "--out", str(tmp_path / "whole")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "killed")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "whole")]) == 0
     rows = {}
     for name in ("killed", "whole"):
         rows[name] = [{**row, "deciding_s": None} for row in read_result(tmp_path / name)["rows"]]
@@ -469,7 +470,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 @pytest.mark.slow
 @pytest.mark.xdist_group("browser")
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver")
-def test_the_page_in_a_browser(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_fits_narrow_and_wide_windows(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     track = replace(suite.TRACKS["ideal"], seeds=(0,), maps=("rooms", "polygons-7001"))
     monkeypatch.setitem(suite.TRACKS, "ideal", track)  # type: ignore[arg-type]
     results = []

@@ -1,9 +1,9 @@
-"""The frozen suite: its maps are the ones of its file, its tracks apart from tuning, its references real."""
+"""The frozen suite: maps match their file, tuning maps are separate, references have the stated cost."""
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from robocov_app.benchmark.large_plans import LARGE_PLANS
 from robocov_app.benchmark.oracle import Oracle, assign_goals
 from robocov_app.benchmark.references import list_references
 
-SOME = (
+SAMPLED_MAPS = (
     "rooms",
     "forklifts",
     "blocks-7001",
@@ -45,25 +45,25 @@ def compute_hashes(names: tuple[str, ...]) -> dict[str, str]:
     return {name: suite.compute_map_hash(suite.build_map(name)) for name in names}
 
 
-def test_some_maps_are_still_the_frozen_ones() -> None:
-    assert compute_hashes(SOME) == load_frozen_hashes(SOME)
+def test_sampled_maps_equal_the_frozen_maps() -> None:
+    assert compute_hashes(SAMPLED_MAPS) == load_frozen_hashes(SAMPLED_MAPS)
 
 
 @pytest.mark.slow
-def test_all_maps_are_still_the_frozen_ones() -> None:
+def test_all_maps_equal_the_frozen_maps() -> None:
     names = tuple(suite.FAMILY_OF)
     assert compute_hashes(names) == load_frozen_hashes(names)
     assert set(suite.load_frozen_maps()) == set(names)
 
 
-def test_a_changed_map_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_changed_map_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     changed = replace(suite.build_map("rooms"), name="rooms, a little different")
     monkeypatch.setattr(suite, "build_map", lambda name: changed)
     with pytest.raises(InputError, match="map rooms: expected the map of suite v1"):
         suite.load_suite_map("rooms")
 
 
-def test_a_ranking_stands_for_all_of_its_tracks() -> None:
+def test_the_name_of_a_ranking_selects_all_of_its_tracks() -> None:
     expected = suite.select_maps(
         ["plans-small", "plans-medium", "plans-large", "plans-crowd"], [], quick=False
     )
@@ -72,7 +72,7 @@ def test_a_ranking_stands_for_all_of_its_tracks() -> None:
         suite.select_maps(["plan"], [], quick=False)
 
 
-def test_what_the_suite_promises() -> None:
+def test_the_suite_is_complete_and_tuning_maps_are_separate() -> None:
     assert len(suite.FAMILIES) >= 6
     assert len(suite.TRACKS["ideal"].maps) >= 60
     tuning = set(suite.TRACKS["tuning"].maps)
@@ -83,14 +83,14 @@ def test_what_the_suite_promises() -> None:
         assert len(suite.load_frozen_maps()[name]["references"][str(robots)]["positions_m"]) == robots
 
 
-def test_a_reference_has_the_cost_that_it_tells() -> None:
+def test_references_have_the_stated_cost() -> None:
     for name, robots in (("rooms-7001", "4"), ("dense-yards-7001", "6")):
-        told = suite.load_frozen_maps()[name]["references"][robots]
-        result = CoverageCost(suite.load_suite_map(name), suite.LATTICE)(np.array(told["positions_m"]))
-        assert result.mean_distance == pytest.approx(told["mean_distance_m"], rel=1e-12)
+        reference = suite.load_frozen_maps()[name]["references"][robots]
+        result = CoverageCost(suite.load_suite_map(name), suite.LATTICE)(np.array(reference["positions_m"]))
+        assert result.mean_distance == pytest.approx(reference["mean_distance_m"], rel=1e-12)
 
 
-def test_names_that_are_unknown() -> None:
+def test_unknown_tracks_and_maps_are_rejected() -> None:
     with pytest.raises(ParameterError, match="--track: unknown track 'ideel': did you mean 'ideal'"):
         suite.select_maps(["ideel"], [], quick=False)
     with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'; `robocov"):
@@ -112,23 +112,24 @@ def test_quick_has_one_map_of_each_family() -> None:
         assert [suite.FAMILY_OF[name] for name in maps] == list(suite.FAMILIES)
 
 
-def test_the_oracle_assigns_as_brute_force_does() -> None:
+def test_the_oracle_assigns_goals_as_brute_force_does() -> None:
     planner = GeodesicPlanner(WALLED, 0.13, 8, radius=0.1)
     rng = np.random.default_rng(0)
     for _ in range(5):
-        places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
-        far = planner.paths.compute_distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
-        found = assign_goals(planner, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
-        best = min(itertools.permutations(range(4)), key=lambda order: (far[range(4), order] ** 2).sum())
-        assert found.tolist() == list(best)
+        points = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2))
+        positions, goals = np.clip(points, 0.2, (1.8, 2.8))
+        distances = planner.paths.compute_distances(positions, goals)
+        assignment = assign_goals(planner, positions, goals)
+        costs = {order: (distances[range(4), order] ** 2).sum() for order in permutations(range(4))}
+        assert assignment.tolist() == list(min(costs, key=costs.__getitem__))
 
 
-def test_the_oracle_walks_round_walls_and_heeds_who_has_failed() -> None:
+def test_the_oracle_moves_around_walls_and_reassigns_goals_after_a_failure() -> None:
     goals = [[3.2, 0.6], [1.0, 2.4]]
     stages = [[0.0, [0, 1], goals], [9.0, [1], [[0.5, 0.5]]]]
-    told = replace(WALLED, extra={"oracle": stages})
+    environment = replace(WALLED, extra={"oracle": stages})
     starts = WALLED.start("left").sample(2, seed=1)
-    record = Simulation(told, Oracle(), starts, Team.homogeneous(2)).run(18.0)
+    record = Simulation(environment, Oracle(), starts, Team.homogeneous(2)).run(18.0)
     middle = record.positions[int(8.9 * 60)]
     assert min(np.abs(middle - goals).max(), np.abs(middle[::-1] - goals).max()) < 0.05
     assert np.abs(record.positions[-1] - [goals[1], (0.5, 0.5)]).max() < 0.05

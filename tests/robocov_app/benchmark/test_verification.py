@@ -1,4 +1,4 @@
-"""Cheating controllers and changed results do not pass a verification, honest ones do."""
+"""Verification rejects cheating controllers and changed results, and accepts honest ones."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Mine:
         POSITIONS[own.number] = own.position
         return sum(own.position - other for other in POSITIONS.values())
 """
-"""Robots learn from a variable of the module where all others are."""
+"""Robots share their positions by a variable of the module."""
 
 ON_DISK = """
 FOLDER = Path(__file__).parent
@@ -104,7 +104,7 @@ class Mine:
     def decide(self, seen, memory):
         return rc.Decision(seen.positions.mean(axis=0) - seen.positions)
 """
-"""Uses the rows of all robots, not only of those that are heard."""
+"""Uses the observations of all robots, not only of those in communication range."""
 
 WITH_MESSAGES = """
 @dataclass(frozen=True)
@@ -131,13 +131,13 @@ IMPORTS = HEAD.partition("@dataclass")[0]
 
 
 @pytest.fixture(autouse=True)
-def _short_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def shorten_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in TRACKS:
         track = suite.TRACKS[name]
         failures = tuple((robot, 0.5) for robot, _ in track.failures)
         changed = replace(track, duration=1.5, seeds=(0,), maps=(MAP,), failures=failures)
         if name == "short-range":
-            # On a small map, the robots of the start would hear each other anyway.
+            # On a small map, all robots would be in communication range at the start.
             changed = replace(changed, changes={"communication_range": 0.5})
         monkeypatch.setitem(suite.TRACKS, name, changed)  # type: ignore[arg-type]
 
@@ -197,7 +197,7 @@ SHARING = [name for name, kind in CONTROLLERS.items() if kind.information == "sh
 def test_robots_that_share_maps_decide_by_their_own_observations(
     controller: str, track: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In 4 s, scans have been received, and at least two plans have been made with them."""
+    """Within 4 s, robots receive scans and make at least two plans with them."""
     longer = replace(suite.TRACKS[track], duration=4.0)
     monkeypatch.setitem(suite.TRACKS, track, longer)  # type: ignore[arg-type]
     transcript = record(controller, track)
@@ -211,7 +211,7 @@ def test_robots_of_the_oracle_decide_by_the_observations_of_the_team() -> None:
     assert isolate(ORACLE, "short-range", robot=None) is None
 
 
-def test_a_robot_does_not_receive_what_others_know() -> None:
+def test_observations_of_others_are_hidden_from_an_isolated_robot() -> None:
     task = build_task("atlas", "short-range")
     transcript = Transcript()
     perform(task, transcript.add)
@@ -246,10 +246,11 @@ def test_robots_may_send_messages(track: str, tmp_path: Path) -> None:
     assert isolate(f"{tmp_path / 'mine.py'}:Mine", track, robot=2) is None
 
 
-def test_messages_with_hidden_knowledge_are_found(tmp_path: Path) -> None:
+def test_messages_with_hidden_knowledge_are_detected(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
     difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
-    assert difference is not None and "decides differently" in difference
+    assert difference is not None
+    assert "decides differently" in difference
 
 
 def test_contents_are_compared_bit_for_bit() -> None:
@@ -311,7 +312,7 @@ class Mine:
     def force(self, own):
         return [0.0, 0.0]
 """
-"""Controller that stands still, as one that recognizes the maps of the suite does on any other map."""
+"""Robots stay at rest, as with a controller that works only on maps of the suite."""
 
 
 @pytest.mark.slow
@@ -350,12 +351,13 @@ def test_an_entry_with_other_information_is_not_verified(tmp_path: Path) -> None
 def test_seeds_are_drawn_unless_one_is_given(tmp_path: Path) -> None:
     folder, name = rate(tmp_path, HEAD.removeprefix(IMPORTS) + PULL, "ideal")
     nothing = VerificationOptions(sample=0, robots=0, new_maps=0)
-    first, second = verify(folder, name, nothing).seed, verify(folder, name, nothing).seed
-    assert first != second
+    first = verify(folder, name, nothing)
+    second = verify(folder, name, nothing)
+    assert first.seed != second.seed
     assert verify(folder, name, replace(nothing, seed=7)).seed == 7
 
 
-def test_the_probability_to_miss_changed_rows_is_that_of_drawing_without_them() -> None:
+def test_the_probability_to_miss_changed_rows_agrees_with_sampling() -> None:
     verification = Verification(seed=0, rows=10, runs=3)
     rng = np.random.default_rng(0)
     missed = [not {0, 1} & set(rng.permutation(10)[:3].tolist()) for _ in range(4000)]
@@ -373,13 +375,13 @@ def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
 
 
 @pytest.fixture
-def _whole_track(monkeypatch: pytest.MonkeyPatch) -> None:
+def whole_track(monkeypatch: pytest.MonkeyPatch) -> None:
     maps = tuple(name for names in suite.FAMILIES.values() for name in names)
     monkeypatch.setitem(suite.TRACKS, TRACK, replace(suite.TRACKS[TRACK], maps=maps))  # type: ignore[arg-type]
 
 
-@pytest.mark.usefixtures("_whole_track")
-def test_controllers_that_know_the_maps_of_the_suite_are_worse_on_new_ones() -> None:
+@pytest.mark.usefixtures("whole_track")
+def test_a_larger_gap_on_new_maps_is_detected() -> None:
     families = list(GENERATORS)
     known = compare_gaps(build_rows(0.0, 0.001), [(family, 0.02) for family in families])
     assert known is not None and known.is_worse
@@ -390,8 +392,8 @@ def test_controllers_that_know_the_maps_of_the_suite_are_worse_on_new_ones() -> 
     assert equal is not None and not equal.is_worse
 
 
-@pytest.mark.usefixtures("_whole_track")
-def test_new_maps_that_are_like_those_of_the_suite_rarely_differ() -> None:
+@pytest.mark.usefixtures("whole_track")
+def test_equal_gaps_on_new_maps_are_accepted() -> None:
     rng = np.random.default_rng(1)
     p_values = []
     for _ in range(60):
@@ -404,11 +406,13 @@ def test_new_maps_that_are_like_those_of_the_suite_rarely_differ() -> None:
     assert 0.2 < np.median(p_values) < 0.8
 
 
-def test_few_rows_cannot_show_a_difference() -> None:
+def test_a_few_rows_are_not_enough_for_a_significant_difference() -> None:
     rows = [{"track": TRACK, "map": MAP, "seed": 0, "gap": 0.0}]
     assert compare_gaps(rows, [("polygons", 0.5)]) is None
     comparison = compare_gaps(rows, [("bundled", 0.5)])
-    assert comparison is not None and comparison.min_p_value == 0.5 and not comparison.is_worse
+    assert comparison is not None
+    assert comparison.min_p_value == 0.5
+    assert not comparison.is_worse
 
 
 def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
@@ -421,7 +425,7 @@ def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
         assert len(new_map.environment.start().sample(6, seed=new_map.start_seed)) == 6
 
 
-def test_a_process_that_ended_is_a_difference() -> None:
+def test_a_process_that_ends_early_is_a_difference() -> None:
     task = build_task("rapf", "ideal")
     transcript = Transcript()
     perform(task, transcript.add)

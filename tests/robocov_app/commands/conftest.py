@@ -7,8 +7,8 @@ from robocov_app.sweep import sweeping
 
 
 @pytest.fixture(autouse=True)
-def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
+def use_quick_settings(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw distances on a coarse lattice and sweep in this process, except in slow tests."""
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr(run_cost, "MIN_FIGURE_LATTICE", 32)
         monkeypatch.setattr(sweeping, "LocalPool", DirectExecutor)
@@ -16,5 +16,5 @@ def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs are not drawn, which takes longer than the runs."""
+    """Save no figures of runs: to draw them takes longer than to simulate."""
     monkeypatch.setattr(artifacts, "save_figures", lambda *_, **__: None)

@@ -1,4 +1,4 @@
-"""`robocov check`: every issue with its line, and maps that are checked at each save."""
+"""`robocov check` reports issues with their lines and checks maps again when they are saved."""
 
 import json
 import os
@@ -32,50 +32,55 @@ BAD = GOOD.replace('"radius": 1}', '"radius": -1}').replace('[2, 2], "radius"', 
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Path:
+def map_file(tmp_path: Path) -> Path:
     path = tmp_path / "mine.json"
     path.write_text(GOOD)
     return path
 
 
-def test_each_issue_gets_a_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file.write_text(BAD)
-    assert main(["check", str(file), "rooms"]) == 2
-    said = capsys.readouterr()
-    lines = said.err.splitlines()
+def test_each_issue_gets_a_line(map_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    map_file.write_text(BAD)
+    assert main(["check", str(map_file), "rooms"]) == 2
+    output = capsys.readouterr()
+    lines = output.err.splitlines()
     assert len(lines) == 4
-    assert lines[0].startswith(f"robocov: error: {file}:6:52: obstacles[0].radius: expected a number")
-    assert lines[1].startswith(f"robocov: error: {file}:7:5: obstacles[1].radius: missing, expected a number")
-    assert lines[2].startswith(f"robocov: error: {file}:7:34: obstacles[1].center: expected a point")
-    assert lines[3].startswith(f"robocov: error: {file}:7:39: obstacles[1]: unknown key 'raduis': did you")
-    assert said.out.startswith("rooms: valid\n")
+    assert lines[0].startswith(f"robocov: error: {map_file}:6:52: obstacles[0].radius: expected a number")
+    assert lines[1].startswith(
+        f"robocov: error: {map_file}:7:5: obstacles[1].radius: missing, expected a number"
+    )
+    assert lines[2].startswith(f"robocov: error: {map_file}:7:34: obstacles[1].center: expected a point")
+    assert lines[3].startswith(
+        f"robocov: error: {map_file}:7:39: obstacles[1]: unknown key 'raduis': did you"
+    )
+    assert output.out.startswith("rooms: valid\n")
 
 
-def test_the_lines_are_in_the_answer_for_programs(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file.write_text(BAD)
-    assert main(["check", str(file), str(file.parent / "none.json"), "--json"]) == 2
-    row, none = json.loads(capsys.readouterr().out)["maps"]
-    assert (row["line"], row["column"]) == (7, 39)
-    assert row["error"].startswith(f"{file}:7:39: obstacles[1]: unknown key")
-    assert "(and 3 more)" in row["error"]
-    second = row["issues"][1]
+def test_json_output_contains_lines_and_columns(map_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    map_file.write_text(BAD)
+    assert main(["check", str(map_file), str(map_file.parent / "none.json"), "--json"]) == 2
+    invalid, missing = json.loads(capsys.readouterr().out)["maps"]
+    assert (invalid["line"], invalid["column"]) == (7, 39)
+    assert invalid["error"].startswith(f"{map_file}:7:39: obstacles[1]: unknown key")
+    assert "(and 3 more)" in invalid["error"]
+    second = invalid["issues"][1]
     assert {key: second[key] for key in ("path", "line", "column")} == {
         "path": "obstacles[0].radius",
         "line": 6,
         "column": 52,
     }
     assert second["text"].startswith("obstacles[0].radius: expected a number")
-    assert row["issues_not_listed"] == 0
-    assert none["line"] is None and none["issues"] == []
-    assert none["error"] == f"{file.parent / 'none.json'}: no such file"
+    assert invalid["issues_not_listed"] == 0
+    assert missing["line"] is None
+    assert missing["issues"] == []
+    assert missing["error"] == f"{map_file.parent / 'none.json'}: no such file"
 
 
-def test_issues_beyond_the_limit_are_counted(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
-    assert main(["check", str(file)]) == 2
+def test_issues_beyond_the_limit_are_counted(map_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    map_file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
+    assert main(["check", str(map_file)]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 21
-    assert lines[-1] == f"robocov: error: {file}: and 10 more issues"
+    assert lines[-1] == f"robocov: error: {map_file}: and 10 more issues"
 
 
 def simulate_saves(*steps: Any) -> Any:
@@ -90,43 +95,43 @@ def simulate_saves(*steps: Any) -> Any:
     return watch_files
 
 
-def test_changes_are_marked_since_the_last_valid_state(
-    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_changes_since_the_last_valid_map_are_marked(
+    map_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     steps = [
-        lambda: file.write_text(GOOD.replace("[5, 3]", "[5, 4.9]")),
-        lambda: file.write_text(BAD),
-        lambda: file.write_text(GOOD.replace("0.5}", "0.7}")),
+        lambda: map_file.write_text(GOOD.replace("[5, 3]", "[5, 4.9]")),
+        lambda: map_file.write_text(BAD),
+        lambda: map_file.write_text(GOOD.replace("0.5}", "0.7}")),
     ]
     monkeypatch.setattr(check, "watch_files", simulate_saves(*steps))
-    assert main(["check", "--watch", str(file), "square"]) == 0
-    said = capsys.readouterr()
-    assert said.err == ""
-    blocks = said.out.split(": valid")
+    assert main(["check", "--watch", str(map_file), "square"]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    blocks = output.out.split(": valid")
     assert len(blocks) == 5
     assert "was" not in blocks[1] and "  area " in blocks[2]
     assert "narrowest gap  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
     assert "warning        the gap between" in blocks[3] and "cannot pass (new)" in blocks[3]
-    assert f"{file}: invalid\n{file}:6:52: obstacles[0].radius: expected a number" in blocks[3]
+    assert f"{map_file}: invalid\n{map_file}:6:52: obstacles[0].radius: expected a number" in blocks[3]
     assert ", was 0.100 m, between" in blocks[4] and "no longer      the gap between" in blocks[4]
     assert "free area      55.3" in blocks[4]
 
 
-def test_for_programs_each_check_is_an_object_on_a_line(
-    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_watching_prints_one_json_object_per_check(
+    map_file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(check, "watch_files", simulate_saves(lambda: file.write_text(BAD)))
-    assert main(["check", "--watch", str(file), "square", "--json"]) == 0
+    monkeypatch.setattr(check, "watch_files", simulate_saves(lambda: map_file.write_text(BAD)))
+    assert main(["check", "--watch", str(map_file), "square", "--json"]) == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [(row["map"], row["valid"]) for row in rows] == [
-        (str(file), True),
+        (str(map_file), True),
         ("square", True),
-        (str(file), False),
+        (str(map_file), False),
     ]
     assert rows[2]["line"] == 7
 
 
-def test_a_bundled_map_is_watched_at_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_file_of_a_bundled_map_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
     watched: list[Path] = []
     monkeypatch.setattr(check, "watch_files", lambda paths: watched.extend(paths) or iter(()))
     assert main(["check", "--watch", "rooms", "no such", "there/none.json"]) == 0
@@ -138,9 +143,9 @@ def read_until(stream: int, expected: bytes, seconds: float = 30.0) -> bytes:
     content = b""
     deadline = time.monotonic() + seconds
     while expected not in content:
-        left = deadline - time.monotonic()
-        assert left > 0, content
-        if select.select([stream], [], [], left)[0]:
+        remaining = deadline - time.monotonic()
+        assert remaining > 0, content
+        if select.select([stream], [], [], remaining)[0]:
             content += os.read(stream, 65536)
     return content
 
@@ -148,37 +153,37 @@ def read_until(stream: int, expected: bytes, seconds: float = 30.0) -> bytes:
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("terminal", [False, True])
 @pytest.mark.slow
-def test_watching_from_outside(file: Path, terminal: bool) -> None:
+def test_a_replaced_file_is_checked_until_ctrl_c(map_file: Path, terminal: bool) -> None:
     open_pair = pty.openpty if terminal else os.pipe
     reader, writer = open_pair()
     process = subprocess.Popen(
-        [*COMMAND, "check", "--watch", str(file)], stdout=writer, stderr=subprocess.PIPE, text=True
+        [*COMMAND, "check", "--watch", str(map_file)], stdout=writer, stderr=subprocess.PIPE, text=True
     )
     os.close(writer)
     try:
         first = read_until(reader, b"Ctrl+C ends" if terminal else b"narrowest gap")
         assert (b"\x1b[2J" in first) == terminal
         start = time.monotonic()
-        fresh = file.with_suffix(".new")
-        fresh.write_text(BAD)
-        fresh.replace(file)
+        replacement = map_file.with_suffix(".new")
+        replacement.write_text(BAD)
+        replacement.replace(map_file)
         output = read_until(reader, b"missing, expected")
         assert time.monotonic() - start < 10.0
         assert b"mine.json:6:52: obstacles[0].radius: expected a number" in output
         process.send_signal(signal.SIGINT)
-        _, complaints = process.communicate(timeout=30)
+        _, errors = process.communicate(timeout=30)
     finally:
         process.kill()
         os.close(reader)
     assert process.returncode == 130
-    assert complaints == "robocov: stopped\n"
+    assert errors == "robocov: stopped\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
-def test_watching_takes_little_processor_time(file: Path) -> None:
+def test_watching_takes_little_processor_time(map_file: Path) -> None:
     with subprocess.Popen(
-        [*COMMAND, "check", "--watch", str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [*COMMAND, "check", "--watch", str(map_file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
         assert process.stdout is not None
         read_until(process.stdout.fileno(), b"narrowest gap")

@@ -14,13 +14,14 @@ def hall() -> Environment:
 
 
 def read_report(after: Environment, before: Environment | None = None) -> dict[str, str]:
+    """Return the values of a report by their titles."""
     lines = format_report(check_map(after), None if before is None else check_map(before))
     pairs = [line.strip().split("  ", 1) for line in lines]
     assert len({title for title, _ in pairs}) == len(pairs)
     return {title: value.strip() for title, value in pairs}
 
 
-def test_a_report_has_every_figure(hall: Environment) -> None:
+def test_a_report_contains_every_measure(hall: Environment) -> None:
     assert read_report(hall) == {
         "name": "hall",
         "area": "100 m²",
@@ -37,7 +38,7 @@ def test_an_unchanged_report_has_no_marks(hall: Environment) -> None:
     assert read_report(hall, hall) == read_report(hall)
 
 
-def test_changed_values_are_printed_with_the_previous_ones(hall: Environment) -> None:
+def test_changed_values_are_printed_with_previous_values(hall: Environment) -> None:
     wall = WallObstacle(((4.0, 0.0), (4.0, 9.9)), 0.5)
     after = read_report(replace(hall, obstacles=(wall,), starts={"all": DiscStart((1.0, 1.0), 0.5)}), hall)
     assert after["free area"] == "95.05 m² (95.1%), was 100 m² (100.0%)"

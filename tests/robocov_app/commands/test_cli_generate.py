@@ -1,4 +1,4 @@
-"""`robocov generate`: files, folders, the maps of the paper's study, and what is refused."""
+"""`robocov generate`: single maps, folders of maps, the maps of the paper's study, and invalid options."""
 
 import json
 import os
@@ -30,86 +30,96 @@ def test_every_kind_of_map_can_be_generated() -> None:
 def test_a_map_is_printed_or_saved(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     expected = generate_map(5, kind=kind)
     assert main(["generate", "--kind", kind, "--seed", "5"]) == 0
-    said = capsys.readouterr()
-    assert (said.out, said.err) == (dump_map(expected), "")
-    json.loads(said.out)
+    output = capsys.readouterr()
+    assert (output.out, output.err) == (dump_map(expected), "")
+    json.loads(output.out)
     out = tmp_path / "map.json"
     assert main(["generate", "--kind", kind, "--seed", "5", "-o", str(out)]) == 0
     assert load_map(out) == expected
     assert capsys.readouterr().out.startswith(f"{out}: ")
 
 
-def test_every_option_arrives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_option_is_passed_to_the_generator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "map.json"
-    words = "--kind rooms --seed 3 --obstacles 8 --area 0.15 --gap 0.7 --width 12 --height 9"
-    row = read_json(capsys, "generate", *words.split(), "--out", str(out))
+    arguments = "--kind rooms --seed 3 --obstacles 8 --area 0.15 --gap 0.7 --width 12 --height 9"
+    summary = read_json(capsys, "generate", *arguments.split(), "--out", str(out))
     expected = generate_map(3, kind="rooms", obstacles=8, area=0.15, gap=0.7, width=12, height=9)
     assert load_map(out) == expected
-    assert row["out"] == str(out)
-    (told,) = row["maps"]
-    assert told["file"] == str(out) and told["area_m2"] == 108.0
-    assert told["narrowest_gap_m"] >= 0.7 and told["warnings"] == []
+    assert summary["out"] == str(out)
+    (generated,) = summary["maps"]
+    assert generated["file"] == str(out)
+    assert generated["area_m2"] == 108.0
+    assert generated["narrowest_gap_m"] >= 0.7
+    assert generated["warnings"] == []
     assert main(["generate", "--side", "8", "--out", str(out), "--overwrite"]) == 0
     assert load_map(out) == generate_map(0, side=8.0)
 
 
-def test_a_folder_of_maps_and_a_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_several_maps_are_saved_in_a_folder_with_an_overview_figure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "new" / "maps"
     sheet = tmp_path / "sheet.png"
-    words = ["generate", "--kind", "mazes", "--count", "4", "--seed", "8", "--out", str(folder)]
-    assert main([*words, "--plot", str(sheet), "--theme", "dark"]) == 0
-    said = capsys.readouterr()
-    assert said.err.startswith("generating: 4 of 4 in ")
-    assert len(said.out.splitlines()) == 4
+    arguments = ["generate", "--kind", "mazes", "--count", "4", "--seed", "8", "--out", str(folder)]
+    assert main([*arguments, "--plot", str(sheet), "--theme", "dark"]) == 0
+    output = capsys.readouterr()
+    assert output.err.startswith("generating: 4 of 4 in ")
+    assert len(output.out.splitlines()) == 4
     names = ["mazes-08.json", "mazes-09.json", "mazes-10.json", "mazes-11.json"]
     assert sorted(path.name for path in folder.iterdir()) == names
     for seed, name in enumerate(names, start=8):
         assert load_map(folder / name) == generate_map(seed, kind="mazes")
     assert sheet.read_bytes().startswith(b"\x89PNG")
-    assert read_error(capsys, *words).startswith(
+    assert read_error(capsys, *arguments).startswith(
         f"{folder}: the folder is not empty; choose another --out or"
     )
 
 
 def test_overwriting_replaces_only_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["generate", "--count", "2", "--out", str(tmp_path), "--overwrite"]
+    arguments = ["generate", "--count", "2", "--out", str(tmp_path), "--overwrite"]
     other = tmp_path / "other.json"
     mine = tmp_path / "polygons-1.json"
     other.write_text("mine")
-    assert main([*words, "--gap", "0.5"]) == 0
-    assert main(words) == 0
+    assert main([*arguments, "--gap", "0.5"]) == 0
+    assert main(arguments) == 0
     assert load_map(tmp_path / "polygons-1.json") == generate_map(1)
     capsys.readouterr()
     mine.write_text("{}")
-    assert main(words) == 2
+    assert main(arguments) == 2
     assert f"{mine}: is not a map of robocov, and --overwrite does not replace it" in capsys.readouterr().err
     assert (other.read_text(), mine.read_text()) == ("mine", "{}")
 
 
 @pytest.mark.slow
-def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_maps_of_the_paper_are_generated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = read_json(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
-    every = *build_claim_maps(QUICK), *build_tuning_maps(QUICK), *build_convex_maps(QUICK)
-    maps = {each.name: each.environment for each in every}
-    drawn = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
-    with_polygons = len(QUICK.generated) + len(QUICK.tuning) + len(QUICK.convex_generated)
-    of_other_kinds = len(FAMILIES) * (len(QUICK.families) + len(QUICK.tuning_families))
-    assert len(drawn) == with_polygons + of_other_kinds
-    assert [Path(row["file"]).stem for row in rows] == list(drawn)
-    for name, environment in drawn.items():
+    study_maps = [*build_claim_maps(QUICK), *build_tuning_maps(QUICK), *build_convex_maps(QUICK)]
+    maps = {each.name: each.environment for each in study_maps}
+    generated = {name: environment for name, environment in maps.items() if name not in list_bundled_maps()}
+    polygon_maps = len(QUICK.generated) + len(QUICK.tuning) + len(QUICK.convex_generated)
+    other_maps = len(FAMILIES) * (len(QUICK.families) + len(QUICK.tuning_families))
+    assert len(generated) == polygon_maps + other_maps
+    assert [Path(row["file"]).stem for row in rows] == list(generated)
+    for name, environment in generated.items():
         assert load_map(tmp_path / f"{name}.json") == environment
-    # its words make the same map, but for the starts
-    extra = drawn["generated-2"].extra["generator"]
-    words = [f"--{name}={extra[name]}" for name in ("kind", "seed", "obstacles", "area")]
+    # The options in the file generate the same map, except for its starts.
+    parameters = generated["generated-2"].extra["generator"]
+    arguments = [f"--{name}={parameters[name]}" for name in ("kind", "seed", "obstacles", "area")]
     out = tmp_path / "again.json"
     read_json(
-        capsys, "generate", *words, f"--gap={extra['gap_m']}", f"--side={extra['width_m']}", "-o", str(out)
+        capsys,
+        "generate",
+        *arguments,
+        f"--gap={parameters['gap_m']}",
+        f"--side={parameters['width_m']}",
+        "-o",
+        str(out),
     )
-    assert load_map(out).obstacles == drawn["generated-2"].obstacles
+    assert load_map(out).obstacles == generated["generated-2"].obstacles
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (
             "--kind mases",
@@ -145,25 +155,25 @@ def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("--out none/map.json", "none/map.json: cannot be written: No such file or directory"),
     ],
 )
-def test_impossible_maps_are_reported_with_the_option(
-    words: str,
+def test_invalid_options_are_reported_by_name(
+    arguments: str,
     message: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert read_error(capsys, "generate", *words.split()).startswith(message)
+    assert read_error(capsys, "generate", *arguments.split()).startswith(message)
     assert not list(tmp_path.iterdir())
 
 
-def test_the_seed_that_leads_nowhere_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--count", "2", "--seed", "4", "--area", "0.8", "--out", str(tmp_path / "maps")]
-    assert main(["generate", *words]) == 2
+def test_the_seed_without_a_layout_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--count", "2", "--seed", "4", "--area", "0.8", "--out", str(tmp_path / "maps")]
+    assert main(["generate", *arguments]) == 2
     assert capsys.readouterr().err.splitlines()[-1].endswith("or another number of obstacles (seed 4)")
 
 
-def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_existing_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "map.json"
     file.write_text("mine")
     assert "already exists; choose another --out or pass --overwrite" in read_error(
@@ -177,18 +187,20 @@ def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
-def test_ctrl_c_keeps_the_maps_that_are_done(tmp_path: Path) -> None:
-    words = ["generate", "--kind", "caves", "--count", "5000", "--out", str(tmp_path / "maps")]
-    process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def test_ctrl_c_keeps_finished_maps(tmp_path: Path) -> None:
+    arguments = ["generate", "--kind", "caves", "--count", "5000", "--out", str(tmp_path / "maps")]
+    process = subprocess.Popen(
+        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     deadline = time.monotonic() + 60
     while len(list(tmp_path.glob("maps/caves-*.json"))) < 2 and time.monotonic() < deadline:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, complaints = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert complaints.splitlines()[-1] == "robocov: stopped"
-    kept = sorted(tmp_path.glob("maps/*"))
-    assert len(kept) >= 2
-    for file in kept:
+    assert errors.splitlines()[-1] == "robocov: stopped"
+    files = sorted(tmp_path.glob("maps/*"))
+    assert len(files) >= 2
+    for file in files:
         assert load_map(file).name.startswith("caves ")
     assert not list(tmp_path.glob("maps/.*"))

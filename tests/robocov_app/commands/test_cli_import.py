@@ -1,4 +1,4 @@
-"""`robocov import` on grids and pictures: what it writes, says and refuses."""
+"""`robocov import` of grids and images: results, messages and invalid options."""
 
 import json
 from pathlib import Path
@@ -15,44 +15,44 @@ from robocov_app.formats import IMPORTERS
 GRID = "type octile\nheight 4\nwidth 5\nmap\n@@@@@\n@..T@\n@...@\n@@@@@\n"
 
 
-def run_command(capsys: pytest.CaptureFixture[str], *words: str) -> list[str]:
-    assert main(list(words)) == 0
+def run_command(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[str]:
+    assert main(list(arguments)) == 0
     out = capsys.readouterr()
     assert out.err == ""
     return out.out.splitlines()
 
 
-def test_a_ros_map_becomes_a_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_ros_map_is_imported_with_a_preview(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     out = tmp_path / "out.json"
-    picture = tmp_path / "seen.png"
-    lines = run_command(capsys, "import", str(path), "-o", str(out), "--preview", str(picture))
+    preview = tmp_path / "preview.png"
+    lines = run_command(capsys, "import", str(path), "-o", str(out), "--preview", str(preview))
     assert lines == [
         "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",
         "3 x 1.5 m, 0 obstacles",
         "note: 16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, treated as obstacles",
         "note: cells are larger than robots: walls move by at most 0.2 m instead of one cell "
         "(--simplify 0.25)",
-        f"saved in {out} and {picture}",
+        f"saved in {out} and {preview}",
     ]
     assert load_map(out).free_area == pytest.approx(4.25)
     assert load_map(out).name == "plan"
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert preview.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_answer_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_import_is_reported_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     row = read_json(
         capsys, "import", str(path), "-o", str(tmp_path / "a.json"), "--unknown", "cut", "--simplify", "0"
     )
     assert (row["out"], row["source"], row["format"]) == (str(tmp_path / "a.json"), str(path), "ros")
-    assert row["size_m"] == [3.0, 1.5]  # the inner edge of the walls around the free space
+    assert row["size_m"] == [3.0, 1.5]  # up to the inner edge of the walls
     assert row["area_kept_m2"] == pytest.approx(4.25)
     assert row["tolerance_m"] == 0.0
     assert any(note.endswith("30 % unknown, cut away") for note in row["notes"])
 
 
-def test_the_name_of_the_map_is_that_of_the_file(
+def test_the_default_output_is_named_after_the_source(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "maps").mkdir()
@@ -63,26 +63,26 @@ def test_the_name_of_the_map_is_that_of_the_file(
     assert "grid.json: already exists; choose another -o or pass --overwrite" in read_error(
         capsys, "import", "maps/grid.map"
     )
-    words = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")
-    assert main(list(words)) == 0
+    arguments = ("import", "maps/grid.map", "--trees", "free", "--overwrite", "--json")
+    assert main(list(arguments)) == 0
     assert json.loads(capsys.readouterr().out)["area_kept_m2"] == 6
 
 
-def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_source_file_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "plan.map"
     path.write_text(GRID)
     message = read_error(capsys, "import", str(path), "--overwrite", "-o", str(path))
     assert f"{path}: is the file being read; choose another -o" in message
-    picture = tmp_path / "plan.png"
-    picture.write_bytes(b"")
-    words = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(picture))
-    assert "choose another --preview" in read_error(capsys, "import", str(picture), *words)
+    image = tmp_path / "plan.png"
+    image.write_bytes(b"")
+    arguments = ("-o", str(tmp_path / "a.json"), "--overwrite", "--preview", str(image))
+    assert "choose another --preview" in read_error(capsys, "import", str(image), *arguments)
     assert path.read_text() == GRID
-    assert set(tmp_path.iterdir()) == {path, picture}
+    assert set(tmp_path.iterdir()) == {path, image}
 
 
 @pytest.mark.parametrize(
-    ("file", "words", "expected"),
+    ("file", "arguments", "expected"),
     [
         ("plan.yaml", "--water free", "--water: no option of the format ros, whose options are: --anywhere"),
         ("plan.yaml", "--cell 1", "--cell: no option of the format ros"),
@@ -105,16 +105,16 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
     ],
 )  # fmt: skip
 def test_invalid_options_are_rejected(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, words: str, expected: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, arguments: str, expected: str
 ) -> None:
     write_ros_map(tmp_path, draw_pixels(PLAN))
     (tmp_path / "grid.map").write_text(GRID)
     out = tmp_path / "out.json"
-    assert expected in read_error(capsys, "import", str(tmp_path / file), "-o", str(out), *words.split())
+    assert expected in read_error(capsys, "import", str(tmp_path / file), "-o", str(out), *arguments.split())
     assert not out.exists()
 
 
-def test_help_names_every_format(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_lists_every_format(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["import", "-h"]) == 0
     text = capsys.readouterr().out
     for name in IMPORTERS:
@@ -122,8 +122,8 @@ def test_help_names_every_format(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
-def test_a_large_map_is_soon_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # 1200 x 1200 cells of halls with pillars: a map of this size must not be a matter of minutes
+def test_a_large_map_is_simplified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # 1200 x 1200 cells: halls with pillars and doors. The time limit of tests bounds the duration.
     pixels = np.full((1200, 1200), 254, dtype=np.uint8)
     y, x = np.mgrid[0:1200, 0:1200]
     pixels[(x % 60 - 30) ** 2 + (y % 60 - 30) ** 2 < 49] = 0

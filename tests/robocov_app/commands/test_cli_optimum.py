@@ -10,22 +10,17 @@ from called import COMMAND, SHORT, read_error, read_json
 from PIL import Image
 
 from robocov.environment import DiscStart, Environment, WallObstacle
-from robocov.mapfile import save_map
+from robocov.mapfile import load_map, save_map
 from robocov.optimum import find_optimum
 from robocov_app.cli import main
 
 FAST = ("--lattice", "24", "--restarts", "3")
 
 
-def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_result_equals_that_of_the_library(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "best.json"
-    row = read_json(
-        capsys, "optimum", "trap", *FAST, "--robots", "3", "--seed", "2", "--positions", str(file)
-    )
-    from robocov.mapfile import load_map
-
+    options = ("--robots", "3", "--seed", "2", "--positions", str(file))
+    row = read_json(capsys, "optimum", "trap", *FAST, *options)
     best = find_optimum(load_map("trap"), 3, lattice=24, restarts=3, seed=2)
     assert row["mean_distance_m"] == best.mean_distance
     assert row["positions_m"] == best.positions.tolist() == json.loads(file.read_bytes())
@@ -42,29 +37,30 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     cost = read_json(capsys, "cost", "trap", "--positions", str(file), "--lattice", "24")
     assert cost["mean_distance_m"] == pytest.approx(best.mean_distance, rel=1e-12)
     assert cost["cost_m3"] == pytest.approx(row["cost_m3"], rel=1e-12)
-    # one robot a line
-    assert len(file.read_text().splitlines()) == 3
+    assert len(file.read_text().splitlines()) == 3, "one line per robot"
 
 
-def test_the_import_is_reported_as_text(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_result_is_printed_as_text(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["optimum", "square", "--lattice", "16", "--restarts", "5", "--robots", "1"]) == 0
-    said = capsys.readouterr().out
-    assert "mean distance   3.82" in said
-    assert "1 robot, 5 restarts in" in said
-    assert "within 0.5% of the best     5" in said
-    assert "[5.000, 5.000]" in said
+    output = capsys.readouterr().out
+    assert "mean distance   3.82" in output
+    assert "1 robot, 5 restarts in" in output
+    assert "within 0.5% of the best     5" in output
+    assert "[5.000, 5.000]" in output
 
 
 def test_a_lower_bound_is_proved_on_request(capsys: pytest.CaptureFixture[str]) -> None:
-    how = ("optimum", "square", "--lattice", "12", "--restarts", "2", "--robots", "1", "--bound")
-    bound = (row := read_json(capsys, *how))["lower_bound"]
+    arguments = ("optimum", "square", "--lattice", "12", "--restarts", "2", "--robots", "1", "--bound")
+    row = read_json(capsys, *arguments)
+    bound = row["lower_bound"]
     assert bound["mean_distance_m"] < row["mean_distance_m"]
     assert bound["cost_m3"] == pytest.approx(100.0 * bound["mean_distance_m"])
     assert bound["gap"] == pytest.approx(1.0 - bound["mean_distance_m"] / row["mean_distance_m"])
     assert bound["gap"] < 0.001
-    assert main([*how, "--precision", "0.5"]) == 0
-    assert "lower bound     3." in (said := capsys.readouterr().out)
-    assert "m, no placement is more than 0." in said
+    assert main([*arguments, "--precision", "0.5"]) == 0
+    output = capsys.readouterr().out
+    assert "lower bound     3." in output
+    assert "m, no placement is more than 0." in output
 
 
 @pytest.mark.usefixtures("no_figures")
@@ -97,7 +93,7 @@ def test_a_comparison_has_a_gap_for_each_controller(
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_covers_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     halves = Environment(
         "halves",
         ((0, 0), (8, 0), (8, 4), (0, 4)),
@@ -116,21 +112,21 @@ def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.slow
-def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_are_reproducible_in_both_themes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     light = tmp_path / "light.png"
     dark = tmp_path / "dark.png"
     assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
     assert main(["optimum", "trap", *FAST, "--plot", str(dark), "--theme", "dark"]) == 0
-    again = light.read_bytes()
+    content = light.read_bytes()
     assert main(["optimum", "trap", *FAST, "--plot", str(light)]) == 0
-    assert light.read_bytes() == again
+    assert light.read_bytes() == content
     capsys.readouterr()
     assert np.array(Image.open(light))[0, 0, :3].min() == 255
     assert np.array(Image.open(dark))[0, 0, :3].max() < 50
 
 
 @pytest.mark.parametrize(
-    ("words", "part"),
+    ("arguments", "part"),
     [
         ((), "expected either MAP or --run DIR"),
         (("rooms", "--run", "x"), "expected either MAP or --run DIR"),
@@ -153,31 +149,35 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("rooms", "--positions", "."), ".: expected a file, got a folder"),
     ],
 )
-def test_mistakes_are_named(words: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert part in read_error(capsys, "optimum", *words)
+def test_invalid_options_are_reported(
+    arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert part in read_error(capsys, "optimum", *arguments)
 
 
-def test_positions_are_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_positions_are_overwritten_only_on_request(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "mine.json"
     file.write_text("[[1, 1]]")
-    words = ("optimum", "trap", *FAST, "--positions", str(file))
-    assert "already exists" in read_error(capsys, *words)
+    arguments = ("optimum", "trap", *FAST, "--positions", str(file))
+    assert "already exists" in read_error(capsys, *arguments)
     assert file.read_text() == "[[1, 1]]"
-    assert main([*words, "--overwrite"]) == 0
+    assert main([*arguments, "--overwrite"]) == 0
     assert len(json.loads(file.read_bytes())) == 6
 
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_no_files(tmp_path: Path) -> None:
     file = tmp_path / "best.json"
-    words = ("optimum", "museum", "--restarts", "100000", "--robots", "20", "--positions", str(file))
-    process = subprocess.Popen([*COMMAND, *words], stderr=subprocess.PIPE, text=True)
+    arguments = ("optimum", "museum", "--restarts", "100000", "--robots", "20", "--positions", str(file))
+    process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     time.sleep(4.0)
     process.send_signal(signal.SIGINT)
     try:
-        _, said = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 130
-    assert "Traceback" not in said
+    assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []

@@ -22,7 +22,7 @@ SMALL = ("--size", "480x320", "--fps", "10", "--video-speed", "1")
 
 @pytest.fixture(autouse=True)
 def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No window stays open that should not have opened."""
+    """Close windows at once that open by mistake."""
     monkeypatch.setattr(ViewerWindow, "run", ViewerWindow.close)
 
 
@@ -33,7 +33,7 @@ def write_history(folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def saved_results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a run and a comparison, in which a robot failed."""
+    """Return a folder with a run, and with a comparison in which a robot failed."""
     folder = tmp_path_factory.mktemp("saved")
     (record,) = build_records(advance_session(start_session(), 60))
     (folder / "run").mkdir()
@@ -61,20 +61,20 @@ def both(saved_results: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(saved_results / "both", tmp_path / "both"))
 
 
-def read_pictures(folder: Path) -> list[np.ndarray]:
+def read_frames(folder: Path) -> list[np.ndarray]:
     return [np.asarray(Image.open(path)) for path in sorted((folder / "frames").iterdir())]
 
 
-# frames and films
+# Frames and videos
 
 
-def test_frames_of_a_run_are_those_of_run(saved_results: Path, tmp_path: Path, capsys) -> None:
-    out = tmp_path / "film"
+def test_frames_and_a_video_of_a_run_are_saved(saved_results: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "video"
     assert main(["replay", str(saved_results / "run"), "--frames", "--video", *SMALL, "--out", str(out)]) == 0
     printed = capsys.readouterr()
     assert printed.out == f"saved in {out}/: frames, replay.json, run.mp4\n"
     assert "video: 21 of 21" in printed.err
-    frames = read_pictures(out)
+    frames = read_frames(out)
     assert len(frames) == 11 + 10
     assert frames[0].shape == (320, 480, 3)
     assert (frames[0] != frames[10]).any()
@@ -85,54 +85,54 @@ def test_frames_of_a_run_are_those_of_run(saved_results: Path, tmp_path: Path, c
 def test_a_comparison_is_shown_side_by_side_with_distances(
     saved_results: Path, tmp_path: Path, capsys
 ) -> None:
-    """On one map, although a robot failed at another place in each run."""
-    out = tmp_path / "film"
-    words = ("--frames", *SMALL, "--show", "distances", "--fps", "5", "--theme", "dark")
-    printed = read_json(capsys, "replay", str(saved_results / "both"), *words, "--out", str(out))
+    """Both runs share one map, although a robot failed at different positions."""
+    out = tmp_path / "video"
+    arguments = ("--frames", *SMALL, "--show", "distances", "--fps", "5", "--theme", "dark")
+    printed = read_json(capsys, "replay", str(saved_results / "both"), *arguments, "--out", str(out))
     assert printed == {"out": str(out), "interrupted": False}
-    frames = read_pictures(out)
+    frames = read_frames(out)
     assert len(frames) == 6 + 5
     left, right = np.array_split(frames[5].astype(int), 2, axis=1)
     assert (left != right).mean() > 0.05
 
 
-def test_the_json_file_does_as_well_as_its_folder(saved_results: Path, tmp_path: Path, capsys) -> None:
+def test_a_run_can_be_given_by_its_json_file(saved_results: Path, tmp_path: Path, capsys) -> None:
     for name, source in (("one", "run/run.json"), ("two", "both/comparison.json")):
-        words = ("--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / name))
-        read_json(capsys, "replay", str(saved_results / source), *words)
-        assert len(read_pictures(tmp_path / name)) == 3
+        arguments = ("--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / name))
+        read_json(capsys, "replay", str(saved_results / source), *arguments)
+        assert len(read_frames(tmp_path / name)) == 3
 
 
 def test_an_earlier_video_is_replaced_only_with_overwrite(
     saved_results: Path, tmp_path: Path, capsys
 ) -> None:
-    out = tmp_path / "film"
-    words = ("replay", str(saved_results / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
-    read_json(capsys, *words)
+    out = tmp_path / "video"
+    arguments = ("replay", str(saved_results / "run"), "--frames", *SMALL, "--fps", "2", "--out", str(out))
+    read_json(capsys, *arguments)
     (out / "notes.txt").write_text("mine")
-    assert "is not empty" in read_error(capsys, *words)
-    read_json(capsys, *words, "--overwrite", "--video-speed", "4")
-    assert len(read_pictures(out)) == 2 + 2
+    assert "is not empty" in read_error(capsys, *arguments)
+    read_json(capsys, *arguments, "--overwrite", "--video-speed", "4")
+    assert len(read_frames(out)) == 2 + 2
     assert (out / "notes.txt").read_text() == "mine"
 
 
-def test_a_run_is_not_replaced_by_its_own_film(run: Path, both: Path, capsys) -> None:
+def test_frames_are_never_saved_in_the_folder_of_the_run(run: Path, both: Path, capsys) -> None:
     for source, out in ((run, run), (run, run.parent), (both, both / "lloyd"), (both / "lloyd", both)):
-        words = ("--frames", *SMALL, "--overwrite", "--out", str(out))
-        assert read_error(capsys, "replay", str(source), *words).endswith(
+        arguments = ("--frames", *SMALL, "--overwrite", "--out", str(out))
+        assert read_error(capsys, "replay", str(source), *arguments).endswith(
             "expected a folder other than that of the run"
         )
     assert (run / "record.npz").exists()
     assert (both / "lloyd" / "record.npz").exists()
 
 
-def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsys) -> None:
-    (short,) = build_records(advance_session(start_session(RPF), 30))
-    (whole,) = build_records(advance_session(start_session(LLOYD), 60))
-    short.save(both / "rpf")
-    whole.save(both / "lloyd")
-    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "film"))
-    assert len(read_pictures(tmp_path / "film")) == 3 + 2
+def test_runs_of_different_lengths_can_be_rendered_but_not_opened(both: Path, tmp_path: Path, capsys) -> None:
+    (short_record,) = build_records(advance_session(start_session(RPF), 30))
+    (whole_record,) = build_records(advance_session(start_session(LLOYD), 60))
+    short_record.save(both / "rpf")
+    whole_record.save(both / "lloyd")
+    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "video"))
+    assert len(read_frames(tmp_path / "video")) == 3 + 2
     assert read_error(capsys, "replay", str(both)) == (
         f"{both}/lloyd: moments: expected 31 as in {both}/rpf, got 61; --frames and --video show both"
     )
@@ -140,16 +140,16 @@ def test_runs_of_different_lengths_make_a_film(both: Path, tmp_path: Path, capsy
 
 def test_the_finished_runs_of_a_killed_comparison_can_be_replayed(both: Path, tmp_path: Path, capsys) -> None:
     shutil.rmtree(both / "lloyd")
-    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "film"))
-    assert len(read_pictures(tmp_path / "film")) == 3
+    read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "1", "--out", str(tmp_path / "video"))
+    assert len(read_frames(tmp_path / "video")) == 3
 
 
-# the window
+# Windows
 
 
 @pytest.fixture
 def opened_sessions(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
-    """Windows on a display that nobody sees, closed after some frames; the sessions in them."""
+    """Collect the sessions of windows, which close after ten frames on a dummy display."""
     sessions: list[Session] = []
 
     def run(window: ViewerWindow) -> None:
@@ -179,7 +179,7 @@ def test_the_window_shows_a_comparison(both: Path, opened_sessions: list[Session
     assert len(session.timeline.panes[1].distance_curve) == 11
 
 
-@pytest.mark.skipif("sys.platform != 'linux'", reason="elsewhere there is always one")
+@pytest.mark.skipif("sys.platform != 'linux'", reason="other systems always have a display")
 def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, capsys) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
@@ -189,28 +189,28 @@ def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, ca
     )
 
 
-# what is wrong
+# Invalid options and damaged results
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         ("--frames", "--out: expected a folder for the frames and the video"),
-        ("--out film", "--out: requires --frames or --video"),
+        ("--out video", "--out: requires --frames or --video"),
         ("--json", "--json: requires --frames or --video"),
         (
-            "--frames --out film --controller a.py:A",
+            "--frames --out video --controller a.py:A",
             "--controller: cannot be combined with --frames or --video",
         ),
         ("--controller gone.py:Mine", "controller 'gone.py:Mine': file not found: gone.py"),
         ("--controller lloyd", "--controller: expected the controller of a run (rapf), got lloyd"),
         ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
-        ("--frames --out film --fps 0", "--fps: expected a number from 1 to 240, got 0"),
-        ("--frames --out film --show cell", "--show: unknown layer 'cell'"),
+        ("--frames --out video --fps 0", "--fps: expected a number from 1 to 240, got 0"),
+        ("--frames --out video --show cell", "--show: unknown layer 'cell'"),
     ],
 )
-def test_inapplicable_options_are_rejected(run: Path, capsys, words: str, message: str) -> None:
-    assert read_error(capsys, "replay", str(run), *words.split()).startswith(message)
+def test_inapplicable_options_are_rejected(run: Path, capsys, arguments: str, message: str) -> None:
+    assert read_error(capsys, "replay", str(run), *arguments.split()).startswith(message)
 
 
 def edit_json(path: Path, **changes) -> None:
@@ -218,13 +218,13 @@ def edit_json(path: Path, **changes) -> None:
 
 
 def edit_arrays(folder: Path, **changes) -> None:
-    with np.load(folder / "record.npz") as found:
-        content = {**found, **changes}
+    with np.load(folder / "record.npz") as arrays:
+        content = {**arrays, **changes}
     np.savez(folder / "record.npz", **content)
 
 
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("damage", "message"),
     [
         (shutil.rmtree, "{run}: not the folder of a run or a comparison (there is no run.json and no comp"),
         (lambda run: (run / "run.json").write_text("{"), "{run}/run.json:1:2: end of file: not JSON: "),
@@ -278,13 +278,13 @@ def edit_arrays(folder: Path, **changes) -> None:
         ),
     ],
 )
-def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message: str) -> None:
-    spoil(run)
+def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, damage, message: str) -> None:
+    damage(run)
     assert read_error(capsys, "replay", str(run)).startswith(message.format(run=run))
 
 
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("damage", "message"),
     [
         (
             lambda both: (both / "comparison.json").write_text("["),
@@ -322,6 +322,6 @@ def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, spoil, message
         ),
     ],
 )
-def test_a_damaged_comparison_is_rejected_in_one_line(both: Path, capsys, spoil, message: str) -> None:
-    spoil(both)
+def test_a_damaged_comparison_is_rejected_in_one_line(both: Path, capsys, damage, message: str) -> None:
+    damage(both)
     assert read_error(capsys, "replay", str(both)).startswith(message.format(both=both))

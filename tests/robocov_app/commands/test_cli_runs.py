@@ -14,20 +14,20 @@ from robocov_app.commands import options
 FILES = "run.json record.npz cost.csv trajectories.png trajectories.svg cost.png cost.svg".split()
 
 
-def test_run_saves_everything_and_prints_the_folder(
+def test_run_saves_all_files_and_prints_the_folder(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    words = "--frames --video --fps 10 --video-speed 1 --out".split()
-    assert main(["run", "rooms", *SHORT, *words, str(out)]) == 0
-    said = capsys.readouterr()
-    assert str(out) in said.out
-    assert "mean distance" in said.out
+    arguments = "--frames --video --fps 10 --video-speed 1 --out".split()
+    assert main(["run", "rooms", *SHORT, *arguments, str(out)]) == 0
+    output = capsys.readouterr()
+    assert str(out) in output.out
+    assert "mean distance" in output.out
     names = sorted(path.name for path in out.glob("[!.]*"))
     assert names == sorted([*FILES, "frames", "run.mp4"])
     frames = sorted(path.name for path in (out / "frames").iterdir())
     assert frames == [f"{k:06d}.png" for k in range(len(frames))]
-    assert len(frames) == 11 + 10, "one second at ten frames, and one second on the last"
+    assert len(frames) == 11 + 10, "ten frames of the run and one second of the last frame"
     header, *rows = (out / "cost.csv").read_text().splitlines()
     assert header == "time_s,mean_distance_m,cost_m3,uncovered_area_m2"
     assert len(rows) == 11
@@ -39,11 +39,13 @@ def test_run_saves_everything_and_prints_the_folder(
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    row = read_json(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
-    assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(row)
-    assert row["settled_at_s"] is None
-    assert row["interrupted"] is False
+def test_run_prints_only_json_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    summary = read_json(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
+    assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(
+        summary
+    )
+    assert summary["settled_at_s"] is None
+    assert summary["interrupted"] is False
 
 
 @pytest.mark.slow
@@ -77,39 +79,41 @@ def test_overwrite_removes_only_the_earlier_result(
 ) -> None:
     out = tmp_path / "run"
     read_json(capsys, "run", "square", *SHORT, "--frames", "--out", str(out))
-    mine = [out / name for name in ("notes.txt", ".x.part.zip", "frames/2024-holiday.png")]
-    for path in mine:
+    own_files = [out / name for name in ("notes.txt", ".x.part.zip", "frames/2024-holiday.png")]
+    for path in own_files:
         path.write_text("mine")
     read_json(capsys, "metrics", str(out))
     assert "not empty" in read_error(capsys, "run", "square", *SHORT, "--out", str(out))
     read_json(capsys, "run", "square", *SHORT, "--out", str(out), "--overwrite")
-    assert [path.read_text() for path in mine] == ["mine"] * 3
-    assert list((out / "frames").iterdir()) == [mine[2]]
-    assert not (out / "metrics.csv").exists(), "it was that of the run which is gone"
+    assert [path.read_text() for path in own_files] == ["mine"] * 3
+    assert list((out / "frames").iterdir()) == [own_files[2]]
+    assert not (out / "metrics.csv").exists(), "the metrics belonged to the overwritten run"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links of POSIX")
 @pytest.mark.usefixtures("no_figures")
-def test_an_obstructed_result_keeps_the_earlier_one(
+def test_the_earlier_result_stays_if_the_new_one_cannot_be_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
     elsewhere = tmp_path / "elsewhere"
-    words = ("run", "square", *SHORT, "--video", "--frames", "--out", str(out), "--overwrite")
+    arguments = ("run", "square", *SHORT, "--video", "--frames", "--out", str(out), "--overwrite")
     read_json(capsys, "run", "square", *SHORT, "--out", str(out))
     elsewhere.mkdir()
     before = (out / "run.json").read_bytes()
     (out / "run.mp4").mkdir()
-    assert "run.mp4: is in the way" in read_error(capsys, *words)
+    assert "run.mp4: is in the way" in read_error(capsys, *arguments)
     (out / "run.mp4").rmdir()
     (out / "frames").symlink_to(elsewhere)
-    assert "frames: is a link, which is not followed" in read_error(capsys, *words)
+    assert "frames: is a link, which is not followed" in read_error(capsys, *arguments)
     assert (out / "run.json").read_bytes() == before
     assert list(elsewhere.iterdir()) == []
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_comparison_never_refers_to_folders_outside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     read_json(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     inner = tmp_path / "run" / "inner"
     inner.mkdir()
@@ -194,7 +198,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ),
     ],
 )
-def test_a_class_that_fails_is_named_with_its_line(
+def test_an_invalid_controller_class_is_reported_with_its_line(
     body: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mine = tmp_path / "mine.py"
@@ -202,8 +206,8 @@ def test_a_class_that_fails_is_named_with_its_line(
     base = "class Base:\n def begin(self, region, team): pass\n def decide(self, seen, memory): pass\n"
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")
-    words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *words, status=1 if "ended Python" in part else 2)
+    arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
+    assert part in read_error(capsys, *arguments, status=1 if "ended Python" in part else 2)
     assert not out.exists()
 
 
@@ -212,14 +216,13 @@ def test_a_traceback_is_shown_on_request(
 ) -> None:
     monkeypatch.setenv("ROBOCOV_TRACEBACK", "1")
     assert main(["run", "square", "--set", "k_rap=1"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("Traceback") and said.splitlines()[-1].startswith(
-        "robocov: error: rapf: unknown gain"
-    )
+    output = capsys.readouterr().err
+    assert output.startswith("Traceback")
+    assert output.splitlines()[-1].startswith("robocov: error: rapf: unknown gain")
 
 
 @pytest.mark.parametrize(
-    ("value", "message"),
+    ("value", "expected"),
     [
         ("9" * 5000, "--set k_rep: expected a number (or null), or a word, got '99999"),
         ("9" * 4000, "rapf.k_rep: expected a number from"),
@@ -233,13 +236,16 @@ def test_a_traceback_is_shown_on_request(
     ],
     ids=range(9),
 )
-def test_an_unknown_gain_is_rejected(value: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    said = read_error(capsys, "run", "square", "--set", f"k_rep={value}")
-    assert said.startswith(message) and len(said) < 200
+def test_an_invalid_value_of_a_gain_is_rejected_in_a_short_line(
+    value: str, expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    message = read_error(capsys, "run", "square", "--set", f"k_rep={value}")
+    assert message.startswith(expected)
+    assert len(message) < 200
 
 
 @pytest.mark.parametrize(
-    ("law", "part"),
+    ("body", "part"),
     [
         (
             "return 1 / 0",
@@ -262,8 +268,8 @@ def test_an_unknown_gain_is_rejected(value: str, message: str, capsys: pytest.Ca
         ("return [1j, 0]", "controller 'Mine': force(own) returned [1j, 0] for robot 1"),
     ],
 )
-def test_a_controller_that_fails_is_named_with_its_line(
-    law: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_failing_controller_is_reported_with_its_line(
+    body: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
@@ -271,30 +277,30 @@ def test_a_controller_that_fails_is_named_with_its_line(
         "@dataclass(frozen=True)\n"
         "class Mine:\n"
         "    def force(self, own):\n"
-        f"        {law}\n"
+        f"        {body}\n"
     )
     out = tmp_path / "run"
-    words = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *words, status=1 if "ended Python" in part else 2)
-    assert not out.exists(), "a folder with nothing in it is not left behind"
+    arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
+    assert part in read_error(capsys, *arguments, status=1 if "ended Python" in part else 2)
+    assert not out.exists(), "no empty folder is left behind"
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-def test_records_of_large_teams_are_thinned(
+def test_records_contain_fewer_steps_at_a_lower_rate_or_of_large_teams(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["run", "rooms", "--robots", "3", "--duration", "0.5", "--lattice", "16"]
-    assert main([*words, "--out", str(tmp_path / "all")]) == 0
+    arguments = ["run", "rooms", "--robots", "3", "--duration", "0.5", "--lattice", "16"]
+    assert main([*arguments, "--out", str(tmp_path / "every-step")]) == 0
     assert "the record" not in capsys.readouterr().out
-    assert main([*words, "--record-hz", "20", "--out", str(tmp_path / "some")]) == 0
+    assert main([*arguments, "--record-hz", "20", "--out", str(tmp_path / "at-20-hz")]) == 0
     assert "the record has one step in 3" in capsys.readouterr().out
     monkeypatch.setattr(options, "MAX_DEFAULT_RECORD_ROWS", 30.0)
-    assert main([*words, "--out", str(tmp_path / "few")]) == 0
-    whole = Record.load(tmp_path / "all")
-    some = Record.load(tmp_path / "some")
-    few = Record.load(tmp_path / "few")
-    assert [len(each.time) for each in (whole, some, few)] == [31, 11, 11]
-    for thin in (some, few):
+    assert main([*arguments, "--out", str(tmp_path / "large-team")]) == 0
+    whole = Record.load(tmp_path / "every-step")
+    at_lower_rate = Record.load(tmp_path / "at-20-hz")
+    of_large_team = Record.load(tmp_path / "large-team")
+    assert [len(each.time) for each in (whole, at_lower_rate, of_large_team)] == [31, 11, 11]
+    for thin in (at_lower_rate, of_large_team):
         np.testing.assert_array_equal(thin.positions, whole.positions[::3])
         np.testing.assert_array_equal(thin.time, whole.time[::3])

@@ -19,10 +19,10 @@ from robocov_app.cli import main
 @pytest.mark.parametrize("earlier", [False, True])
 @pytest.mark.parametrize(("limit", "file"), [(2_000, "record.npz"), (45_000, "trajectories.png")])
 @pytest.mark.slow
-def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
+def test_a_full_disk_leaves_no_partial_files_and_keeps_the_earlier_result(
     tmp_path: Path, limit: int, file: str, *, earlier: bool
 ) -> None:
-    """The size of files is limited, which fails as a full disk does: in the middle of a write."""
+    """A limit on the size of files fails as a full disk does, in the middle of a write."""
     before = {"run.json": '{"format": "robocov-run"}', "trajectories.png": "old", "record.npz": "old"}
     if earlier:
         (tmp_path / "run").mkdir()
@@ -35,26 +35,28 @@ def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
         "import robocov, robocov_app.runs.execution, robocov_app.figures.runs, matplotlib.figure\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
         f"out = {str(tmp_path / 'run')!r}\n"
-        "words = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--overwrite', '--out', out]\n"
-        "sys.exit(main(words))\n"
+        "arguments = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--overwrite', '--out', out]\n"
+        "sys.exit(main(arguments))\n"
     )
-    # -B: Python would keep halves of modules, too
-    done = subprocess.run([sys.executable, "-B", "-c", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    errors = [line for line in done.stderr.splitlines() if line.startswith("robocov: error: ")]
+    # Without -B, Python would leave truncated bytecode of modules.
+    process = subprocess.run(
+        [sys.executable, "-B", "-c", script], capture_output=True, text=True, check=False
+    )
+    assert process.returncode == 2, process.stderr
+    errors = [line for line in process.stderr.splitlines() if line.startswith("robocov: error: ")]
     assert len(errors) == 1
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in process.stderr
     assert f"{file}: cannot be written" in errors[0]
-    left = {path.name: path for path in (tmp_path / "run").glob("*")}
+    files = {path.name: path for path in (tmp_path / "run").glob("*")}
     if earlier:
-        assert {name: path.read_text() for name, path in left.items()} == before
-    assert earlier or file not in left
-    assert not [name for name in left if "part" in name or "new" in name]
+        assert {name: path.read_text() for name, path in files.items()} == before
+    assert earlier or file not in files
+    assert not [name for name in files if "part" in name or "new" in name]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="special files of POSIX")
 @pytest.mark.parametrize(
-    "words",
+    "arguments",
     [
         *("generate --overwrite --out", "generate --plot", "export square --overwrite --format wkt --out"),
         *("import square.wkt --overwrite --out", "import square.wkt --out o.json --overwrite --preview"),
@@ -65,30 +67,34 @@ def test_a_full_disk_leaves_no_half_written_file_and_the_earlier_result(
 )
 @pytest.mark.parametrize("name", ["pipe", "link", pytest.param("x" * 252, id="too long")])
 def test_an_unwritable_file_is_reported_and_unchanged(
-    words: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arguments: str,
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A named pipe, also by a link, and a name that is too long; a suffix makes it fit its command."""
+    """The file is a named pipe, a link to one, or has too long a name."""
     monkeypatch.chdir(tmp_path)
     Path("p.json").write_text("[[1, 1], [2, 2]]")
     suffix = {"--plot": ".png", "--preview": ".png", "--screenshot": ".png", "--video": ".mp4"}
-    target = Path(name + suffix.get(words.split()[-1], ".json"))
+    target = Path(name + suffix.get(arguments.split()[-1], ".json"))
     if name in ("pipe", "link"):
         os.mkfifo(target if name == "pipe" else "a pipe")
     if name == "link":
         target.symlink_to("a pipe")
-    if "run" in words.split():
+    if "run" in arguments.split():
         (record,) = build_records(advance_session(start_session(), 5))
         record.save(Path("run"))
-    elif "import" in words:
+    elif "import" in arguments:
         Path("square.wkt").write_text("POLYGON ((0 0, 9 0, 9 9, 0 9, 0 0))")
     before = sorted(path.lstat().st_mode for path in tmp_path.iterdir())
-    said = read_error(capsys, *words.split(), str(target))
-    assert ("expected a file, got a named pipe" in said) or "File name too long" in said
+    message = read_error(capsys, *arguments.split(), str(target))
+    assert ("expected a file, got a named pipe" in message) or "File name too long" in message
     assert sorted(path.lstat().st_mode for path in tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize(
-    "words",
+    "arguments",
     [
         *(
             "run square --out",
@@ -102,18 +108,18 @@ def test_an_unwritable_file_is_reported_and_unchanged(
         *("generate --count 2 --out", "import", "demo square --frames 1 --out", "run"),
     ],
 )
-def test_a_name_that_is_too_long_is_one_line(words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "n" * 40 in read_error(capsys, *words.split(), "n" * 256)
+def test_too_long_names_are_reported_in_one_line(arguments: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "n" * 40 in read_error(capsys, *arguments.split(), "n" * 256)
 
 
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may look anywhere")
-@pytest.mark.parametrize("words", ["run square --overwrite --out", "replay", "report", "generate --out"])
-def test_a_folder_without_permission_is_one_line(
-    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may read every folder")
+@pytest.mark.parametrize("arguments", ["run square --overwrite --out", "replay", "report", "generate --out"])
+def test_missing_permissions_are_reported_in_one_line(
+    arguments: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tmp_path.chmod(0)
     try:
-        assert "ermission denied" in read_error(capsys, *words.split(), str(tmp_path / "x"))
+        assert "ermission denied" in read_error(capsys, *arguments.split(), str(tmp_path / "x"))
     finally:
         tmp_path.chmod(0o700)
 
@@ -121,42 +127,42 @@ def test_a_folder_without_permission_is_one_line(
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
 def test_ctrl_c_keeps_and_reports_partial_results(tmp_path: Path) -> None:
-    words = ("--duration", "3000", "--lattice", "16", "--size", "480x320")
-    for patience in (1.0, 5.0, 25.0):  # until it is under way
-        out = tmp_path / f"run-{patience}"
-        command = [*COMMAND, "run", "square", *words, "--out", str(out)]
+    arguments = ("--duration", "3000", "--lattice", "16", "--size", "480x320")
+    for delay in (1.0, 5.0, 25.0):  # until the run has recorded some steps
+        out = tmp_path / f"run-{delay}"
+        command = [*COMMAND, "run", "square", *arguments, "--out", str(out)]
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 60
         while not out.exists() and time.monotonic() < deadline:
             time.sleep(0.05)
-        time.sleep(patience)
+        time.sleep(delay)
         process.send_signal(signal.SIGINT)
-        said, complaints = process.communicate(timeout=120)
+        output, errors = process.communicate(timeout=120)
         if (out / "run.json").exists() and len(Record.load(out)) > 10:
             break
-    assert process.returncode == 130, complaints
-    assert "Traceback" not in complaints
-    assert "Interrupted at" in said
-    assert "Partial results are in" in said
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert "Interrupted at" in output
+    assert "Partial results are in" in output
     record = Record.load(out)
     assert 10 < len(record) < 180_000
     run = json.loads((out / "run.json").read_text())
     assert run["duration_s"] == pytest.approx(record.time[-1])
     assert run["summary"]["mean_distance_m"] > 0
-    assert len((out / "cost.csv").read_text().splitlines()) < 300, "nobody waits for all of the cost"
+    assert len((out / "cost.csv").read_text().splitlines()) < 300, "the cost is computed of few steps"
     assert (out / "trajectories.png").exists()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.slow
-def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
+def test_ctrl_c_keeps_the_finished_part_of_a_video(tmp_path: Path) -> None:
     """In a terminal Ctrl+C goes to the whole process group, the encoder included."""
     import imageio_ffmpeg
 
     out = tmp_path / "run"
-    words = "run square --duration 20 --lattice 16 --video-speed 0.01 --size 480x320".split()
+    arguments = "run square --duration 20 --lattice 16 --video-speed 0.01 --size 480x320".split()
     process = subprocess.Popen(
-        [*COMMAND, *words, "--video", "--out", str(out)],
+        [*COMMAND, *arguments, "--video", "--out", str(out)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -167,10 +173,10 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
         time.sleep(0.05)
     time.sleep(0.5)
     os.killpg(process.pid, signal.SIGINT)
-    said, complaints = process.communicate(timeout=60)
-    assert process.returncode == 130, complaints
-    assert "Traceback" not in complaints
-    assert "run.mp4" in said
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert "run.mp4" in output
     assert [path.name for path in out.glob(".*")] == [".robocov.json"], "no unfinished file is left"
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(out / "run.mp4"))
     assert frames > 3
@@ -178,29 +184,31 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["controllers", "maps", "check rooms", "schema"])
 @pytest.mark.slow
-def test_a_terminal_that_knows_ascii_only_gets_an_answer(command: str) -> None:
-    done = subprocess.run(
+def test_commands_print_on_terminals_restricted_to_ascii(command: str) -> None:
+    process = subprocess.run(
         [*COMMAND, *command.split()],
         env={**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"},
         capture_output=True,
         check=False,
     )
-    assert done.returncode == 0
-    assert done.stderr == b""
-    assert len(done.stdout) > 100
+    assert process.returncode == 0
+    assert process.stderr == b""
+    assert len(process.stdout) > 100
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
 @pytest.mark.slow
-def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
-    words = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
-    done = subprocess.run(f"{' '.join([*COMMAND, *words])} >&-", shell=True, capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
+def test_a_closed_standard_output_is_no_error(tmp_path: Path) -> None:
+    arguments = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
+    process = subprocess.run(
+        f"{' '.join([*COMMAND, *arguments])} >&-", shell=True, capture_output=True, check=False
+    )
+    assert process.returncode == 0, process.stderr
     assert (tmp_path / "run" / "trajectories.png").exists()
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_a_controller_for_the_whole_team_needs_no_names(
+def test_a_team_controller_is_named_after_its_class(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mine = tmp_path / "mine.py"
@@ -216,12 +224,14 @@ def test_a_controller_for_the_whole_team_needs_no_names(
         "        return rc.Decision(0 * seen.positions, memory=memory + 1)\n"
     )
     out = tmp_path / "out"
-    words = ("compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Still", "--out", str(out))
-    assert [row["label"] for row in read_json(capsys, *words)["runs"]] == ["RAPF", "Still"]
+    arguments = ("compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Still", "--out", str(out))
+    assert [row["label"] for row in read_json(capsys, *arguments)["runs"]] == ["RAPF", "Still"]
     assert (Record.load(out / "Still").forces == 0).all()
 
 
-def test_names_with_brackets_are_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_brackets_in_labels_are_not_interpreted_as_markup(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
         "from dataclasses import dataclass\n"
@@ -231,19 +241,19 @@ def test_names_with_brackets_are_no_markup(tmp_path: Path, capsys: pytest.Captur
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
-    words = ["compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Mine"]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    arguments = ["compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Mine"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 0
     assert "[bold]R[/] [/] $x" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_a_reader_that_has_had_enough_is_no_error() -> None:
-    done = subprocess.run(
+def test_a_reader_that_closes_the_pipe_early_is_no_error() -> None:
+    process = subprocess.run(
         f"{sys.executable} -m robocov_app schema | head -c 10",
         shell=True,
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.stderr == ""
-    assert len(done.stdout) == 10
+    assert process.stderr == ""
+    assert len(process.stdout) == 10

@@ -11,44 +11,57 @@ from robocov_app.runs import artifacts
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def comparison(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("metrics") / "both"
-    words = ["compare", "rooms", "--controllers", "rapf", "rpf", "--robots", "3", *SHORT, "--out", str(out)]
+    arguments = [
+        "compare",
+        "rooms",
+        "--controllers",
+        "rapf",
+        "rpf",
+        "--robots",
+        "3",
+        *SHORT,
+        "--out",
+        str(out),
+    ]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(artifacts, "save_figures", lambda *_, **__: None)
-        assert main(words) == 0
+        assert main(arguments) == 0
     return out
 
 
-def test_each_run_gets_its_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["metrics", str(folder), "--rate", "4", "--plot", str(folder / "metrics.png")]) == 0
-    said = capsys.readouterr().out
-    assert "RAPF" in said
-    assert "RPF" in said
-    assert (folder / "metrics.png").stat().st_size > 10_000
+def test_metrics_of_each_run_are_saved_as_a_table(
+    comparison: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["metrics", str(comparison), "--rate", "4", "--plot", str(comparison / "metrics.png")]) == 0
+    output = capsys.readouterr().out
+    assert "RAPF" in output
+    assert "RPF" in output
+    assert (comparison / "metrics.png").stat().st_size > 10_000
     for name in ("rapf", "rpf"):
-        header, *rows = (folder / name / "metrics.csv").read_text().splitlines()
+        header, *rows = (comparison / name / "metrics.csv").read_text().splitlines()
         assert header.split(",") == list(COLUMNS.values())
-        expected = compute_run_metrics(Record.load(folder / name), 4.0)
+        expected = compute_run_metrics(Record.load(comparison / name), 4.0)
         assert len(rows) == len(expected.time) == 5
         assert [float(cell) for cell in rows[-1].split(",")] == [float(x) for x in expected.rows()[-1]]
 
 
-def test_json_has_the_figures_of_the_end(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["metrics", str(folder / "rapf"), "--rate", "0", "--json"]) == 0
-    said = capsys.readouterr()
-    assert said.err == ""
-    (run,) = json.loads(said.out)["runs"]
+def test_json_output_contains_the_final_metrics(comparison: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", str(comparison / "rapf"), "--rate", "0", "--json"]) == 0
+    output = capsys.readouterr()
+    assert output.err == ""
+    (run,) = json.loads(output.out)["runs"]
     assert 0 < run["sensed_area_m2"] <= run["range_area_m2"] < run["free_area_m2"]
     assert run["components"] == 1
     assert run["near_final_s"] is not None
 
 
 def test_a_folder_without_a_run_is_reported(
-    tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, comparison: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert str(tmp_path) in read_error(capsys, "metrics", str(tmp_path))
-    assert read_error(capsys, "metrics", str(folder), "--rate", "-1").startswith(
+    assert read_error(capsys, "metrics", str(comparison), "--rate", "-1").startswith(
         "--rate: expected a number from 0 to 10000 Hz, got -1.0"
     )
-    assert "picture.gif" in read_error(capsys, "metrics", str(folder), "--plot", "picture.gif")
+    assert "picture.gif" in read_error(capsys, "metrics", str(comparison), "--plot", "picture.gif")

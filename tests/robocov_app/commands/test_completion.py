@@ -1,4 +1,4 @@
-"""Completion: what the script offers is what the commands take."""
+"""Scripts for shells complete the names of commands, their options and values."""
 
 from __future__ import annotations
 
@@ -25,32 +25,35 @@ def script() -> str:
     return out.getvalue()
 
 
-def complete_words(script: str, *words: str) -> list[str]:
+def complete_words(script: str, *arguments: str) -> list[str]:
     assert BASH is not None
-    line = " ".join(f"'{word}'" for word in words)
-    ask = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _robocov; echo ${{COMPREPLY[@]}}"
-    run = subprocess.run([BASH, "--norc"], input=ask, capture_output=True, text=True, timeout=60, check=True)
-    return run.stdout.split()
+    line = " ".join(f"'{word}'" for word in arguments)
+    code = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(arguments) - 1}; _robocov; echo ${{COMPREPLY[@]}}"
+    process = subprocess.run(
+        [BASH, "--norc"], input=code, capture_output=True, text=True, timeout=60, check=True
+    )
+    return process.stdout.split()
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_options_of_a_command_are_those_of_its_help(
+def test_completed_options_are_those_in_the_help(
     name: str, script: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main([name, "--help"])
-    said = capsys.readouterr().out
-    told = set(re.findall(r"--[a-z][a-z-]+", said))
-    found = re.search(rf"^ +{name}\) names=\"(--[^\"]*)\" ;;$", script, re.MULTILINE)
-    assert found is not None
-    flags = set(found[1].split())
-    assert flags <= told
-    head = set(re.findall(r"^\W*(?:-\w(?: \S+)?, )?(--[a-z][a-z-]+)", said, re.MULTILINE))
-    assert "--help" in head and head <= flags
+    output = capsys.readouterr().out
+    in_help = set(re.findall(r"--[a-z][a-z-]+", output))
+    match = re.search(rf"^ +{name}\) names=\"(--[^\"]*)\" ;;$", script, re.MULTILINE)
+    assert match is not None
+    completed = set(match[1].split())
+    assert completed <= in_help
+    documented = set(re.findall(r"^\W*(?:-\w(?: \S+)?, )?(--[a-z][a-z-]+)", output, re.MULTILINE))
+    assert "--help" in documented
+    assert documented <= completed
 
 
 @pytest.mark.skipif(BASH is None, reason="not installed: bash")
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("arguments", "expected"),
     [
         (("robocov", "com"), ["compare", "completion"]),
         (("robocov", "run", "--rob"), ["--robots"]),
@@ -61,12 +64,14 @@ def test_the_options_of_a_command_are_those_of_its_help(
         (("robocov", "run", "--json", "roo"), ["rooms"]),
     ],
 )
-def test_the_shell_completes(script: str, words: tuple[str, ...], wanted: list[str]) -> None:
-    assert complete_words(script, *words) == wanted
+def test_bash_completes_commands_options_and_values(
+    script: str, arguments: tuple[str, ...], expected: list[str]
+) -> None:
+    assert complete_words(script, *arguments) == expected
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_have_all_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scripts_of_other_shells_contain_all_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", shell]) == 0
     out = capsys.readouterr().out
     assert all(name in out for name in COMMANDS)

@@ -1,4 +1,4 @@
-"""Folders of results come from anybody: to read them runs no code of theirs."""
+"""Results may come from untrusted sources: no command executes code from their folders."""
 
 import json
 import sys
@@ -31,19 +31,19 @@ duration = 0.5
 dt = 0.05
 lattice = 8
 """
-EVIL = "from pathlib import Path\nPath({marker!r}).touch()\n"
+MALICIOUS_CODE = "from pathlib import Path\nPath({marker!r}).touch()\n"
 
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run, a comparison and a sweep of controllers whose code has become evil since."""
+    """Return a folder with a run, a comparison and a sweep whose controllers have become malicious."""
     folder = tmp_path_factory.mktemp("shared")
     save_map(ROOM, folder / "room.json")
     name = write_controller(folder, "")
     (folder / "study.toml").write_text(STUDY)
-    (folder / "ours.toml").write_text(STUDY.replace("mine.py:Mine", "lloyd"))
+    (folder / "lloyd.toml").write_text(STUDY.replace("mine.py:Mine", "lloyd"))
     room = str(folder / "room.json")
-    # an installed package may offer a controller, too
+    # An installed package may offer a controller as well.
     offered = folder / "offered-1.0.dist-info"
     offered.mkdir()
     (offered / "METADATA").write_text("Metadata-Version: 2.1\nName: offered\nVersion: 1.0\n")
@@ -58,20 +58,20 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
             ["compare", room, "--controllers", "lloyd", name, "planted", "--out", str(folder / "both")],
         ):
             assert main([*command, *SHORT]) == 0
-        words = ["sweep", str(folder / "study.toml"), "--out", str(folder / "sweep"), "--workers", "1"]
-        assert main(words) == 0
+        arguments = ["sweep", str(folder / "study.toml"), "--out", str(folder / "sweep"), "--workers", "1"]
+        assert main(arguments) == 0
     for path in ("run/run.json", "both/Mine/run.json"):
         run = json.loads((folder / path).read_text())
-        run["controller"]["source"] = EVIL.format(marker=str(folder / "marker"))
+        run["controller"]["source"] = MALICIOUS_CODE.format(marker=str(folder / "marker"))
         (folder / path).write_text(json.dumps(run))
     for path in ("mine.py", "planted.py"):
         text = (folder / path).read_text()
-        (folder / path).write_text(EVIL.format(marker=str(folder / "marker")) + text)
+        (folder / path).write_text(MALICIOUS_CODE.format(marker=str(folder / "marker")) + text)
     return folder
 
 
 @pytest.fixture(autouse=True)
-def nothing_ran_yet(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def remove_traces(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (shared / "marker").unlink(missing_ok=True)
     monkeypatch.syspath_prepend(shared)
     monkeypatch.delitem(sys.modules, "planted", raising=False)
@@ -79,7 +79,7 @@ def nothing_ran_yet(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
-    """What windows show that nobody sees, after they were used for some seconds."""
+    """Collect the sessions of windows, which are used on a dummy display and closed."""
     sessions: list[Session] = []
 
     def run(window: ViewerWindow) -> None:
@@ -88,8 +88,8 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
             window.do("robot:next")
             for _ in range(10):
                 window.run_frame(1 / 30)
-        for deed in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
-            window.do(deed)
+        for action in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
+            window.do(action)
             window.run_frame(1 / 30)
         sessions.append(window.viewer.session)
         window.close()
@@ -101,49 +101,53 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
 
 
 @pytest.mark.parametrize(
-    "words",
+    "arguments",
     [
         ("replay", "run"),
         ("replay", "offered"),
         ("replay", "both"),
-        ("replay", "run", "--frames", *SMALL, "--out", "film"),
-        ("replay", "both", "--frames", *SMALL, "--out", "film"),
+        ("replay", "run", "--frames", *SMALL, "--out", "video"),
+        ("replay", "both", "--frames", *SMALL, "--out", "video"),
         ("report", "run", "offered", "both", "sweep", "--out", "report.html"),
         ("metrics", "run"),
         ("metrics", "both", "--plot", "metrics.png"),
         ("optimum", "--run", "both", "--restarts", "1", "--lattice", "8"),
-        ("sweep", "ours.toml", "--dry-run", "--out", "sweep"),
+        ("sweep", "lloyd.toml", "--dry-run", "--out", "sweep"),
     ],
     ids=" ".join,
 )
 @pytest.mark.slow
-def test_no_command_runs_the_code_of_results(
+def test_no_command_executes_code_of_results(
     shared: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     windows: list[Session],
-    words: tuple[str, ...],
+    arguments: tuple[str, ...],
 ) -> None:
     monkeypatch.chdir(shared)
-    made = ("film", "report.html", "metrics.png")
-    status = main([str(tmp_path / word) if word in made else word for word in words])
+    outputs = ("video", "report.html", "metrics.png")
+    status = main([str(tmp_path / word) if word in outputs else word for word in arguments])
     assert not (shared / "marker").exists()
-    assert status == 0 or words[0] == "sweep"  # which may not take over a folder of another study
+    assert status == 0 or arguments[0] == "sweep"  # A sweep rejects the folder of another study.
     for session in windows:
-        lost = [isinstance(pane.controller, MissingController) for pane in session.timeline.panes]
-        assert lost == ([False, True, True] if words[1] == "both" else [True])
+        is_missing = [isinstance(pane.controller, MissingController) for pane in session.timeline.panes]
+        assert is_missing == ([False, True, True] if arguments[1] == "both" else [True])
 
 
 @pytest.mark.slow
-def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_library_executes_no_code_of_results(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(shared)
     for folder in ("run", "offered", "both/Mine", "both/planted"):
         record = Record.load(shared / folder)
-        record.snapshot(3), record.cells(3), record.to_json(), repr(record)
-        render_record_html(record), render_record_png(record)
+        record.snapshot(3)
+        record.cells(3)
+        record.to_json()
+        repr(record)
+        render_record_html(record)
+        render_record_png(record)
     results = read_results(shared / "sweep")
     assert results.record(0).controller == results.to_pandas()["controller"][0] == "mine.py:Mine"
-    contest = Contest(read_study(shared / "ours.toml"), (Contender("ours", "ours", "lloyd", {}),))
+    contest = Contest(read_study(shared / "lloyd.toml"), (Contender("lloyd", "lloyd", "lloyd", {}),))
     read_outcomes(shared / "sweep", contest, {})
     assert not (shared / "marker").exists()
 
@@ -161,7 +165,8 @@ def test_the_controller_of_a_run_is_loaded_only_on_request(
     assert main(["replay", str(shared / "run"), "--controller", name]) == 0
     (session,) = windows
     assert session.timeline.panes[0].controller.name == name
-    assert session.timeline.is_live and session.timeline.end_time == 0.0, "it has begun anew"
+    assert session.timeline.is_live
+    assert session.timeline.end_time == 0.0, "the run was restarted"
     assert not (shared / "marker").exists()
     capsys.readouterr()
     message = read_error(capsys, "replay", str(shared / "run"), "--controller", name.replace("Mine", "Other"))

@@ -26,8 +26,8 @@ def test_a_gain_applies_to_every_controller_that_has_it() -> None:
 
 @pytest.mark.parametrize("order", [("k_rep", "rpf.k_rep"), ("rpf.k_rep", "k_rep")])
 def test_a_gain_of_one_controller_takes_precedence(order: tuple[str, str]) -> None:
-    given = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
-    assert select_gains(NAMES, given) == [{"k_rep": 1}, {"k_rep": 2}, {}]
+    gains = {key: {"k_rep": 1, "rpf.k_rep": 2}[key] for key in order}
+    assert select_gains(NAMES, gains) == [{"k_rep": 1}, {"k_rep": 2}, {}]
 
 
 def test_a_controller_in_a_file_may_be_named_by_its_class(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_a_controller_in_a_file_may_be_named_by_its_class(tmp_path: Path) -> Non
     assert select_gains(names, {f"{file}:Mine.pull": 2}) == [{}, {"pull": 2}]
 
 
-def test_the_name_of_several_classes_is_not_enough(tmp_path: Path) -> None:
+def test_an_ambiguous_class_name_is_rejected(tmp_path: Path) -> None:
     names = []
     for stem in ("first", "second"):
         file = tmp_path / f"{stem}.py"
@@ -56,6 +56,6 @@ def test_the_name_of_several_classes_is_not_enough(tmp_path: Path) -> None:
         ("rap.k_rep", "--set rap.k_rep: unknown controller 'rap': did you mean 'rapf'"),
     ],
 )
-def test_a_gain_without_a_controller_is_rejected(key: str, message: str) -> None:
+def test_a_gain_that_no_controller_has_is_rejected(key: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         select_gains(NAMES, {key: 1})

@@ -8,9 +8,7 @@ from robocov_app.cli import COMMANDS, main
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_values_of_options_have_names_that_users_understand(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_help_contains_no_internal_types(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     main([name, "--help"])
     text = capsys.readouterr().out
     assert not re.findall(r"\{\[.*|\[(?:STR|FLOAT|INT|PATH) \[.*|\{(?:FLOAT|INT) .*", text)
@@ -29,7 +27,7 @@ def test_no_line_is_longer_than_the_terminal(
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_an_example_can_be_copied_from_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_is_on_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     main([name, "--help"])
     paragraphs = capsys.readouterr().out.split("\n\n")
     examples = [paragraph for paragraph in paragraphs if paragraph.startswith("Example: ")]
@@ -37,7 +35,7 @@ def test_an_example_can_be_copied_from_one_line(name: str, capsys: pytest.Captur
     assert "\n" not in examples[0]
 
 
-def test_no_line_of_the_overview_is_longer_than_a_usual_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_overview_is_at_most_80_columns_wide(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--help"])
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if len(line) > 80] == []

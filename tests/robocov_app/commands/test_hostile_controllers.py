@@ -1,4 +1,4 @@
-"""Controllers that end Python, or close its output: one line that names them, and status 1."""
+"""Controllers that end Python or close its output are reported in one line, with status 1."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Odd(BaseException):
 
 class Unspeakable(Exception):
     def __str__(self):
-        raise ValueError("no words")
+        raise ValueError("no message")
 
 @dataclass(frozen=True)
 class Mine:
@@ -58,13 +58,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def call(folder: Path, body: str, *words: str) -> subprocess.CompletedProcess[str]:
+def run_command(folder: Path, body: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     (folder / "mine.py").write_text(HEAD.replace("BODY", body))
-    return subprocess.run([*COMMAND, *words], cwd=folder, capture_output=True, text=True, timeout=300)
+    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-def read_last_line(ended: subprocess.CompletedProcess[str]) -> str:
-    assert "Traceback" not in ended.stderr and "fault of robocov" not in ended.stderr
+def read_error_line(ended: subprocess.CompletedProcess[str]) -> str:
+    assert "Traceback" not in ended.stderr
+    assert "fault of robocov" not in ended.stderr
     errors = [line for line in ended.stderr.splitlines() if line.startswith("robocov: error: ")]
     assert len(errors) == 1, ended.stderr
     assert escape_controls(errors[0]) == errors[0]
@@ -73,43 +74,45 @@ def read_last_line(ended: subprocess.CompletedProcess[str]) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", [*RAISED, *ENDED])
-def test_one_line_names_a_controller_that_ends_python(folder: Path, body: str) -> None:
-    ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+def test_a_controller_that_ends_python_is_reported_in_one_line(folder: Path, body: str) -> None:
+    ended = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
     assert ended.returncode == 1, ended.stderr
-    assert (RAISED | ENDED)[body] in read_last_line(ended)
+    assert (RAISED | ENDED)[body] in read_error_line(ended)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", ORDINARY)
-def test_one_line_names_a_controller_that_fails(folder: Path, body: str) -> None:
-    ended = call(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+def test_a_failing_controller_is_reported_in_one_line(folder: Path, body: str) -> None:
+    ended = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
     assert ended.returncode == 2, ended.stderr
-    assert ORDINARY[body] in read_last_line(ended)
+    assert ORDINARY[body] in read_error_line(ended)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
 def test_a_comparison_ended_by_a_controller_is_reported(folder: Path) -> None:
-    ended = call(folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL)
+    ended = run_command(
+        folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL
+    )
     assert ended.returncode == 1
-    assert ENDED["os._exit(0)"] in read_last_line(ended)
+    assert ENDED["os._exit(0)"] in read_error_line(ended)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
-def test_a_controller_that_behaves_is_only_watched(folder: Path) -> None:
-    ended = call(folder, "pass", "run", "square", "--controller", "mine.py:Mine", *SMALL, "--json")
+def test_supervision_does_not_change_the_output_of_a_correct_controller(folder: Path) -> None:
+    ended = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Mine", *SMALL, "--json")
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('{"out": "out"')
-    wrong = call(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
+    wrong = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
     assert wrong.returncode == 2
-    assert "unknown class 'Yours' (known: Mine" in read_last_line(wrong)
+    assert "unknown class 'Yours' (known: Mine" in read_error_line(wrong)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", ["os._exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
-def test_a_sweep_names_the_controller_that_ends_its_worker(folder: Path, body: str) -> None:
+def test_a_sweep_reports_the_controller_that_ends_its_worker(folder: Path, body: str) -> None:
     study = 'maps = ["square"]\ncontrollers = ["mine.py:Mine"]\nduration = 0.3\nrobots = 2\nlattice = 16\n'
     (folder / "study.toml").write_text(study)
-    ended = call(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
+    ended = run_command(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
     assert ended.returncode == 1
     row = (folder / "out" / "results.csv").read_text().splitlines()[1]
     assert "mine.py:Mine" in row and "its process ended (" in row

@@ -56,16 +56,17 @@ def test_shared_rewards_sum_up_to_the_decrease_of_the_cost(cluttered: Environmen
 
 @pytest.mark.parametrize("reward", ["shared", "own"])
 def test_rewarding_less_often_gives_the_same_sum_of_rewards(cluttered: Environment, reward: str) -> None:
-    often = start_episode(cluttered, reward=reward, reward_every=1, contact_penalty=0.0)
-    seldom = start_episode(cluttered, reward=reward, reward_every=4, contact_penalty=0.0)
-    dense = np.array(take_random_actions(often, 12))
-    sparse = np.array(take_random_actions(seldom, 12))
-    assert (sparse[[0, 1, 2, 4]] == 0.0).all() and sparse[3].any()
+    every_action = start_episode(cluttered, reward=reward, reward_every=1, contact_penalty=0.0)
+    every_fourth = start_episode(cluttered, reward=reward, reward_every=4, contact_penalty=0.0)
+    dense = np.array(take_random_actions(every_action, 12))
+    sparse = np.array(take_random_actions(every_fourth, 12))
+    assert (sparse[[0, 1, 2, 4]] == 0.0).all()
+    assert sparse[3].any()
     assert sparse.sum() == pytest.approx(dense.sum(), abs=1e-12)
-    assert seldom.coverage.mean_distance == often.coverage.mean_distance
+    assert every_fourth.coverage.mean_distance == every_action.coverage.mean_distance
 
 
-def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
+def test_the_last_action_is_always_rewarded(cluttered: Environment) -> None:
     episode = start_episode(cluttered, reward_every=100)
     assert not episode.advance(np.ones((3, 2))).rewards.any()
     assert episode.advance(np.ones((3, 2)), is_last=True).rewards.any()
@@ -88,14 +89,16 @@ def test_contacts_are_reported_and_penalized(empty: Environment) -> None:
     expected = ((clearances[1:] <= 1e-3) * record.dt).sum(axis=0)
     assert count_contacts(record, clearances) == 1
     np.testing.assert_allclose(contact_time, expected, atol=1e-12)
-    assert contact_time[0] > 0.3 and not contact_time[1:].any()
+    assert contact_time[0] > 0.3
+    assert not contact_time[1:].any()
 
 
 def test_contact_between_two_robots_counts_for_both(empty: Environment) -> None:
     episode = start_episode(empty, np.array([[5.0, 5.0], [5.5, 5.0], [8.0, 8.0]]))
     towards = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 0.0]])
     contact_time = sum(episode.advance(towards).contact_time for _ in range(12))
-    assert contact_time[0] == contact_time[1] > 0.1 and contact_time[2] == 0.0
+    assert contact_time[0] == contact_time[1] > 0.1
+    assert contact_time[2] == 0.0
 
 
 def test_a_robot_that_has_not_joined_has_no_contact(empty: Environment) -> None:
@@ -113,7 +116,8 @@ def test_the_record_is_that_of_a_simulation_under_the_same_forces(cluttered: Env
     episode = start_episode(cluttered, recording=True, repeat=3)
     take_random_actions(episode, 10)
     record = episode.record()
-    assert len(record.time) == 31 and not record.forces[-1].any()
+    assert len(record.time) == 31
+    assert not record.forces[-1].any()
     simulation = Simulation(cluttered, Rapf(), STARTS)
     for k in range(30):
         assert simulation.positions.tobytes() == record.positions[k].tobytes()
@@ -135,7 +139,8 @@ def test_a_failing_robot_does_not_change_the_rewards_of_the_others(cluttered: En
     for _ in range(8):
         rewards.append(episode.advance(forces).rewards)
         working.append(episode.working.tolist())
-    assert working[3] == [True] * 3 and working[5] == [True, True, False]
+    assert working[3] == [True] * 3
+    assert working[5] == [True, True, False]
     first_failed = next(k for k, row in enumerate(working) if not row[2])
     cost = CoverageCost(cluttered, 16)
     for k in range(first_failed, 8):
@@ -150,7 +155,8 @@ def test_an_episode_continues_without_working_robots(empty: Environment) -> None
     failures = Conditions(failures=tuple((k, 0.15) for k in (1, 2, 3)))
     episode = start_episode(empty, conditions=failures)
     rewards = take_random_actions(episode, 4)
-    assert not episode.working.any() and not np.array(rewards[2:]).any()
+    assert not episode.working.any()
+    assert not np.array(rewards[2:]).any()
     assert np.isfinite(episode.build_rows()).all()
 
 
@@ -162,10 +168,8 @@ def test_moving_obstacles_count_at_their_present_position(empty: Environment) ->
     final = CoverageCost(moving.at(1.5), 16)(episode.simulation.positions)
     assert episode.coverage.mean_distance == pytest.approx(final.mean_distance, abs=1e-9)
     decrease = episode.initial_coverage.mean_distance - final.mean_distance
-    assert (
-        rewards[:, 0].sum() == pytest.approx(decrease / episode.reference_distance, abs=1e-12)
-        and decrease != 0.0
-    )
+    assert rewards[:, 0].sum() == pytest.approx(decrease / episode.reference_distance, abs=1e-12)
+    assert decrease != 0.0
 
 
 def test_scans_are_those_of_the_present_positions(cluttered: Environment) -> None:
@@ -205,12 +209,13 @@ def test_options_replace_random_values(empty: Environment, cluttered: Environmen
     options = {"map": cluttered, "start": "uniform", "start_seed": 7, "nothing": 1}
     episode = draw_episode(task, sampler, rng, options)
     expected = cluttered.start("uniform").sample(3, seed=7)
-    assert episode.environment is cluttered and np.array_equal(episode.simulation.positions, expected)
+    assert episode.environment is cluttered
+    assert np.array_equal(episode.simulation.positions, expected)
     placed = draw_episode(task, sampler, rng, {"map": empty, "positions": STARTS.tolist()})
     assert np.array_equal(placed.simulation.positions, STARTS)
 
 
-def test_each_episode_has_another_seed_of_its_conditions(empty: Environment) -> None:
+def test_each_episode_has_its_own_seed_of_conditions(empty: Environment) -> None:
     task = CoverageTask(maps=empty, robots=3, lattice=8, conditions=Conditions(position_noise=0.1))
     sampler = MapSampler(empty, 8)
     rng = np.random.default_rng(0)

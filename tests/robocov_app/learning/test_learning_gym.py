@@ -30,7 +30,7 @@ ID = "robocov_app.learning.gym:robocov/Coverage-v0"
         {"conditions": Conditions(position_noise=0.1, failure_rate=0.3)},
     ],
 )
-def test_gymnasiums_check_passes(changes: dict[str, Any]) -> None:
+def test_the_check_of_gymnasium_passes(changes: dict[str, Any]) -> None:
     check_env(gymnasium.make(ID, render_mode="rgb_array", size=(160, 120), **SMALL, **changes).unwrapped)
 
 
@@ -43,41 +43,42 @@ def test_importing_the_module_registers_the_environment() -> None:
     assert finished.stdout == "(2, 19)\n"
 
 
-def test_it_is_the_parallel_environment_with_one_learner(cluttered: Environment) -> None:
+def test_a_single_agent_environment_behaves_as_the_parallel_one(cluttered: Environment) -> None:
     options = {**SMALL, "maps": cluttered, "reward": "own", "contact_penalty": 0.3, "reward_every": 3}
     single = CoverageEnv(**options)
     parallel = CoverageParallelEnv(**options)
     rows, info = single.reset(seed=5)
     rows_by_agent, infos = parallel.reset(seed=5)
     rng = np.random.default_rng(0)
-    over = False
-    while not over:
+    truncated = False
+    while not truncated:
         assert rows.tobytes() == b"".join(rows_by_agent[agent].tobytes() for agent in parallel.agents)
         action = rng.normal(scale=2.0, size=(3, 2))
-        rows, reward, ended, over, info = single.step(action)
-        rows_by_agent, rewards, _, truncated, infos = parallel.step(
+        rows, reward, terminated, truncated, info = single.step(action)
+        rows_by_agent, rewards, _, truncations, infos = parallel.step(
             dict(zip(parallel.agents, action, strict=True))
         )
         assert reward == pytest.approx(np.mean([*rewards.values()]), abs=1e-15)
-        assert not ended and set(truncated.values()) == {over}
+        assert not terminated
+        assert set(truncations.values()) == {truncated}
         assert info["mean_distance_m"] == infos["robot_1"]["mean_distance_m"]
     assert parallel.agents == []
 
 
-def test_environments_in_processes_behave_as_single_ones() -> None:
+def test_environments_in_processes_behave_as_single_environments() -> None:
     """Each has its own seed, and the results are the same, bit for bit."""
-    several = gymnasium.vector.AsyncVectorEnv([partial(CoverageEnv, **SMALL)] * 2)
+    vector_env = gymnasium.vector.AsyncVectorEnv([partial(CoverageEnv, **SMALL)] * 2)
     actions = np.random.default_rng(0).normal(size=(4, 2, 3, 2)).astype(np.float32)
     try:
-        rows, _ = several.reset(seed=[3, 4])
+        rows, _ = vector_env.reset(seed=[3, 4])
         together = [rows.copy()]
         rewards = []
         for action in actions:
-            rows, reward, *_ = several.step(action)
+            rows, reward, *_ = vector_env.step(action)
             together.append(rows.copy())
             rewards.append(reward)
     finally:
-        several.close()
+        vector_env.close()
     for k, seed in enumerate((3, 4)):
         alone = CoverageEnv(**SMALL)
         assert np.array_equal(alone.reset(seed=seed)[0], together[0][k])
@@ -96,13 +97,13 @@ def test_an_episode_ends_when_no_robot_works() -> None:
     env.reset(seed=0)
     ended = []
     for _ in range(4):
-        rows, _, over, _, info = env.step(np.zeros((3, 2)))
-        ended.append(over)
+        rows, _, terminated, _, info = env.step(np.zeros((3, 2)))
+        ended.append(terminated)
         assert [bool(row.any()) for row in rows] == info["working"].tolist()
     assert ended == [False, False, False, True]
 
 
-def test_actions_may_be_rescaled_and_observations_flattened() -> None:
+def test_wrappers_rescale_actions_and_flatten_observations() -> None:
     wrapped = gymnasium.wrappers.RescaleAction(CoverageEnv(**SMALL), np.float32(-1.0), np.float32(1.0))
     wrapped = gymnasium.wrappers.FlattenObservation(wrapped)
     plain = CoverageEnv(**SMALL)
@@ -126,7 +127,7 @@ def test_steps_before_a_reset_and_invalid_actions_are_rejected() -> None:
 @pytest.mark.parametrize(
     ("name", "package"), [("CoverageEnv", "gymnasium"), ("CoverageParallelEnv", "pettingzoo")]
 )
-def test_without_the_extra_the_message_names_it(
+def test_a_missing_package_is_reported_with_its_extra(
     name: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
@@ -136,7 +137,7 @@ def test_without_the_extra_the_message_names_it(
     assert str(caught.value) == f'{package} is not installed: pip install "robocov[rl]"'
 
 
-def test_public_names() -> None:
+def test_public_names_are_loaded_on_access() -> None:
     assert all(getattr(learning, name) is not None for name in learning.__all__)
     assert sorted(learning._MODULES) == sorted(learning.__all__) and set(learning.__all__) <= {*dir(learning)}
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
@@ -161,10 +162,10 @@ def test_policies_do_not_import_gymnasium_or_pettingzoo() -> None:
         {"conditions": Conditions(loss=0.5)},
     ],
 )
-def test_environments_that_share_a_simulation_behave_as_single_ones(
+def test_environments_that_share_a_simulation_behave_as_single_environments(
     mode: AutoresetMode, changes: dict[str, Any]
 ) -> None:
-    """Observations, rewards, ends and infos, bit for bit, over the ends of episodes."""
+    """Observations, rewards, ends and infos are equal bit for bit, also after the end of an episode."""
     options = {**SMALL, "maps": "rooms", "duration": 0.4, **changes}
     together = CoverageVectorEnv(3, autoreset_mode=mode, **options)
     apart = gymnasium.vector.SyncVectorEnv([partial(CoverageEnv, **options)] * 3, autoreset_mode=mode)
@@ -187,15 +188,15 @@ def test_environments_that_share_a_simulation_behave_as_single_ones(
 
 
 def test_vector_environments_reject_invalid_actions() -> None:
-    several = CoverageVectorEnv(2, **SMALL)
+    vector_env = CoverageVectorEnv(2, **SMALL)
     with pytest.raises(RobocovError, match="reset"):
-        several.step(np.zeros((2, 3, 2)))
-    several.reset(seed=0)
+        vector_env.step(np.zeros((2, 3, 2)))
+    vector_env.reset(seed=0)
     with pytest.raises(ParameterError, match="action of robot_3"):
-        several.step(np.pad(np.zeros((2, 2, 2)), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan))
+        vector_env.step(np.pad(np.zeros((2, 2, 2)), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan))
 
 
-def test_environments_of_one_simulation_show_their_own_robots() -> None:
+def test_environments_that_share_a_simulation_render_their_own_robots() -> None:
     together = CoverageVectorEnv(2, render_mode="rgb_array", **SMALL)
     alone = CoverageEnv(render_mode="rgb_array", **SMALL)
     together.reset(seed=4)

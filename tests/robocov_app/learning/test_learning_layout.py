@@ -13,10 +13,12 @@ from robocov.team import Team
 from robocov.voronoi import partition
 from robocov_app.learning import ObservationLayout
 
-REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))  # a diameter of 10 m
+REGION = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]))  # diameter: 10 m
 
 
-def observe_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays: int = 0) -> Observations:
+def observe_at(
+    positions: np.ndarray, communication_range: float = np.inf, seed: int = 0, rays: int = 0
+) -> Observations:
     rng = np.random.default_rng(seed)
     n = len(positions)
     points = positions + rng.normal(scale=0.8, size=(n, 2))
@@ -25,21 +27,23 @@ def observe_at(positions: np.ndarray, reach: float = np.inf, seed: int = 0, rays
     return Observations(
         positions,
         rng.uniform(-0.7, 0.7, size=(n, 2)),
-        Neighbors.from_ranges(positions, np.full(n, reach)),
+        Neighbors.from_ranges(positions, np.full(n, communication_range)),
         points,
         REGION,
         scans=scans,
     )
 
 
-def compute_row(layout: ObservationLayout, seen: Observations, robot: int, reach: float) -> list[float]:
-    """Return one row by another way, in plain Python."""
+def compute_row(
+    layout: ObservationLayout, seen: Observations, robot: int, communication_range: float
+) -> list[float]:
+    """Compute one row of observations in plain Python, as a reference."""
     x, y = seen.positions[robot]
     row = [(x - 4.0) / 10.0, (y - 3.0) / 10.0, *seen.velocities[robot] / 0.8]
     point = seen.obstacle_points[robot]
     row += [0.0] * 3 if np.isnan(point[0]) else [(point[0] - x) / 2.0, (point[1] - y) / 2.0, 1.0]
     others = [k for k in range(len(seen.positions)) if k != robot]
-    heard = [k for k in others if np.hypot(*(seen.positions[k] - [x, y])) <= reach]
+    heard = [k for k in others if np.hypot(*(seen.positions[k] - [x, y])) <= communication_range]
     heard.sort(key=lambda k: (np.hypot(*(seen.positions[k] - [x, y])), k))
     for rank in range(layout.neighbors):
         if rank < len(heard):
@@ -56,45 +60,53 @@ def compute_row(layout: ObservationLayout, seen: Observations, robot: int, reach
 
 
 @pytest.mark.parametrize("layout", [ObservationLayout(), ObservationLayout(0), ObservationLayout(2, 5, True)])
-@pytest.mark.parametrize("reach", [np.inf, 2.5])
+@pytest.mark.parametrize("communication_range", [np.inf, 2.5])
 @pytest.mark.parametrize("n", [1, 3, 60])
-def test_rows_are_what_they_are_documented_to_be(layout: ObservationLayout, reach: float, n: int) -> None:
+def test_rows_contain_the_documented_values(
+    layout: ObservationLayout, communication_range: float, n: int
+) -> None:
     positions = np.random.default_rng(n).uniform((0, 0), (8, 6), size=(n, 2))
-    seen = observe_at(positions, reach, n, layout.rays)
-    team = Team.homogeneous(n, max_speed=0.8, sensing_range=2.0, communication_range=reach)
+    seen = observe_at(positions, communication_range, n, layout.rays)
+    team = Team.homogeneous(n, max_speed=0.8, sensing_range=2.0, communication_range=communication_range)
     rows = layout.build_rows(seen, team)
-    assert rows.dtype == np.float32 and rows.shape == (n, layout.size)
+    assert rows.dtype == np.float32
+    assert rows.shape == (n, layout.size)
     for robot in range(n):
-        np.testing.assert_allclose(rows[robot], compute_row(layout, seen, robot, reach), atol=2e-6)
+        np.testing.assert_allclose(
+            rows[robot], compute_row(layout, seen, robot, communication_range), atol=2e-6
+        )
 
 
-def test_blocks_are_all_of_a_row() -> None:
+def test_blocks_cover_each_row() -> None:
     layout = ObservationLayout(3, 8, True)
     assert [*layout.blocks] == ["position", "velocity", "obstacle", "neighbor", "rays", "centroid"]
-    covered = np.concatenate([np.arange(layout.size)[place] for place in layout.blocks.values()])
+    covered = np.concatenate([np.arange(layout.size)[block] for block in layout.blocks.values()])
     assert covered.tolist() == list(range(layout.size))
-    assert "rays" not in ObservationLayout().blocks and "neighbor" not in ObservationLayout(0).blocks
+    assert "rays" not in ObservationLayout().blocks
+    assert "neighbor" not in ObservationLayout(0).blocks
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 2**32), n=st.integers(2, 40), reach=st.floats(0.5, 5.0))
-def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) -> None:
+@given(seed=st.integers(0, 2**32), n=st.integers(2, 40), communication_range=st.floats(0.5, 5.0))
+def test_a_row_depends_only_on_the_knowledge_of_its_robot(
+    seed: int, n: int, communication_range: float
+) -> None:
     """Changing anything outside robot i's ranges changes nothing in row i, not one bit."""
     rng = np.random.default_rng(seed)
     positions = rng.uniform((0, 0), (8, 6), size=(n, 2))
-    seen = observe_at(positions, reach, seed, rays=6)
+    seen = observe_at(positions, communication_range, seed, rays=6)
     layout = ObservationLayout(3, 6, True)
-    team = Team.homogeneous(n, communication_range=reach)
+    team = Team.homogeneous(n, communication_range=communication_range)
     i = int(rng.integers(n))
     before = layout.build_rows(seen, team)[i]
     heard = np.zeros(n, dtype=bool)
     heard[[*seen.neighbors.list_neighbors(i), i]] = True
     moved = positions.copy()
     for k in np.flatnonzero(~heard):
-        place = rng.uniform((0, 0), (8, 6))
-        if np.hypot(*(place - positions[i])) > reach:
-            moved[k] = place
-    other = observe_at(moved, reach, seed + 1, rays=6)
+        position = rng.uniform((0, 0), (8, 6))
+        if np.hypot(*(position - positions[i])) > communication_range:
+            moved[k] = position
+    other = observe_at(moved, communication_range, seed + 1, rays=6)
     for name in ("velocities", "obstacle_points"):
         getattr(other, name)[i] = getattr(seen, name)[i]
     other.scans.distances[i] = seen.scans.distances[i]
@@ -105,7 +117,7 @@ def test_a_row_tells_only_what_the_robot_knows(seed: int, n: int, reach: float) 
 @settings(max_examples=30)
 @given(seed=st.integers(0, 2**32), n=st.integers(1, 20), sensing=st.sampled_from([0.0, 0.3, 3.0, np.inf]))
 def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> None:
-    """Even where a robot believes itself to be outside, or what it senses is farther than it can sense."""
+    """Positions may be outside the region, and distances beyond the sensing range."""
     rng = np.random.default_rng(seed)
     seen = observe_at(rng.uniform((-5, -5), (13, 11), size=(n, 2)), np.inf, seed, rays=4)
     layout = ObservationLayout(2, 4, True)
@@ -114,7 +126,7 @@ def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> Non
     assert ((rows >= low) & (rows <= high)).all()
 
 
-def test_a_message_that_is_old_is_told_as_it_came() -> None:
+def test_rows_contain_the_positions_in_old_messages() -> None:
     positions = np.array([[1.0, 1.0], [2.0, 1.0]])
     linked = Neighbors.from_ranges(positions, np.full(2, 5.0))
     seen = Observations(
@@ -137,12 +149,12 @@ def test_a_message_that_is_old_is_told_as_it_came() -> None:
         ({"centroid": 1}, r"observation.centroid: expected true or false, got 1"),
     ],
 )
-def test_what_cannot_be_told(values: dict[str, object], message: str) -> None:
+def test_invalid_layouts_are_rejected(values: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         ObservationLayout(**values)
 
 
-def test_rays_want_a_scan() -> None:
+def test_a_scan_with_another_number_of_rays_is_rejected() -> None:
     seen = observe_at(np.array([[1.0, 1.0]]), rays=4)
     with pytest.raises(ParameterError, match=r"observation.rays: expected 6 rays in a scan, got 4"):
         ObservationLayout(rays=6).build_rows(seen, Team.homogeneous(1))

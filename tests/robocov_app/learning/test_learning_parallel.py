@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 with warnings.catch_warnings():
-    # Its tests load games in ways that it has deprecated.
+    # The tests of pettingzoo load games by deprecated functions.
     warnings.simplefilter("ignore", DeprecationWarning)
     from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test
 
@@ -59,7 +59,7 @@ def test_the_check_of_pettingzoo_for_truncation_passes(
     max_cycles_test(Module)
 
 
-def play(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
+def run_random_episode(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
     """Take random actions, and return all observations, rewards and infos."""
     observations, infos = env.reset(seed=seed)
     rng = np.random.default_rng(0)
@@ -72,13 +72,13 @@ def play(env: CoverageParallelEnv, seed: int, cycles: int = 6) -> list[bytes]:
 
 
 @pytest.mark.parametrize("changes", VARIANTS)
-def test_the_same_seed_gives_the_same_bits(cluttered: Environment, changes: dict[str, Any]) -> None:
+def test_results_of_the_same_seed_are_identical(cluttered: Environment, changes: dict[str, Any]) -> None:
     env = build_environment(cluttered, **changes)
     other = build_environment(cluttered, **changes)
-    first = play(env, 3)
-    assert first == play(other, 3)
-    assert first == play(env, 3)
-    assert first != play(env, 4)
+    first = run_random_episode(env, 3)
+    assert first == run_random_episode(other, 3)
+    assert first == run_random_episode(env, 3)
+    assert first != run_random_episode(env, 4)
 
 
 def test_without_a_seed_the_random_numbers_continue(cluttered: Environment) -> None:
@@ -92,7 +92,7 @@ def test_without_a_seed_the_random_numbers_continue(cluttered: Environment) -> N
     assert np.array_equal(other.reset()[0]["robot_1"], first)
 
 
-def test_an_episode_is_truncated_after_its_time(empty: Environment) -> None:
+def test_an_episode_is_truncated_after_its_duration(empty: Environment) -> None:
     env = build_environment(empty, duration=0.5)
     env.reset(seed=0)
     for cycle in range(5):
@@ -102,7 +102,7 @@ def test_an_episode_is_truncated_after_its_time(empty: Environment) -> None:
     assert env.agents == [] and infos["robot_2"]["time_s"] == pytest.approx(0.5)
 
 
-def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None:
+def test_the_last_action_is_always_rewarded(cluttered: Environment) -> None:
     returns = []
     for every in (1, 1000):
         env = build_environment(cluttered, reward_every=every, contact_penalty=0.0)
@@ -111,7 +111,8 @@ def test_the_last_action_is_rewarded_in_any_case(cluttered: Environment) -> None
         while env.agents:
             rewards.append(env.step(dict.fromkeys(env.agents, (2.0, 1.0)))[1]["robot_1"])
         returns.append(rewards)
-    assert not any(returns[1][:-1]) and abs(returns[1][-1]) > 0.1
+    assert not any(returns[1][:-1])
+    assert abs(returns[1][-1]) > 0.1
     assert sum(returns[0]) == pytest.approx(returns[1][-1], abs=1e-12)
 
 
@@ -156,9 +157,9 @@ def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
     env.reset(seed=0)
     with pytest.raises(ParameterError, match="actions: expected one for each agent, got none for robot_2"):
         env.step({"robot_1": (0, 0)})
-    for bad in ((0.0, np.inf), (1.0,), "go", None):
+    for invalid in ((0.0, np.inf), (1.0,), "go", None):
         with pytest.raises(ParameterError, match=r"action of robot_1: expected two finite numbers, got"):
-            env.step({"robot_1": bad})
+            env.step({"robot_1": invalid})
     with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got 0"):
         build_environment(empty, max_cycles=0)
     with pytest.raises(ParameterError, match="unknown part of a task 'map': did you mean 'maps'"):

@@ -53,7 +53,7 @@ class OpenSpaceSeeker:
 
 
 @pytest.mark.parametrize(("controller_class", "min_contacts"), [(Rapf, 0), (Lloyd, 1), (OpenSpaceSeeker, 0)])
-def test_a_controller_in_an_environment_has_the_record_of_its_run(
+def test_a_controller_as_a_policy_has_the_record_of_its_run(
     cluttered: Environment, controller_class: Any, min_contacts: int
 ) -> None:
     """Every state and force of `Simulation.run`, bit for bit, contacts with walls included."""
@@ -75,13 +75,13 @@ def test_a_controller_in_an_environment_has_the_record_of_its_run(
 
 
 def test_a_controller_as_a_policy_of_velocities_has_nearly_the_same_run(cluttered: Environment) -> None:
-    """Velocities give its forces up to rounding."""
+    """Forces computed from velocities differ only by rounding."""
     env = CoverageEnv(maps=cluttered, robots=3, repeat=1, duration=2.0, lattice=8, action="velocity")
     env.reset(options={"start": "corner", "start_seed": 3})
     expert = ControllerPolicy(Rapf())
-    over = False
-    while not over:
-        over = env.step(expert(env))[3]
+    truncated = False
+    while not truncated:
+        truncated = env.step(expert(env))[3]
     expected = Simulation(cluttered, Rapf(), cluttered.start("corner").sample(3, seed=3)).run(2.0)
     np.testing.assert_allclose(env.episode.simulation.positions, expected.positions[-1], atol=1e-9)
 
@@ -94,7 +94,8 @@ def test_a_policy_repeats_its_actions_and_restarts_with_each_episode(cluttered: 
         env.reset(seed=seed)
         first = expert(env)
         first[:] = 0.0  # The caller may change the actions.
-        assert expert(env).any() and np.array_equal(expert(env), other(env))
+        assert expert(env).any()
+        assert np.array_equal(expert(env), other(env))
         env.step(expert(env))
         assert np.array_equal(expert(env), other(env))
 
@@ -188,7 +189,8 @@ def test_actions_are_held_for_a_period(empty: Environment) -> None:
 
     simulation = Simulation(empty, PolicyController(act, period=0.25), [[2.0, 2.0]], dt=0.01)
     simulation.run(1.0)
-    assert len(observed) == 5 and len(set(observed)) == 5
+    assert len(observed) == 5
+    assert len(set(observed)) == 5
 
 
 POLICY_MODULE = '''
@@ -215,22 +217,12 @@ class Outwards(PolicyController):
 def test_the_command_line_accepts_a_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(POLICY_MODULE)
     name = f"{tmp_path / 'mine.py'}:Outwards"
-    command = [
-        "run",
-        "square",
-        "--controller",
-        name,
-        "--duration",
-        "2",
-        "--lattice",
-        "16",
-        "--robots",
-        "3",
-        "--json",
-    ]
-    assert main([*command, "--set", "period=0.2", "--out", str(tmp_path / "out")]) == 0
-    run = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert run["controller"]["name"] == name and run["controller"]["gains"] == {"period": 0.2}
+    options = "--robots 3 --duration 2 --lattice 16 --set period=0.2 --json".split()
+    out = tmp_path / "out"
+    assert main(["run", "square", "--controller", name, *options, "--out", str(out)]) == 0
+    run = json.loads((out / "run.json").read_text())
+    assert run["controller"]["name"] == name
+    assert run["controller"]["gains"] == {"period": 0.2}
     policy_class = type(make_controller(name))
     assert policy_class.name == policy_class.label == "Outwards"
     assert policy_class.summary == "a policy that was learned"

@@ -11,15 +11,17 @@ from robocov_app.learning import CoverageTask
 from robocov_app.learning.task import change_task
 
 
-def test_times() -> None:
+def test_the_period_and_the_number_of_cycles_follow_from_the_times() -> None:
     task = CoverageTask(duration=10.0, dt=0.05, repeat=4)
-    assert task.period == pytest.approx(0.2) and task.cycles == 50
+    assert task.period == pytest.approx(0.2)
+    assert task.cycles == 50
     assert CoverageTask().cycles == 600
 
 
-def test_the_team_goes_before_the_number() -> None:
+def test_a_team_takes_precedence_over_the_number_of_robots() -> None:
     task = CoverageTask(robots=9, team=Team.homogeneous(3, max_speed=0.5))
-    assert task.robots == 3 and task.agents == ["robot_1", "robot_2", "robot_3"]
+    assert task.robots == 3
+    assert task.agents == ["robot_1", "robot_2", "robot_3"]
     assert len(change_task(task, {"robots": 5}).whole_team) == 5
     assert change_task(task, {"duration": 5.0}).team is task.team
     assert change_task(None, {"robots": 2}).robots == 2
@@ -50,11 +52,11 @@ def test_the_team_goes_before_the_number() -> None:
         ),
     ],
 )
-def test_what_makes_no_sense(values: dict[str, Any], message: str) -> None:
+def test_invalid_values_are_rejected(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         CoverageTask(**values)
 
 
-def test_an_unknown_part() -> None:
+def test_unknown_names_of_values_are_rejected() -> None:
     with pytest.raises(ParameterError, match="unknown part of a task 'robot': did you mean 'robots'"):
         change_task(None, {"robot": 6})

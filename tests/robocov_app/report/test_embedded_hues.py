@@ -1,4 +1,4 @@
-"""Neighboring cells differ at every moment of a replay, in teams of any size."""
+"""Neighboring cells have different hues at every frame of a replay, in teams of any size."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,14 @@ def embed(robots: int, **settings) -> tuple:
 
 
 @pytest.mark.parametrize("robots", [12, 20, 30])
-def test_no_two_neighbors_share_a_hue_at_any_moment(robots) -> None:
+def test_neighbors_never_share_a_hue(robots) -> None:
     record, data = embed(robots)
     assert data["count"] > 20
     hues = list_hues(data["hues"], range(data["count"]))
-    for moment, hue in enumerate(np.array(hues)):
-        assert hue.min() >= 0 and hue.max() < N_SHARED_HUES
-        time = min(moment * data["step"], data["end"])
+    for frame, hue in enumerate(np.array(hues)):
+        assert hue.min() >= 0
+        assert hue.max() < N_SHARED_HUES
+        time = min(frame * data["step"], data["end"])
         for later in (time, min(time + 0.5 * data["step"], data["end"])):
             positions = np.array(
                 [
@@ -36,11 +37,11 @@ def test_no_two_neighbors_share_a_hue_at_any_moment(robots) -> None:
             )
             first, second = partition(positions, record.environment.region).adjacency.T
             shared = hue[first] == hue[second]
-            # Between two moments a pair can meet for less than a step. At the moments themselves none does.
+            # Between two frames, one pair may become neighbors for less than a step.
             assert not shared.any() or (later > time and shared.sum() <= 1)
 
 
-def test_hues_change_seldom() -> None:
+def test_hues_rarely_change() -> None:
     _, data = embed(30)
     assert len(data["hues"]["changes"]) < 0.1 * 30 * data["count"]
 
@@ -50,7 +51,7 @@ def test_small_teams_have_a_hue_for_each_robot() -> None:
     assert data["hues"] == {"first": list(range(MAX_OWN_HUES)), "changes": []}
 
 
-def test_robots_that_do_not_work_have_no_cell() -> None:
+def test_failed_robots_have_no_cell() -> None:
     record = build_moving_record(12)
     positions = record.positions[::5].copy()
     working = np.ones(positions.shape[:2], dtype=bool)

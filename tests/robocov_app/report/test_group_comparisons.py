@@ -75,7 +75,7 @@ def test_there_is_no_comparison_without_pairs() -> None:
     assert compare([build_run(error="no")]) == []
 
 
-def test_the_headline_does_not_hide_that_maps_disagree() -> None:
+def test_the_headline_counts_maps_with_different_verdicts() -> None:
     ratios = {"a": 0.8, "b": 0.85, "museum": 1.3, "c": 1.0, "d": 0.7}
     (comparison,) = compare(build_pairs(ratios))
     for pairs in comparison.maps:
@@ -86,7 +86,7 @@ def test_the_headline_does_not_hide_that_maps_disagree() -> None:
     assert headline.endswith(" over 5 maps.")
 
 
-def test_every_map_counts_the_same() -> None:
+def test_all_maps_have_the_same_weight() -> None:
     (comparison,) = compare(build_pairs({"a": 0.8, "b": 0.85, "museum": 1.3, "c": 1.0, "d": 0.7}))
     effects = [np.log(pairs.ratio.estimate) for pairs in comparison.maps]
     check_limits(comparison.ratio, bootstrap(effects, "mean"))
@@ -148,8 +148,8 @@ def test_many_groups_are_compared_with_the_first() -> None:
 
 
 @pytest.mark.parametrize("maps", [1, 6])
-def test_gains_are_not_compared_on_the_runs_that_they_were_chosen_on(maps: int) -> None:
-    # The controllers are equal, and the gains have no effect, so that the best ones are only lucky.
+def test_gains_are_chosen_and_compared_on_different_runs(maps: int) -> None:
+    # The controllers are equal, and the gains have no effect, so that the best gains are best by chance.
     rng = np.random.default_rng(3)
     effects = []
     for _ in range(40):

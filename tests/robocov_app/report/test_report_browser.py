@@ -1,4 +1,4 @@
-"""The report in a real browser: the replay, the keyboard, the large pictures, dark, print, telephones."""
+"""The report in a browser: replay, keyboard, enlarged images, dark theme, print and narrow screens."""
 
 import base64
 import os
@@ -39,22 +39,22 @@ ENTRIES = [
     for name, base in (("rapf", 1.5), ("rpf", 3.0))
 ]
 
-READABLE = """
+FIND_LOW_CONTRAST = """
 function channels(code) { return code.match(/[\\d.]+/g).map(Number); }
-function light(code) {
+function luminance(code) {
   const [r, g, b] = channels(code).slice(0, 3).map((c) => c / 255)
     .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
-function ground(element) {
+function findBackground(element) {
   for (let e = element; e; e = e.parentElement) {
     const { backgroundColor: color } = getComputedStyle(e);
     if ((channels(color)[3] ?? 1) === 1 && color !== "transparent") return color;
   }
   return "rgb(255, 255, 255)";
 }
-const bad = [];
-let looked = 0;
+const failures = [];
+let checked = 0;
 const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
 while (walker.nextNode()) {
   const element = walker.currentNode.parentElement;
@@ -62,21 +62,21 @@ while (walker.nextNode()) {
   if (!walker.currentNode.textContent.trim() || element.closest("script, style")) continue;
   if (!element.checkVisibility({ visibilityProperty: true })) continue;
   const ink = element.ownerSVGElement ? style.fill : style.color;
-  let below = ground(element);
-  // numbers of robots stand on their discs
+  let below = findBackground(element);
+  // Numbers of robots are on their discs.
   if (element.closest(".robocov-picture")) below = style.getPropertyValue("--rc-final");
   if (below.startsWith("#")) below = below.match(/[0-9a-f]{2}/g).map((x) => parseInt(x, 16)).join(",");
-  const [low, high] = [light(ink), light(below)].sort((a, b) => a - b);
-  looked += 1;
-  if ((high + 0.05) / (low + 0.05) < 4.5) bad.push([element.outerHTML.slice(0, 120), ink, below]);
+  const [low, high] = [luminance(ink), luminance(below)].sort((a, b) => a - b);
+  checked += 1;
+  if ((high + 0.05) / (low + 0.05) < 4.5) failures.push([element.outerHTML.slice(0, 120), ink, below]);
 }
-return [looked, bad];
+return [checked, failures];
 """
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    # its own manager, which would ask the network, has nothing to do
+    # Without this, Selenium would look for drivers in the network.
     os.environ["SE_OFFLINE"] = "true"
     shared = Browser(tmp_path_factory.mktemp("profile"))
     try:
@@ -109,13 +109,14 @@ def test_a_page_opens_without_errors_or_requests(browser, page, tmp_path) -> Non
     assert browser.read_console() == []
     assert browser.run_script("return performance.getEntriesByType('resource').length") == 0
     assert [box.text for box in browser.find_all(".facts strong")] == ["1.500 m", "3.000 m"]
-    names = "return Object.getOwnPropertyNames(window)"
-    before = browser.run_script(names)
+    list_names = "return Object.getOwnPropertyNames(window)"
+    names = browser.run_script(list_names)
     empty = tmp_path / "empty.html"
     empty.write_text("<!doctype html><p>nothing")
     browser.open_file(empty)
-    ours = {name for name in set(before) - set(browser.run_script(names)) if not name.startswith("se_")}
-    assert not ours  # no global name but the driver's
+    added_names = set(names) - set(browser.run_script(list_names))
+    # Names that begin with "se_" belong to the driver.
+    assert not {name for name in added_names if not name.startswith("se_")}
 
 
 def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
@@ -127,14 +128,16 @@ def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
     opened.find(".main").click()
     opened.wait_until(lambda: not opened.is_playing)
     after = opened.read_canvases()
-    at = opened.time
-    assert len(after) == 3 and all(old != new for old, new in zip(before, after, strict=True))
+    paused_at = opened.time
+    assert len(after) == 3
+    assert all(old != new for old, new in zip(before, after, strict=True))
     time.sleep(0.2)
-    assert opened.time == at and opened.read_canvases() == after
+    assert opened.time == paused_at
+    assert opened.read_canvases() == after
 
 
-def test_it_ends_and_begins_again(opened) -> None:
-    assert opened.time == SECONDS  # it shows the end first
+def test_playing_restarts_from_the_end(opened) -> None:
+    assert opened.time == SECONDS  # The end is shown first.
     opened.find(".main").click()
     opened.wait_until(lambda: 0.0 < opened.time < SECONDS)
     opened.run_script("const list = document.querySelector('.speed select'); list.value = '16'")
@@ -146,7 +149,7 @@ def test_it_ends_and_begins_again(opened) -> None:
 @pytest.mark.parametrize("seconds", [0.0, 2.4, 6.0])
 def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
     opened.seek(seconds)
-    places = opened.run_script(
+    canvas_sizes = opened.run_script(
         "return [...document.querySelectorAll('.pane > canvas')].map((c) => [c.width, c.height])"
     )
     for pane, (name, final) in enumerate((("rapf", 1.5), ("rpf", 3.0))):
@@ -154,14 +157,14 @@ def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
         history = build_history(record, final)
         cost = np.interp(seconds, history.time, history.mean_distance)
         assert float(opened.find_all(".facts strong")[pane].text.split()[0]) == pytest.approx(cost, abs=2e-3)
-        moment = round(seconds * 10)
-        width, height = places[pane]
+        step = round(seconds * 10)
+        width, height = canvas_sizes[pane]
         zoom = min((width - 4) / 16, (height - 4) / 10)
-        for x, y in record.positions[moment]:
+        for x, y in record.positions[step]:
             column = (width - zoom * 16) / 2 + x * zoom
             row = (height - zoom * 10) / 2 + (10 - y) * zoom
-            others = np.hypot(*(record.positions[moment] - (x, y)).T)
-            if np.sort(others)[1] * zoom > 24:  # left of its number, where nobody hides it
+            others = np.hypot(*(record.positions[step] - (x, y)).T)
+            if np.sort(others)[1] * zoom > 24:  # left of the number, if no other robot is close
                 assert opened.read_pixel(pane, column - 7, row) == LIGHT.final
 
 
@@ -177,11 +180,11 @@ def test_a_click_on_the_curves_seeks_to_that_time(opened) -> None:
     assert 0.5 < first < opened.time < SECONDS
 
 
-def test_everything_can_be_done_with_the_keyboard(opened) -> None:
+def test_keys_seek_play_and_pause(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
     opened.run_script("document.querySelector('.stage').focus()")
-    scrolled = opened.run_script("return scrollY")
+    scroll_position = opened.run_script("return scrollY")
     opened.press_keys(Keys.HOME)
     assert opened.time == 0.0
     opened.press_keys(Keys.ARROW_RIGHT)
@@ -197,8 +200,8 @@ def test_everything_can_be_done_with_the_keyboard(opened) -> None:
     assert not opened.is_playing
     opened.press_keys(Keys.END)
     assert opened.time == SECONDS
-    assert opened.run_script("return scrollY") == scrolled  # the page has stayed where it was
-    # what a list of runs does with keys is its own business
+    assert opened.run_script("return scrollY") == scroll_position
+    # Keys in a list of runs do not seek.
     opened.run_script("document.querySelector('.pane select').focus()")
     opened.press_keys(".")
     assert opened.time == SECONDS
@@ -226,8 +229,18 @@ def test_controls_have_names(opened) -> None:
     roles: dict[str, int] = {}
     for node in tree:
         role = node.get("role", {}).get("value")
-        wanted = ("button", "checkbox", "combobox", "slider", "link", "region", "navigation", "image", "img")
-        if role in wanted and not node["ignored"]:
+        control_roles = (
+            "button",
+            "checkbox",
+            "combobox",
+            "slider",
+            "link",
+            "region",
+            "navigation",
+            "image",
+            "img",
+        )
+        if role in control_roles and not node["ignored"]:
             roles[role] = roles.get(role, 0) + 1
             assert node.get("name", {}).get("value"), node
     assert roles["slider"] == 1 and roles["checkbox"] == 3 and roles["combobox"] == 3
@@ -235,22 +248,24 @@ def test_controls_have_names(opened) -> None:
 
 
 def test_the_time_is_announced_only_when_paused(opened) -> None:
-    said = "return document.querySelector('.said').textContent"
+    read_announcement = "return document.querySelector('.said').textContent"
     opened.seek(3.0)
     opened.wait_until(
-        lambda: opened.run_script(said).startswith("At 3.0 s: RAPF: mean distance to the nearest robot")
+        lambda: opened.run_script(read_announcement).startswith(
+            "At 3.0 s: RAPF: mean distance to the nearest robot"
+        )
     )
     opened.run_script(
-        "window.told = 0; new MutationObserver(() => { window.told += 1; })"
+        "window.announcements = 0; new MutationObserver(() => { window.announcements += 1; })"
         ".observe(document.querySelector('.said'), {childList: true, characterData: true, subtree: true})"
     )
-    # by the page itself: on a slow machine it would have ended before a second click came from here
+    # The page clicks itself: on a slow machine, the replay might end before a second click from here.
     opened.run_script(
         "const main = document.querySelector('.main'), at = document.querySelector('.transport input');"
         "const stop = () => { if (Number(at.value) < 3.1) { requestAnimationFrame(stop); return; }"
-        "window.running = window.told; main.click(); }; main.click(); stop()"
+        "window.running = window.announcements; main.click(); }; main.click(); stop()"
     )
-    opened.wait_until(lambda: opened.run_script("return window.told") == 1)
+    opened.wait_until(lambda: opened.run_script("return window.announcements") == 1)
     assert opened.run_script("return window.running") == 0
     label = opened.find(".pane > canvas").get_attribute("aria-label")
     assert "RAPF" in label and "4 robots" in label and f"{opened.time:.1f} s" in label
@@ -277,7 +292,7 @@ def test_panes_are_added_changed_and_removed(opened) -> None:
     assert opened.read_console() == []
 
 
-def test_a_picture_opens_large_and_the_focus_comes_back(opened) -> None:
+def test_an_enlarged_image_returns_the_focus_when_closed(opened) -> None:
     from selenium.webdriver.common.keys import Keys
 
     opened.run_script("document.querySelectorAll('.thumbnails button')[2].focus()")
@@ -286,18 +301,19 @@ def test_a_picture_opens_large_and_the_focus_comes_back(opened) -> None:
     opened.wait_until(dialog.is_displayed)
     assert opened.has_focus("dialog .remove")
     title = opened.find("dialog h2").text
-    drawn = "return document.querySelector('dialog canvas').toDataURL()"
-    before = opened.run_script(drawn)
+    read_image = "return document.querySelector('dialog canvas').toDataURL()"
+    before = opened.run_script(read_image)
     assert opened.find("dialog canvas").size["width"] > 600
     opened.press_keys(Keys.ARROW_LEFT)
-    assert opened.find("dialog h2").text != title and opened.run_script(drawn) != before
+    assert opened.find("dialog h2").text != title
+    assert opened.run_script(read_image) != before
     assert "Mean distance 3.000 m after 6.0 s." in opened.find("dialog .facts").text
     opened.press_keys(Keys.ESCAPE)
     opened.wait_until(lambda: not dialog.is_displayed())
     assert opened.run_script("return document.activeElement.dataset.run") == "2"
 
 
-def test_a_large_picture_can_be_watched(opened) -> None:
+def test_the_run_of_an_enlarged_image_can_be_replayed(opened) -> None:
     opened.run_script("document.querySelectorAll('.thumbnails button')[3].click()")
     opened.find(".watch-run").click()
     opened.wait_until(lambda: len(opened.find_all(".pane")) == 3)
@@ -306,35 +322,36 @@ def test_a_large_picture_can_be_watched(opened) -> None:
 
 
 @pytest.mark.parametrize(("scheme", "theme"), [("light", LIGHT), ("dark", DARK)])
-def test_light_and_dark_follow_the_reader_and_can_be_read(browser, page, scheme, theme) -> None:
+def test_colors_follow_the_preferred_scheme_and_are_legible(browser, page, scheme, theme) -> None:
     browser.open_file(page, color_scheme=scheme)
-    ground = browser.run_script("return getComputedStyle(document.documentElement).backgroundColor")
-    assert ground == f"rgb({', '.join(map(str, theme.background))})"
-    looked, bad = browser.run_script(READABLE)
-    assert looked > 150 and bad == []
-    # a reader who changes the preference sees it at once, in what is drawn as well
+    background = browser.run_script("return getComputedStyle(document.documentElement).backgroundColor")
+    assert background == f"rgb({', '.join(map(str, theme.background))})"
+    checked, failures = browser.run_script(FIND_LOW_CONTRAST)
+    assert checked > 150
+    assert failures == []
+    # A change of the preference takes effect at once, on canvases as well.
     other = {"light": "dark", "dark": "light"}[scheme]
     before = browser.read_canvases()
     browser.set_preferences(color_scheme=other)
     browser.wait_until(lambda: browser.read_canvases() != before)
 
 
-def test_it_prints_without_controls(browser, page) -> None:
+def test_controls_are_not_printed(browser, page) -> None:
     browser.open_file(page, color_scheme="dark")
     pdf = browser.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     content = base64.b64decode(pdf["data"])
-    assert (
-        content.startswith(b"%PDF")
-        and 1 <= content.count(b"/Type /Page\n") + content.count(b"/Type /Page ") <= 12
-    )
+    assert content.startswith(b"%PDF")
+    pages = content.count(b"/Type /Page\n") + content.count(b"/Type /Page ")
+    assert 1 <= pages <= 12
     browser.set_preferences("print", color_scheme="dark")
     shown = browser.run_script(
         "return ['.live', '.stills', 'nav', '.keys']"
         ".map((name) => document.querySelector(name).checkVisibility())"
     )
     assert shown == [False, True, False, False]
-    looked, bad = browser.run_script(READABLE)
-    assert looked > 100 and bad == []
+    checked, failures = browser.run_script(FIND_LOW_CONTRAST)
+    assert checked > 100
+    assert failures == []
     browser.set_preferences()
 
 
@@ -344,12 +361,15 @@ def test_no_element_overflows_at_any_width(browser, page, width) -> None:
     browser.wait_until(lambda: browser.find_all(".pane"))
     assert browser.run_script("return document.documentElement.scrollWidth") <= width
     browser.run_script("document.querySelector('.thumbnails button').click()")
-    inside = browser.run_script(
+    left, right, canvas_left, canvas_right = browser.run_script(
         "const box = document.querySelector('dialog').getBoundingClientRect();"
         "const canvas = document.querySelector('dialog canvas').getBoundingClientRect();"
         "return [box.left, box.right, canvas.left - box.left, box.right - canvas.right]"
     )
-    assert inside[0] >= 0 and inside[1] <= width and inside[2] >= 0 and inside[3] >= 0
+    assert left >= 0
+    assert right <= width
+    assert canvas_left >= 0
+    assert canvas_right >= 0
     assert browser.read_console() == []
 
 
@@ -379,7 +399,7 @@ def test_hostile_names_have_no_effect(browser, tmp_path) -> None:
     assert browser.find("dialog h2").text.startswith("</script>")
 
 
-def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
+def test_replays_in_one_notebook_are_independent(browser, tmp_path) -> None:
     runs = [ReplayRun(build_record(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
     cells = "".join(f"<section>{build_replay_html([run])}</section>" for run in runs)
     path = tmp_path / "notebook.html"
@@ -389,30 +409,31 @@ def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
     browser.open_file(path)
     assert browser.read_console() == []
     assert [each.text for each in browser.find_all(".head strong")] == ["run 0", "run 1"]
-    ground = browser.run_script(
+    background = browser.run_script(
         "return getComputedStyle(document.querySelector('.robocov-replay')).backgroundColor"
     )
-    assert ground == f"rgb({', '.join(map(str, DARK.background))})"
+    assert background == f"rgb({', '.join(map(str, DARK.background))})"
     before = browser.read_canvases()
     browser.seek(0.0)
     after = browser.read_canvases()
-    assert before[0] != after[0] and before[2:] == after[2:]  # only the first one went back
-    assert not browser.find_all(".chart")[0].is_displayed()  # without a cost there are no curves
+    assert before[0] != after[0]
+    assert before[2:] == after[2:]  # Only the first replay seeks.
+    assert not browser.find_all(".chart")[0].is_displayed()  # Without a cost there are no curves.
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5, 40])
 def test_cells_are_voronoi_cells(browser, robots) -> None:
     record = build_record(robots=robots, seed=robots)
-    places = record.positions[0]
+    positions = record.positions[0]
     if robots == 5:
-        places[4] = places[3]  # two in one place have the same cell
+        positions[4] = positions[3]  # Two robots at one position share a cell.
     script = read_asset("arena.js") + (
         "const [region, places] = arguments;"
         "return Array.from({length: places.length / 2}, (_, i) => cellOf(region, places, i))"
     )
-    cells = browser.run_script(script, ROOMS.region.vertices.ravel().tolist(), places.ravel().tolist())
-    wanted = partition(places, ROOMS.region)
-    for cell, mass in zip(cells, wanted.masses, strict=True):
+    cells = browser.run_script(script, ROOMS.region.vertices.ravel().tolist(), positions.ravel().tolist())
+    expected = partition(positions, ROOMS.region)
+    for cell, mass in zip(cells, expected.masses, strict=True):
         x, y = np.array(cell).reshape(-1, 2).T
         area = 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
         assert area == pytest.approx(mass, rel=1e-9)
@@ -447,9 +468,9 @@ def test_robots_that_fail_are_crossed_out_and_late_robots_appear(browser, tmp_pa
         + "return [times.map((time) => run.statesAt(time)), run.events.map(({said}) => said)]"
     )
     data = embed_run(run, 0, choose_controller_styles(["rapf"])["rapf"], 5.0, include_goals=True)
-    states, said = browser.run_script(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
+    states, events = browser.run_script(script, {**data, "plan": embed_map(ROOMS)}, [0.0, 2.0, 3.9, 4.0])
     assert states == [[1, 1, 0, 1], [1, 2, 0, 1], [1, 2, 0, 1], [1, 2, 1, 1]]
-    assert said == ["robot 2 fails", "robot 3 joins"]
+    assert events == ["robot 2 fails", "robot 3 joins"]
     assert browser.read_console() == []
 
 
@@ -485,17 +506,17 @@ def test_the_page_has_the_hues_of_the_data(browser, robots) -> None:
         + "const [data, times] = arguments; const run = new Run(data, new ArenaMap(data.plan, () => {}));"
         + "return times.map((time) => run.huesAt(time))"
     )
-    moments = [0, 1, data["count"] // 2, data["count"] - 1]
-    times = [min(moment * data["step"], data["end"]) for moment in moments]
+    frames = [0, 1, data["count"] // 2, data["count"] - 1]
+    times = [min(frame * data["step"], data["end"]) for frame in frames]
     shown = browser.run_script(script, {**data, "plan": embed_map(record.environment)}, times)
-    assert shown == list_hues(data["hues"], moments)
+    assert shown == list_hues(data["hues"], frames)
 
 
 ULP = float(np.spacing(2.0))
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "wanted"),
+    ("low", "high", "expected"),
     [
         (0.0, 60.0, [0, 20, 40, 60]),
         (-0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1]),
@@ -504,13 +525,13 @@ ULP = float(np.spacing(2.0))
         (0.0, 1e300, [k * 2e299 for k in range(6)]),
     ],
 )
-def test_ticks_are_few_whatever_they_span(browser, low, high, wanted) -> None:
+def test_axes_have_round_ticks(browser, low, high, expected) -> None:
     script = read_asset("arena.js") + read_asset("chart.js") + "return roundTicks(...arguments)"
-    assert browser.run_script(script, low, high, 5, TICK_FACTORS) == pytest.approx(wanted)
+    assert browser.run_script(script, low, high, 5, TICK_FACTORS) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("values", [(2.0, 2.0 + ULP), (2.0, 2.0), (-0.0, 0.0), (1e-3, 1e300), (np.nan, 2.0)])
-def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
+def test_curves_with_extreme_values_do_not_stop_the_page(browser, tmp_path, values) -> None:
     result = build_recorded_result([build_run(), build_run("rpf")], seconds=2.0)
     for folder, saved in result.loaded.items():
         time = saved.history.time
@@ -521,18 +542,19 @@ def test_no_curve_freezes_the_page(browser, tmp_path, values) -> None:
     browser.open_file(path)
     browser.wait_until(lambda: browser.find_all(".pane"))
     browser.seek(1.0)
-    assert browser.read_console() == [] and len(browser.read_canvases()) == 3
+    assert browser.read_console() == []
+    assert len(browser.read_canvases()) == 3
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_no_name_is_too_long_for_a_page(browser, tmp_path, width) -> None:
+def test_long_names_do_not_widen_the_page(browser, tmp_path, width) -> None:
     name = "W" * 300
     runs = [
         replace(
-            build_run(own, seed, 2.0, map_name=f"{name}{m}", start=name, gains=((name, 1.0 + seed),)),
-            label=own,
+            build_run(controller, seed, 2.0, map_name=f"{name}{m}", start=name, gains=((name, 1.0 + seed),)),
+            label=controller,
         )
-        for own in (f"{name}1", f"{name}2")
+        for controller in (f"{name}1", f"{name}2")
         for m in range(2)
         for seed in range(3)
     ]

@@ -1,4 +1,4 @@
-"""`robocov report`: from folders to a file."""
+"""`robocov report` writes a page about the results in folders."""
 
 import json
 import os
@@ -23,52 +23,52 @@ def run(tmp_path: Path) -> Path:
     return tmp_path / "one"
 
 
-def test_a_page_is_in_the_folder_of_the_run(run, capsys) -> None:
+def test_the_page_is_saved_in_the_folder_of_the_run(run, capsys) -> None:
     assert main(["report", str(run)]) == 0
-    said = capsys.readouterr()
-    assert said.out.splitlines()[0] == f"{run}: run"
+    output = capsys.readouterr()
+    assert output.out.splitlines()[0] == f"{run}: run"
     assert is_report(run / "report.html")
     before = (run / "report.html").read_bytes()
-    assert main(["report", str(run)]) == 0  # an earlier one is replaced without a word
+    assert main(["report", str(run)]) == 0  # An earlier report is replaced.
     assert (run / "report.html").read_bytes() == before
 
 
-def test_the_answer_as_json(run, tmp_path, capsys) -> None:
+def test_a_summary_is_printed_as_json(run, tmp_path, capsys) -> None:
     save_comparison(tmp_path / "both")
     out = tmp_path / "page.html"
-    said = read_json(
-        capsys, "report", str(run), str(tmp_path / "both"), "--out", str(out), "--title", "<Two>"
-    )
-    assert said["path"] == str(out) and said["bytes"] == out.stat().st_size
-    assert [(each["kind"], each["runs"], each["shown"]) for each in said["results"]] == [
+    options = ("--out", str(out), "--title", "<Two>")
+    summary = read_json(capsys, "report", str(run), str(tmp_path / "both"), *options)
+    assert summary["path"] == str(out)
+    assert summary["bytes"] == out.stat().st_size
+    assert [(each["kind"], each["runs"], each["shown"]) for each in summary["results"]] == [
         ("run", 1, 1),
         ("comparison", 2, 2),
     ]
-    assert {each["failed"] + each["missing"] for each in said["results"]} == {0}
+    assert {each["failed"] + each["missing"] for each in summary["results"]} == {0}
     assert "<title>&lt;Two&gt; – robocov</title>" in out.read_text()
 
 
 def test_foreign_files_are_not_replaced(run, capsys) -> None:
     (run / "report.html").write_text("mine")
-    said = read_error(capsys, "report", str(run))
-    assert said.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
+    message = read_error(capsys, "report", str(run))
+    assert message.startswith(f"{run / 'report.html'}: the file is not a report of robocov")
     assert (run / "report.html").read_text() == "mine"
     assert main(["report", str(run), "--overwrite", "--theme", "dark"]) == 0
     assert is_report(run / "report.html")
 
 
-def test_a_report_is_replaced_with_its_results_unlike_foreign_files(run) -> None:
+def test_overwriting_results_removes_reports_but_no_foreign_files(run) -> None:
     assert main(["report", str(run)]) == 0
     save_run(run / "again", build_record(SQUARE, robots=2, seconds=1.0))
     (run / "again" / "report.html").write_text("mine")
-    for folder, left in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
+    for folder, remaining in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
         with create_result(folder, overwrite=True) as result:
             (result.staging / "run.json").write_text("{}")
-        assert sorted(path.name for path in folder.glob("[!.]*")) == left
+        assert sorted(path.name for path in folder.glob("[!.]*")) == remaining
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (["nothing"], "nothing: folder not found"),
         (["."], ".: not the folder of a run, a comparison or a sweep"),
@@ -77,18 +77,18 @@ def test_a_report_is_replaced_with_its_results_unlike_foreign_files(run) -> None
         ([], "DIR"),
     ],
 )
-def test_bad_input_is_named(run, tmp_path, monkeypatch, capsys, words, message) -> None:
+def test_invalid_arguments_are_rejected(run, tmp_path, monkeypatch, capsys, arguments, message) -> None:
     monkeypatch.chdir(tmp_path)
-    if words:
-        assert message in read_error(capsys, "report", *words)
+    if arguments:
+        assert message in read_error(capsys, "report", *arguments)
     else:
         assert main(["report"]) == 2
         assert message in capsys.readouterr().err
     assert list(tmp_path.rglob("*.html")) == []
 
 
-@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_to_is_named(run, capsys) -> None:
+@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() == 0, reason="root may write to every folder")
+def test_a_folder_without_write_permission_is_reported(run, capsys) -> None:
     run.chmod(0o500)
     try:
         assert "cannot be written" in read_error(capsys, "report", str(run))
@@ -101,14 +101,15 @@ def test_the_page_contains_no_paths_of_the_machine(run) -> None:
     assert str(run.parent) not in (run / "report.html").read_text()
 
 
-def test_help_loads_nothing_heavy() -> None:
+def test_the_help_imports_no_large_packages() -> None:
     script = (
         "import sys\nfrom robocov_app.cli import main\nmain(['report', '--help'])\n"
         "print('LOADED', ' '.join(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    said, _, loaded = done.stdout.partition("LOADED")
-    assert "Example: robocov report" in said and re.search(r"--theme \{auto,light,dark\}", said)
+    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    help_text, _, loaded = process.stdout.partition("LOADED")
+    assert "Example: robocov report" in help_text
+    assert re.search(r"--theme \{auto,light,dark\}", help_text)
     assert not set(loaded.split()) & {"matplotlib", "jinja2", "pyarrow", "pygame", "scipy"}
 
 
@@ -118,24 +119,25 @@ def test_an_unfinished_comparison_is_reported(tmp_path, capsys) -> None:
     content = json.loads((tmp_path / "both/comparison.json").read_text())
     content |= {"folders": ["rapf", "rpf", "lloyd"], "runs": []}
     (tmp_path / "both/comparison.json").write_text(json.dumps(content))
-    said = read_json(capsys, "report", str(tmp_path / "both"))
-    assert said["results"][0]["missing"] == 1
+    summary = read_json(capsys, "report", str(tmp_path / "both"))
+    assert summary["results"][0]["missing"] == 1
     assert "Not finished: 1 of 3 runs is missing." in (tmp_path / "both/report.html").read_text()
 
 
 @pytest.mark.slow
-def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
+def test_damaged_runs_are_skipped_and_reported(run, tmp_path, capsys) -> None:
     save_comparison(tmp_path / "both")
     (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both")]) == 0
-    said = capsys.readouterr()
-    assert f"robocov: warning: {tmp_path / 'both'}: rpf is skipped: " in said.err
+    errors = capsys.readouterr().err
+    assert f"robocov: warning: {tmp_path / 'both'}: rpf is skipped: " in errors
     page = (tmp_path / "both/report.html").read_text()
     assert "1 run cannot be read and is left out: rpf (" in page
     assert "Runs that failed or cannot be read" in page
-    told = read_json(capsys, "report", str(tmp_path / "both"))["results"][0]
-    assert (told["runs"], told["damaged"][0]["folder"], told["missing"]) == (1, "rpf", 0)
-    # beside another result that is whole, one that is not is named, too
+    summary = read_json(capsys, "report", str(tmp_path / "both"))["results"][0]
+    assert (summary["runs"], summary["missing"]) == (1, 0)
+    assert summary["damaged"][0]["folder"] == "rpf"
+    # A damaged run next to another result is skipped as well.
     (run / "record.npz").write_bytes(b"PK")
     assert main(["report", str(tmp_path / "both"), str(run)]) == 0
     assert "one is skipped: " in capsys.readouterr().err
@@ -143,26 +145,29 @@ def test_one_damaged_run_is_named_and_left_out(run, tmp_path, capsys) -> None:
 
 def test_without_readable_runs_nothing_is_written(run, capsys) -> None:
     (run / "record.npz").write_bytes(b"PK")
-    said = read_error(capsys, "report", str(run))
-    assert "no runs remain to report" in said and not (run / "report.html").exists()
+    message = read_error(capsys, "report", str(run))
+    assert "no runs remain to report" in message
+    assert not (run / "report.html").exists()
 
 
 @pytest.mark.slow
-def test_a_reference_is_searched_for_once_and_then_cached(run, tmp_path, monkeypatch, capsys) -> None:
+def test_the_best_placement_is_cached(run, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("robocov_app.report.results.references.RESTARTS", 2)
     page = run / "report.html"
-    assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
+    assert main(["report", str(run)]) == 0
+    assert "above the best" not in page.read_text()
     assert main(["report", str(run), "--optimum"]) == 0
     (above,) = re.findall(r"average, ([\d.]+) % above the best placement known", page.read_text())
     assert float(above) > 0.0
     before = page.read_bytes()
-    monkeypatch.setattr(
-        "robocov_app.report.results.references.find_optimum", None
-    )  # nothing is searched for again
-    assert main(["report", str(run)]) == 0 and page.read_bytes() == before
+    # From now on, a search would fail.
+    monkeypatch.setattr("robocov_app.report.results.references.find_optimum", None)
+    assert main(["report", str(run)]) == 0
+    assert page.read_bytes() == before
     monkeypatch.setenv("ROBOCOV_CACHE", "")
-    assert main(["report", str(run)]) == 0 and "above the best" not in page.read_text()
+    assert main(["report", str(run)]) == 0
+    assert "above the best" not in page.read_text()
     assert "searching" not in capsys.readouterr().err.replace("searching: 1 of 1", "")
 
 

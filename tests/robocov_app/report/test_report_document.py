@@ -1,4 +1,4 @@
-"""The page as a whole: its sections, its size, and that hostile names cannot break it."""
+"""The page as a whole: sections, size, accessibility, and escaping of hostile names."""
 
 import hashlib
 import json
@@ -32,7 +32,7 @@ SWEEP = [
 
 @pytest.fixture(scope="module")
 def html() -> str:
-    """A page of a sweep with gains, failures and missing runs."""
+    """Build the page of a sweep with several gains, failed runs and missing runs."""
     return build_report(
         [replace(build_recorded_result([*SWEEP, build_run("mine", error=HOSTILE)]), expected_count=40)]
     ).html
@@ -61,22 +61,23 @@ def test_the_page_has_landmarks_headings_and_a_skip_link(html) -> None:
         assert "aria-label" in section or "aria-labelledby" in section
 
 
-def test_all_pictures_and_plots_are_described(html) -> None:
+def test_all_images_and_plots_are_described(html) -> None:
     page = Page(html)
-    pictures = page.all("svg")
-    assert len(pictures) > 30
-    for each in pictures:
+    images = page.all("svg")
+    assert len(images) > 30
+    for each in images:
         hidden = each.get("aria-hidden") == "true"
         assert hidden or (each.get("role") == "img" and len(each.get("aria-label") or "") > 20)
-    said = " ".join(each.get("aria-label") or "" for each in pictures)
+    descriptions = " ".join(each.get("aria-label") or "" for each in images)
     for number in (
         "1.430 m at the end (median of 5 runs, quartiles 1.230 to 1.630)",
         "medians at 0.1: 1.430",
     ):
-        assert number in said, number
+        assert number in descriptions, number
     for button in page.all("button"):
         assert "Open large." in button["aria-label"] and "final mean distance" in button["aria-label"]
-    assert not page.all("img") and not page.all("canvas")  # canvases and their words are made by the script
+    assert not page.all("img")
+    assert not page.all("canvas"), "canvases are created by the script"
 
 
 def test_tables_have_captions_and_scopes(html) -> None:
@@ -100,7 +101,7 @@ def test_the_page_needs_no_network(html) -> None:
     assert f"script-src 'sha256-{digest}'" in policy and "unsafe-eval" not in policy
 
 
-def test_hostile_names_stay_names() -> None:
+def test_hostile_names_are_escaped() -> None:
     runs = [
         replace(
             build_run(HOSTILE, seed, 2.0 + seed, map_name=HOSTILE, gains=((HOSTILE, 1.0 + seed),)),
@@ -116,19 +117,18 @@ def test_hostile_names_stay_names() -> None:
     assert not page.all("img")
     assert [each.get("type") for each in page.all("script")] == ["application/json", None]
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
-    assert (
-        data["maps"][0]["name"] == escape_controls(HOSTILE)
-        and escape_controls(HOSTILE) in data["runs"][0]["title"]
-    )
+    assert data["maps"][0]["name"] == escape_controls(HOSTILE)
+    assert escape_controls(HOSTILE) in data["runs"][0]["title"]
     assert escape_controls(HOSTILE) in "".join(page.words)
-    assert "{{7*7}}" in "".join(page.words) and "49" not in re.findall(r"\b49\b", "".join(page.words))
+    assert "{{7*7}}" in "".join(page.words)
+    assert not re.findall(r"\b49\b", "".join(page.words))
 
 
 def test_the_same_results_give_the_same_bytes() -> None:
     runs = [*SWEEP[:4], build_run("mine", error=HOSTILE)]
     first = build_report([build_recorded_result(runs)]).html
-    again = build_report([build_recorded_result(runs)]).html
-    assert again == first
+    second = build_report([build_recorded_result(runs)]).html
+    assert second == first
 
 
 @pytest.mark.slow
@@ -142,7 +142,8 @@ def test_fifty_runs_take_less_than_three_megabytes() -> None:
     assert page.shown == (50,)
     assert len(page.html.encode()) < 3_000_000
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page.html)[1])
-    assert len(data["runs"]) == 50 and data["rate"] >= 2.0
+    assert len(data["runs"]) == 50
+    assert data["rate"] >= 2.0
 
 
 @pytest.mark.slow
@@ -152,21 +153,28 @@ def test_fifty_long_runs_of_large_teams_take_less_than_three_megabytes() -> None
     (saved,) = result.loaded.values()
     loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in runs}
     page = build_report([build_result(runs, loaded=loaded, maps={"rooms": ROOMS})])
-    assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
+    assert page.shown == (50,)
+    assert len(page.html.encode()) < 3_000_000
 
 
 @pytest.mark.slow
-def test_several_results_are_sections_with_ids_of_their_own() -> None:
-    one = build_recorded_result([build_run(), build_run("rpf", final=3.0)])
-    other = build_recorded_result([build_run("lloyd", map_name="hall")], HALL)
+def test_several_results_are_sections_with_unique_ids() -> None:
+    comparison = build_recorded_result([build_run(), build_run("rpf", final=3.0)])
+    run = build_recorded_result([build_run("lloyd", map_name="hall")], HALL)
     page = build_report(
-        [replace(one, kind="comparison"), replace(other, kind="run"), replace(one, kind="comparison")]
+        [
+            replace(comparison, kind="comparison"),
+            replace(run, kind="run"),
+            replace(comparison, kind="comparison"),
+        ]
     )
     parsed = Page(page.html)
     ids = [attributes["id"] for _, attributes in parsed.elements if "id" in attributes]
-    assert len(ids) == len(set(ids)) and page.shown == (2, 1, 2)
+    assert len(ids) == len(set(ids))
+    assert page.shown == (2, 1, 2)
     levels = [int(tag[1]) for tag, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
-    assert levels[:3] == [1, 2, 3] and levels.count(2) == 3
+    assert levels[:3] == [1, 2, 3]
+    assert levels.count(2) == 3
     assert "3 results" in parsed.words
 
 
@@ -177,7 +185,8 @@ def test_empty_sections_are_left_out() -> None:
     assert headings == ["Setup", "Results", "Replay", "Cost over time", "Metrics"]
     failed = build_report([build_result([build_run(error="it broke")])]).html
     assert re.findall(r"<h2[^>]*>([^<]+)", failed) == ["Setup", "Failures"]
-    assert "it broke" in failed and "No run has a result." in failed
+    assert "it broke" in failed
+    assert "No run has a result." in failed
 
 
 def test_a_sweep_has_all_of_its_sections(html) -> None:
@@ -186,38 +195,30 @@ def test_a_sweep_has_all_of_its_sections(html) -> None:
         *("Setup", "Results", "Replay", "Cost over time", "Final cost", "In pairs"),
         *("What the result depends on", "Trajectories", "Failures"),
     ]
-    assert "Not finished: 9 of 40 runs are missing." in html and "1 of 31 runs failed (mine 1 of 1): " in html
-    assert html.count('class="thumbnails"') == 1 and html.count("data-run=") == 30
+    assert "Not finished: 9 of 40 runs are missing." in html
+    assert "1 of 31 runs failed (mine 1 of 1): " in html
+    assert html.count('class="thumbnails"') == 1
+    assert html.count("data-run=") == 30
 
 
 @pytest.mark.parametrize("theme", ["auto", "light", "dark"])
-def test_themes(theme) -> None:
+def test_only_the_automatic_theme_follows_the_preferred_scheme(theme) -> None:
     html = build_report([build_recorded_result([build_run()])], theme=theme).html
     assert ("prefers-color-scheme" in html.partition("</style>")[0]) == (theme == "auto")
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (
-            lambda: build_report([build_recorded_result([build_run()])], theme="sepia"),
-            "unknown theme 'sepia'",
-        ),
-    ],
-)
-def test_an_unknown_theme_is_rejected(call, message) -> None:
-    with pytest.raises(ParameterError) as caught:
-        call()
-    assert message in str(caught.value)
+def test_an_unknown_theme_is_rejected() -> None:
+    with pytest.raises(ParameterError, match="unknown theme 'sepia'"):
+        build_report([build_recorded_result([build_run()])], theme="sepia")
 
 
-def test_failures_are_at_the_top(html) -> None:
-    words = html.partition("<body>")[2]
-    assert words.index("1 of 31 runs failed (mine 1 of 1): ") < words.index("Not finished: 9 of 40")
-    assert words.index("Not finished") < words.index('class="lede"') < words.index("<table")
+def test_failed_and_missing_runs_are_at_the_top(html) -> None:
+    body = html.partition("<body>")[2]
+    assert body.index("1 of 31 runs failed (mine 1 of 1): ") < body.index("Not finished: 9 of 40")
+    assert body.index("Not finished") < body.index('class="lede"') < body.index("<table")
 
 
-def test_variants_have_the_same_marks_and_labels_in_tables_pictures_and_the_replay(html) -> None:
+def test_marks_and_labels_of_variants_are_the_same_everywhere(html) -> None:
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
     styles = {(run["label"], run["style"], run["mark"], str(run["dashes"])) for run in data["runs"]}
     assert len(styles) == 6
@@ -230,13 +231,15 @@ def test_variants_have_the_same_marks_and_labels_in_tables_pictures_and_the_repl
 
 def test_a_long_name_is_shortened_with_a_tooltip() -> None:
     name = "<b>" + "ü" * 297
-    whole = name.replace("<", "&lt;").replace(">", "&gt;")
+    escaped = name.replace("<", "&lt;").replace(">", "&gt;")
     html = build_report(
         [build_recorded_result([build_run(map_name=name)], replace(ROOMS, name=name))], title=name
     ).html
     page = Page(html)
-    cut = [word for words in page.words for word in words.split() if "…" in word]
-    assert len(cut) >= 3 and max(map(len, cut)) <= MAX_WORD_CHARS and f'title="{whole}"' in html
+    shortened = [word for text in page.words for word in text.split() if "…" in word]
+    assert len(shortened) >= 3
+    assert max(map(len, shortened)) <= MAX_WORD_CHARS
+    assert f'title="{escaped}"' in html
 
 
 def test_a_result_with_only_damaged_runs_has_a_section_with_the_reason() -> None:
@@ -252,7 +255,8 @@ def test_a_report_is_recognized(tmp_path) -> None:
     path.write_text(build_report([build_recorded_result([build_run()])]).html)
     assert is_report(path)
     path.write_text("<!doctype html><title>mine</title>")
-    assert not is_report(path) and not is_report(tmp_path / "none.html")
+    assert not is_report(path)
+    assert not is_report(tmp_path / "none.html")
 
 
 def test_all_marks_have_paths() -> None:
@@ -264,10 +268,10 @@ def test_all_marks_have_paths() -> None:
 
 
 @pytest.mark.slow
-def test_the_replay_explains_obstacles_that_move() -> None:
+def test_the_replay_explains_moving_obstacles() -> None:
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
-    words = [
+    has_explanation = [
         "paler obstacles move" in build_report([build_recorded_result([build_run()], environment)]).html
         for environment in (ROOMS, replace(ROOMS, obstacles=(cart,)))
     ]
-    assert words == [False, True]
+    assert has_explanation == [False, True]

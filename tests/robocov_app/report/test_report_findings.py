@@ -46,7 +46,7 @@ RUNS = [
         ),
     ],
 )
-def test_title_and_findings(result: ReportedResult, title: str, finding: str) -> None:
+def test_titles_and_findings_summarize_the_result(result: ReportedResult, title: str, finding: str) -> None:
     assert format_title(result) == title
     comparisons = compare_groups(choose_compared_groups(result).groups)
     assert list_findings(result, comparisons) == [finding]
@@ -114,7 +114,7 @@ def test_many_seeds_are_counted() -> None:
     assert dict(list_facts(result))["Seeds"].endswith("121, … (20)")
 
 
-def test_only_gains_that_are_used_have_their_meaning() -> None:
+def test_only_used_gains_are_explained() -> None:
     result = build_result([build_run(gains=(("k_rep", 0.3),))])
     result = replace(result, gain_meanings={"k_rep": "strength", "k_att": "of others"})
     assert list_gain_meanings(result) == [("k_rep", "strength")]
@@ -127,7 +127,7 @@ def test_titles_of_runs_contain_their_differences() -> None:
     assert format_run_title(build_result([single_run], kind="run"), single_run, "RAPF") == "RAPF · rooms"
 
 
-def test_facts_of_a_run() -> None:
+def test_facts_of_a_run_are_its_gains_and_measures() -> None:
     result = build_result(RUNS)
     run = build_run(gains=(("k", 1.0),), settled_at_s=3.0, path_length_m=1.5)
     expected = "Gains: k 1; settled at 3.0 s; 0 contacts; mean path length 1.50 m."

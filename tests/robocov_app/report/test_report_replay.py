@@ -1,4 +1,4 @@
-"""The replay as HTML, without a browser: what is in it, and what is not."""
+"""The HTML of a replay: content, isolation from the page, and escaping of names."""
 
 import json
 import re
@@ -32,50 +32,51 @@ def read_replay_data(html: str) -> dict:
     return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
 
 
-def test_a_fragment_brings_all_that_it_needs() -> None:
+def test_a_replay_is_self_contained() -> None:
     html = build_replay_html(build_replay_runs())
     page = Page(html)
     assert [attributes for name, attributes in page.elements if "id" in attributes] == []
     assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
-    assert len(page.all("style")) == 1 and len(page.all("script")) == 2
+    assert len(page.all("style")) == 1
+    assert len(page.all("script")) == 2
     assert not page.all("html")
     data = read_replay_data(html)
     assert [run["title"] for run in data["runs"]] == ["run 0", "run 1"]
     assert [run["style"] for run in data["runs"]] == ["rapf", "rpf"]
 
 
-def test_runs_of_one_controller_with_other_gains_look_different() -> None:
+def test_runs_with_different_gains_have_different_styles() -> None:
     runs = [ReplayRun(build_record(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
-    looks = [
+    styles = [
         (run["style"], run["mark"], tuple(run["dashes"]))
         for run in read_replay_data(build_replay_html(runs))["runs"]
     ]
-    assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
+    assert styles[0] == styles[2]
+    assert all(first != second for first, second in zip(*styles[:2], strict=True))
 
 
-def test_without_scripts_pictures_with_descriptions_are_shown() -> None:
+def test_images_with_descriptions_replace_the_replay_without_scripts() -> None:
     page = Page(build_replay_element(build_replay_runs(6)))
-    pictures = page.all("svg")
-    assert len(pictures) == MAX_PANES
-    assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in pictures)
+    images = page.all("svg")
+    assert len(images) == MAX_PANES
+    assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in images)
     assert not page.all("style")
 
 
-def test_no_name_leaves_its_element() -> None:
+def test_hostile_names_are_escaped() -> None:
     record = replace(build_record(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
     html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
-    assert len(page.all("script")) == 2 and not page.all("img")
+    assert len(page.all("script")) == 2
+    assert not page.all("img")
     data = read_replay_data(html)
-    assert (
-        data["runs"][0]["title"]
-        == data["runs"][0]["facts"]
-        == data["maps"][0]["name"]
-        == escape_controls(HOSTILE)
-    )
+    escaped = escape_controls(HOSTILE)
+    assert data["runs"][0]["title"] == escaped
+    assert data["runs"][0]["facts"] == escaped
+    assert data["maps"][0]["name"] == escaped
 
 
-def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
+def test_panes_show_the_first_or_the_selected_runs() -> None:
     assert read_replay_data(build_replay_html(build_replay_runs(6)))["panes"] == [0, 1, 2, 3]
     assert read_replay_data(build_replay_element(build_replay_runs(6), [5, 2]))["panes"] == [5, 2]
 
@@ -91,7 +92,8 @@ def test_style_and_script_do_not_affect_the_page() -> None:
             assert part.strip().startswith((".robocov-replay", ".robocov-picture")), part
     html = build_replay_html(build_replay_runs(1))
     script = html[html.rindex("<script>") : html.rindex("</script>")]
-    assert script.startswith('<script>(() => {\n"use strict";') and script.rstrip().endswith("})();")
+    assert script.startswith('<script>(() => {\n"use strict";')
+    assert script.rstrip().endswith("})();")
     assert "window." not in read_replay_js().replace("window.devicePixelRatio", "").replace(
         "window.innerHeight", ""
     )

@@ -1,4 +1,4 @@
-"""matplotlib's figures as parts of a page."""
+"""Figures of matplotlib are embedded in a page as SVG."""
 
 import re
 from xml.etree import ElementTree
@@ -56,51 +56,55 @@ FIGURES = {
 
 
 @pytest.mark.parametrize("kind", FIGURES)
-def test_all_colors_are_the_pages(kind) -> None:
-    svg = inline_svg(FIGURES[kind](), "k", "what it shows")
+def test_all_colors_are_variables_of_the_page(kind) -> None:
+    svg = inline_svg(FIGURES[kind](), "k", "description")
     assert not re.findall(r"#[0-9a-fA-F]{3,6}\b|rgb\(", svg.replace("#k-", "="))
     used = set(re.findall(r"var\(--rc-([\w-]+)\)", svg))
-    assert used and used <= list_css_colors(LIGHT).keys()
+    assert used
+    assert used <= list_css_colors(LIGHT).keys()
 
 
 @pytest.mark.parametrize("kind", FIGURES)
-def test_ids_begin_with_the_key_and_all_that_is_referred_to_is_there(kind) -> None:
-    svg = inline_svg(FIGURES[kind](), "f7", "what it shows")
+def test_ids_start_with_the_key_and_all_references_are_valid(kind) -> None:
+    svg = inline_svg(FIGURES[kind](), "f7", "description")
     root = ElementTree.fromstring(svg)
     ids = [each.get("id") for each in root.iter() if each.get("id")]
-    assert len(ids) == len(set(ids)) and all(name.startswith("f7-") for name in ids)
-    referred = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', svg))
-    assert {name for pair in referred for name in pair if name} <= set(ids)
-    assert "http" not in svg and "DejaVu" not in svg
+    assert len(ids) == len(set(ids))
+    assert all(name.startswith("f7-") for name in ids)
+    references = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', svg))
+    assert {name for pair in references for name in pair if name} <= set(ids)
+    assert "http" not in svg
+    assert "DejaVu" not in svg
 
 
-def test_texts_stay_texts_whatever_they_are() -> None:
+def test_hostile_texts_are_escaped() -> None:
     for kind, figure in FIGURES.items():
         root = ElementTree.fromstring(inline_svg(figure(HOSTILE), "k", HOSTILE))
-        assert root.get("aria-label") == HOSTILE and root.get("role") == "img"
-        said = " ".join(each.text or "" for each in root.iter("text"))
-        assert "</script>" in said, kind
+        assert root.get("aria-label") == HOSTILE
+        assert root.get("role") == "img"
+        texts = " ".join(each.text or "" for each in root.iter("text"))
+        assert "</script>" in texts, kind
         assert not [each for each in root.iter() if each.tag in ("script", "img")]
 
 
-def test_many_dots_become_one_path() -> None:
+def test_many_points_become_one_path() -> None:
     figure = FIGURES["boxes"]()
     axes = figure.axes[0]
     points = axes.lines[0]
-    wanted = axes.transData.transform(np.column_stack(points.get_data()))
+    expected = axes.transData.transform(np.column_stack(points.get_data()))
     root = ElementTree.fromstring(inline_svg(figure, "k", "x"))
     dots = [each for each in root.iter("path") if "h0" in (each.get("d") or "")]
     assert len(dots) == 1
-    places = np.array(re.findall(r"M([\d.]+) ([\d.]+)h0", dots[0].get("d")), dtype=float)
+    positions = np.array(re.findall(r"M([\d.]+) ([\d.]+)h0", dots[0].get("d")), dtype=float)
     height = float(root.get("viewBox").split()[3])
-    pixels = places * figure.dpi / 72
-    assert pixels[:, 0] == pytest.approx(wanted[:, 0], abs=0.1)
-    assert height * figure.dpi / 72 - pixels[:, 1] == pytest.approx(wanted[:, 1], abs=0.2)
+    pixels = positions * figure.dpi / 72
+    assert pixels[:, 0] == pytest.approx(expected[:, 0], abs=0.1)
+    assert height * figure.dpi / 72 - pixels[:, 1] == pytest.approx(expected[:, 1], abs=0.2)
     assert "stroke-width:3.6" in dots[0].get("style")
 
 
 def test_the_same_figure_gives_the_same_bytes() -> None:
     band = Band("RAPF", STYLES["rapf"], TIME, np.outer([1, 2, 3], TIME))
-    once = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
-    again = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
-    assert once == again
+    first = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
+    second = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
+    assert first == second

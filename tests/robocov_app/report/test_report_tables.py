@@ -69,12 +69,12 @@ def test_a_single_run_has_its_values() -> None:
     assert build_runs_table(result) is None
 
 
-def test_a_clearance_that_is_rounded_to_zero_has_no_sign() -> None:
+def test_a_clearance_rounded_to_zero_has_no_sign() -> None:
     (table,) = build_summary_tables(build_result([build_run(min_clearance_m=-0.0004)]))
     assert get_column(table, "Clearance, m") == ["0.000"]
 
 
-def test_every_map_has_a_table_and_all_together_have_scaled_distances() -> None:
+def test_every_map_has_a_table_and_the_table_of_all_maps_has_scaled_distances() -> None:
     museum_runs = [build_run("rapf", seed, 9.0, map_name="museum") for seed in range(5)]
     tables = build_summary_tables(build_result([*build_five_runs(), *museum_runs]))
     all_maps, rooms, museum = tables
@@ -130,7 +130,7 @@ def test_many_sets_of_gains_are_summarized_as_ranges_and_listed() -> None:
     assert len(get_column(build_gain_sets_table(result), "Gains")) == 19
 
 
-def test_a_controller_all_of_whose_runs_failed_is_listed() -> None:
+def test_a_controller_without_successful_runs_is_listed() -> None:
     result = build_result([build_run(), build_run("mine", error="no")])
     assert get_column(build_controllers_table(result), "Controller") == ["RAPF", "mine"]
 
@@ -158,7 +158,7 @@ def test_without_failures_there_is_no_table_of_them() -> None:
     assert build_failures_table(build_result([build_run()])) is None
 
 
-def test_pairs_have_a_table_over_maps_and_one_map_by_map() -> None:
+def test_pairs_have_a_table_of_all_maps_and_of_each_map() -> None:
     runs = []
     for map_number in range(2):
         for seed in range(8):
@@ -198,8 +198,8 @@ def test_gaps_to_the_reference_are_a_column_if_they_are_known() -> None:
     assert "J/J_ref − 1" in all_maps.notes[-1]
 
 
-@pytest.mark.parametrize("figure", ["contacts", "stuck_robots", "min_clearance_m"])
-def test_an_unknown_figure_has_no_value(figure: str) -> None:
+@pytest.mark.parametrize("measure", ["contacts", "stuck_robots", "min_clearance_m"])
+def test_an_unknown_measure_has_no_value(measure: str) -> None:
     headings = {"contacts": "Contacts", "stuck_robots": "Stuck robots", "min_clearance_m": "Clearance, m"}
-    (table,) = build_summary_tables(build_result([build_run(**{figure: None})]))
-    assert get_column(table, headings[figure]) == [NO_VALUE]
+    (table,) = build_summary_tables(build_result([build_run(**{measure: None})]))
+    assert get_column(table, headings[measure]) == [NO_VALUE]

@@ -1,4 +1,4 @@
-"""The project's colors as CSS format_variables: the same names in light and dark, and readable in both."""
+"""Colors of the themes as CSS variables: same names in both themes, and sufficient contrast."""
 
 import re
 
@@ -24,18 +24,18 @@ def test_both_themes_have_the_same_names() -> None:
 
 
 @THEMES
-@pytest.mark.parametrize("ground", ["background", "panel"])
-def test_all_that_is_written_can_be_read(theme, ground) -> None:
+@pytest.mark.parametrize("surface", ["background", "panel"])
+def test_texts_and_curves_have_sufficient_contrast(theme, surface) -> None:
     colors = list_css_colors(theme)
     curves = [*theme.controllers, *(f"other-{k}" for k in range(len(theme.others)))]
     for name in ("ink", "faint", "accent", *curves):
-        assert compute_contrast(colors[name], colors[ground]) >= 4.5, (theme.name, name, ground)
+        assert compute_contrast(colors[name], colors[surface]) >= 4.5, (theme.name, name, surface)
     for name in ("warning", "final", "trajectory", "start", "boundary"):
-        assert compute_contrast(colors[name], colors[ground]) >= 3.0, (theme.name, name, ground)
+        assert compute_contrast(colors[name], colors[surface]) >= 3.0, (theme.name, name, surface)
 
 
 @THEMES
-def test_texts_on_colors_are_legible(theme) -> None:
+def test_texts_on_colored_areas_have_sufficient_contrast(theme) -> None:
     colors = list_css_colors(theme)
     assert compute_contrast(colors["on-accent"], colors["accent"]) >= 4.5
     assert compute_contrast(colors["on-final"], colors["final"]) >= 4.5
@@ -45,7 +45,7 @@ def test_texts_on_colors_are_legible(theme) -> None:
         assert compute_contrast(colors["trajectory"], colors[f"cell-{k}"]) >= 3.0
 
 
-def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:
+def test_a_fixed_dark_theme_is_printed_in_light_colors() -> None:
     css = build_theme_rules(":root", "dark")
     screen, _, paper = css.partition("@media print")
     assert parse_declarations(screen)["background"] == format_hex_color(DARK.background)
@@ -53,18 +53,18 @@ def test_a_fixed_theme_is_light_on_paper_all_the_same() -> None:
     assert "prefers-color-scheme" not in css
 
 
-def test_auto_follows_the_reader_and_the_notebook() -> None:
+def test_the_automatic_theme_follows_preferences_and_notebooks() -> None:
     css = build_theme_rules(".scope")
-    for words in (
+    for selector in (
         "prefers-color-scheme:dark",
         'data-jp-theme-light="false"',
         'data-vscode-theme-kind$="dark"',
     ):
-        assert words in css
+        assert selector in css
     assert css.count("{") == css.count("}")
     assert css.index("@media print") == css.rindex("@media")
 
 
-def test_another_theme_is_an_error() -> None:
+def test_an_unknown_theme_is_rejected() -> None:
     with pytest.raises(ParameterError, match="unknown theme 'sepia'"):
         build_theme_rules(":root", "sepia")

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from reported_results import HOSTILE, build_record, save_comparison, save_run
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.errors import InputError
 from robocov_app.report.results.loading import load_result
-from robocov_app.report.results.result import FIGURE_NAMES, replace_unprintable
+from robocov_app.report.results.result import FIGURE_NAMES, ReportedRun, replace_unprintable
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -23,7 +24,7 @@ import robocov as rc
 
 @dataclass(frozen=True)
 class Failing:
-    "Gives up in one half of the map."
+    "Fails in one half of the map."
     pull: float = rc.gain(1.0, "N/m", "how <i>strong</i>")
 
     def force(self, own):
@@ -35,7 +36,7 @@ class Failing:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A sweep that is really run."""
+    """Run a small sweep, and return its folder."""
     root = tmp_path_factory.mktemp("study")
     (root / "failing.py").write_text(FAILING)
     study = Study(
@@ -83,13 +84,10 @@ def test_runs_of_a_comparison_have_the_same_case(tmp_path) -> None:
 
 def test_runs_of_a_sweep_are_the_rows_of_its_table(folder) -> None:
     result = load_result(folder)
-    assert (result.kind, len(result.runs), result.expected_count, result.missing_count) == (
-        "sweep",
-        24,
-        24,
-        0,
-    )
-    assert list(result.maps) == ["yard", "flat"] and result.maps["flat"] == ROOMS
+    assert result.kind == "sweep"
+    assert (len(result.runs), result.expected_count, result.missing_count) == (24, 24, 0)
+    assert list(result.maps) == ["yard", "flat"]
+    assert result.maps["flat"] == ROOMS
     rapf = [run for run in result.runs if run.controller == "rapf"]
     assert [name for name, _ in rapf[0].gains] == list(get_gains(CONTROLLERS["rapf"]))
     assert dict(rapf[0].gains)["target"] == "centroid"
@@ -97,23 +95,29 @@ def test_runs_of_a_sweep_are_the_rows_of_its_table(folder) -> None:
     assert {run.team for run in rapf} == {(("max_speed", 0.5),), (("max_speed", 1.0),)}
     own = next(run for run in result.runs if run.controller != "rapf")
     assert (own.label, own.gains) == ("Failing", (("pull", 1.0),))
-    assert result.gain_units["k_rep"] == "N m³" and result.gain_units["pull"] == "N/m"
+    assert result.gain_units["k_rep"] == "N m³"
+    assert result.gain_units["pull"] == "N/m"
     assert result.gain_meanings["pull"] == "how <i>strong</i>"
-    assert "max_speed" not in result.facts["team"] and result.facts["team"]["viscosity"] == 2.0
+    assert "max_speed" not in result.facts["team"]
+    assert result.facts["team"]["viscosity"] == 2.0
 
 
 @pytest.mark.slow
 def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
     result = load_result(folder)
-    assert result.failed_runs and len(result.completed_runs) + len(result.failed_runs) == 24
+    assert result.failed_runs
+    assert len(result.completed_runs) + len(result.failed_runs) == 24
     for run in result.failed_runs:
         assert "</script> too far" in (run.error or "")
-        assert run.figures == {} and np.isnan(run.final_distance)
+        assert run.figures == {}
+        assert np.isnan(run.final_distance)
     first = result.completed_runs[0]
     record = result.read_record(first)
     history = result.read_history(first)
-    assert record.seed == first.seed and record.environment.name == SQUARE.name
-    assert history is not None and history.mean_distance[-1] == pytest.approx(first.final_distance)
+    assert record.seed == first.seed
+    assert record.environment.name == SQUARE.name
+    assert history is not None
+    assert history.mean_distance[-1] == pytest.approx(first.final_distance)
 
 
 def test_missing_runs_of_an_unfinished_sweep_are_counted(folder, tmp_path) -> None:
@@ -123,16 +127,15 @@ def test_missing_runs_of_an_unfinished_sweep_are_counted(folder, tmp_path) -> No
     (copy / "results.csv").write_text("\n".join(lines[:8]) + "\n")
     result = load_result(copy)
     assert (len(result.runs), result.missing_count) == (7, 17)
-    assert result.runs == tuple(
-        run for run, _ in zip(move_runs(load_result(folder).runs, copy), range(7), strict=False)
-    )
+    assert result.runs == tuple(move_runs(load_result(folder).runs[:7], copy))
     (copy / "results.csv").write_text(lines[0] + "\n")
     with pytest.raises(InputError, match="none of the 24 runs of the sweep is done"):
         load_result(copy)
 
 
-def move_runs(entries, folder):
-    return [replace(run, folder=folder / "runs" / run.folder.name) for run in entries]
+def move_runs(runs: Sequence[ReportedRun], folder: Path) -> list[ReportedRun]:
+    """Return the runs as if their sweep were in another folder."""
+    return [replace(run, folder=folder / "runs" / run.folder.name) for run in runs]
 
 
 def write_file(folder: Path, name: str, text: str) -> Path:
@@ -156,7 +159,7 @@ def write_file(folder: Path, name: str, text: str) -> Path:
         ),
     ],
 )
-def test_the_message_names_the_unreadable_file(folder, tmp_path, damage, message) -> None:
+def test_unreadable_files_are_reported_by_name(folder, tmp_path, damage, message) -> None:
     copy = tmp_path / "copy"
     copy.mkdir()
     for name in ("study.json", "results.csv"):
@@ -179,21 +182,24 @@ def test_the_message_names_the_unreadable_file(folder, tmp_path, damage, message
         (lambda run: (run / "cost.csv").write_text("time_s\n"), "cost.csv: line 1: "),
     ],
 )
-def test_a_damaged_run_of_a_sweep_is_left_out_and_named(folder, tmp_path, damage, reason) -> None:
+def test_a_damaged_run_of_a_sweep_is_dropped_and_reported(folder, tmp_path, damage, reason) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
-    whole = load_result(copy)
-    first = whole.completed_runs[0]
+    complete = load_result(copy)
+    first = complete.completed_runs[0]
     damage(first.folder)
     counts: list[int] = []
-    result = whole.drop_unreadable(counts.append)
-    assert result.runs == tuple(run for run in whole.runs if run is not first)
+    result = complete.drop_unreadable(counts.append)
+    assert result.runs == tuple(run for run in complete.runs if run is not first)
     ((name, reason_text),) = result.damaged_runs
-    assert name == first.folder.name and reason in reason_text and str(tmp_path) not in reason_text
-    assert counts == list(range(1, len(whole.completed_runs) + 1)) and result.missing_count == 0
+    assert name == first.folder.name
+    assert reason in reason_text
+    assert str(tmp_path) not in reason_text
+    assert counts == list(range(1, len(complete.completed_runs) + 1))
+    assert result.missing_count == 0
 
 
-def test_damaged_runs_of_a_comparison_are_left_out_and_named(tmp_path) -> None:
+def test_damaged_runs_of_a_comparison_are_dropped_and_reported(tmp_path) -> None:
     save_comparison(tmp_path / "three", ("rapf", "rpf", "lloyd"))
     (tmp_path / "three/rpf/record.npz").write_bytes(b"")
     other = replace(SQUARE, boundary=((0, 0), (9, 0), (9, 8), (0, 8)))
@@ -203,10 +209,8 @@ def test_damaged_runs_of_a_comparison_are_left_out_and_named(tmp_path) -> None:
     result = load_result(tmp_path / "three")
     assert [run.controller for run in result.runs] == ["rapf"]
     assert [name for name, _ in result.damaged_runs] == ["rpf", "lloyd"]
-    assert (
-        "expected the map of rapf, got a different map" in result.damaged_runs[1].reason
-        and result.missing_count == 0
-    )
+    assert "expected the map of rapf, got a different map" in result.damaged_runs[1].reason
+    assert result.missing_count == 0
 
 
 def test_labels_of_controllers_with_the_same_name_are_numbered(tmp_path) -> None:

@@ -66,7 +66,7 @@ def test_letters_are_numbered_after_z() -> None:
     assert labels[53] == "RAPF B3"
 
 
-def test_variants_differ_in_color_dashes_and_mark_and_a_controller_has_the_style_of_its_first() -> None:
+def test_variants_differ_in_color_dashes_and_mark() -> None:
     failed_runs = [build_run("rapf", error="no"), build_run("mine", error="no")]
     result = build_result([*build_gain_study(values=(1, 3, 30, 100)), *failed_runs])
     styles = choose_group_styles(result)
@@ -105,7 +105,7 @@ def test_scaled_distances_do_not_depend_on_the_size_of_a_map(distances: list[flo
     assert np.median(scaled) == pytest.approx(1.0)
 
 
-def test_the_only_setting_is_its_map() -> None:
+def test_a_single_setting_is_described_by_its_map() -> None:
     result = build_result([build_run(), build_run(seed=1)])
     assert [format_setting(result, setting) for setting in list_settings(result)] == ["rooms"]
 
@@ -127,6 +127,6 @@ def test_varying_gains_are_found_for_each_controller() -> None:
     assert find_varying_gains(build_result(build_gain_study(values=(1.0,)))) == {}
 
 
-def test_gains_have_their_units() -> None:
+def test_gains_are_formatted_with_units() -> None:
     gains = [("k", 0.1), ("limit", None), ("n", 3.0)]
     assert format_gains(gains, {"k": "N"}) == "k 0.1 N, limit none, n 3"

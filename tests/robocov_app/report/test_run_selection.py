@@ -50,7 +50,7 @@ def build_paired_result(maps: int, seeds: int) -> ReportedResult:
 
 
 @given(MANY_RUNS)
-def test_a_selection_is_small_and_has_the_extremes_of_each_map(runs: list[ReportedRun]) -> None:
+def test_a_selection_is_small_and_contains_the_extremes_of_each_map(runs: list[ReportedRun]) -> None:
     selection = select_runs(build_result(runs))
     assert len(set(selection.runs)) == len(selection.runs) <= MAX_SHOWN_RUNS
     assert [run for run in runs if run in selection.runs] == list(selection.runs)
@@ -69,7 +69,7 @@ def test_a_selection_is_small_and_has_the_extremes_of_each_map(runs: list[Report
                 assert find_range(selected) == find_range(group)
 
 
-def test_panes_have_the_same_start() -> None:
+def test_panes_show_runs_from_the_same_start() -> None:
     result = build_paired_result(maps=2, seeds=20)
     selection = select_runs(result)
     pane_runs = list_pane_runs(selection)
