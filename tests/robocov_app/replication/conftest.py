@@ -1,4 +1,4 @@
-"""What the tests of the paper share."""
+"""Fixtures for the tests of the paper's study."""
 
 import pytest
 
@@ -7,6 +7,6 @@ from robocov_app.figures.statistics import bootstrap, bootstrap_statistic
 
 @pytest.fixture
 def few_resamples(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Intervals of a twentieth of the samples, where only what is made of them is looked at."""
-    for drawn in (bootstrap, bootstrap_statistic):
-        monkeypatch.setitem(drawn.__kwdefaults__, "resamples", 200)
+    """Compute intervals from a twentieth of the samples, for tests that need no exact intervals."""
+    for function in (bootstrap, bootstrap_statistic):
+        monkeypatch.setitem(function.__kwdefaults__, "resamples", 200)

@@ -45,13 +45,13 @@ def test_no_text_is_covered_or_cut_off(number, theme):
     assert to_rgb(figure.get_facecolor()) == to_plot_color((LIGHT if theme == "light" else DARK).background)
 
 
-def test_figures_are_found_by_their_numbers():
+def test_figures_are_numbered_from_1_to_8():
     assert list(FIGURES) == list(range(1, 9))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(1, 9))
-def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number, tmp_path):
+def test_files_are_reproducible_and_as_wide_as_columns_of_a_journal(number, tmp_path):
     figure = draw_figure(number, RUNS, PARTITION, "light")
     width = figure.get_size_inches()[0]
     assert width == pytest.approx(3.5 if number == 1 else 7.16, abs=0.01)
@@ -63,7 +63,7 @@ def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number
     assert b"/FontFile2" in content and b"/Type3" not in content
 
 
-def test_a_partition_with_centers_of_mass():
+def test_figure_1_shows_robots_and_centers_of_mass():
     axes = draw_figure(1, RUNS, PARTITION, "light").axes[0]
     centers = partition(PARTITION.positions[0], SQUARE.region).centroids
     (dots,) = [line for line in axes.lines if len(line.get_xdata()) == 6]
@@ -82,29 +82,31 @@ def test_a_partition_with_centers_of_mass():
         (8, "other/rapf", "other/rpf"),
     ],
 )
-def test_panels_show_their_runs_in_the_papers_colors(number, left, right):
+def test_panels_show_trajectories_in_the_papers_colors(number, left, right):
     figure = draw_figure(number, RUNS, PARTITION, "light")
     for axes, name in zip(figure.axes, (left, right), strict=True):
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
         assert lines.get_segments()[2] == pytest.approx(RUNS[name].record.positions[:, 2])
         assert {to_rgb(c) for c in lines.get_colors()} == {to_plot_color(LIGHT.trajectory)}
-    words = [text.get_text() for text in figure.texts]
-    assert f"(a)  {RUNS[left].record.label}" in words and f"(b)  {RUNS[right].record.label}" in words
+    texts = [text.get_text() for text in figure.texts]
+    assert f"(a)  {RUNS[left].record.label}" in texts and f"(b)  {RUNS[right].record.label}" in texts
     for name in (left, right):
-        assert f"mean distance {RUNS[name].history.mean_distance[-1]:.3f} m" in words
+        assert f"mean distance {RUNS[name].history.mean_distance[-1]:.3f} m" in texts
     assert len({axes.get_position().height for axes in figure.axes}) == 1
 
 
 @pytest.mark.parametrize(
     ("number", "case", "other"), [(3, "convex", "lloyd"), (5, "a", "rpf"), (7, "b", "rpf")]
 )
-def test_cost_curves(number, case, other):
+def test_cost_figures_have_a_curve_for_each_controller(number, case, other):
     figure = draw_figure(number, RUNS, PARTITION, "light")
     (axes,) = figure.axes
-    long = [line for line in axes.lines if len(line.get_xdata()) == 121]
-    for line, law in zip(long, ("rapf", other), strict=True):
-        assert np.asarray(line.get_ydata()) == pytest.approx(RUNS[f"{case}/{law}"].history.mean_distance)
-        assert to_rgb(line.get_color()) == to_plot_color(LIGHT.controllers[law])
+    curves = [line for line in axes.lines if len(line.get_xdata()) == 121]
+    for line, controller in zip(curves, ("rapf", other), strict=True):
+        assert np.asarray(line.get_ydata()) == pytest.approx(
+            RUNS[f"{case}/{controller}"].history.mean_distance
+        )
+        assert to_rgb(line.get_color()) == to_plot_color(LIGHT.controllers[controller])
     figure.canvas.draw()
     for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label):
         box = text.get_window_extent()
@@ -112,18 +114,18 @@ def test_cost_curves(number, case, other):
 
 
 def test_the_legend_names_centroids_only_if_some_are_visible():
-    def list_words(runs):
+    def list_labels(runs):
         (legend,) = draw_figure(2, runs, PARTITION, "light").legends
         return [text.get_text() for text in legend.get_texts()]
 
-    def build_ending(goals):
+    def replace_goals(compute_goals):
         return {
-            name: FigureRun(replace(shown.record, goals=goals(shown.record)), shown.history)
-            for name, shown in RUNS.items()
+            name: FigureRun(replace(run.record, goals=compute_goals(run.record)), run.history)
+            for name, run in RUNS.items()
         }
 
-    assert "cell centroid" in list_words(RUNS)
-    arrived = list_words(build_ending(lambda record: record.positions))
+    assert "cell centroid" in list_labels(RUNS)
+    arrived = list_labels(replace_goals(lambda record: record.positions))
     assert not {"cell centroid", "goal"} & set(arrived)
-    runs = build_ending(lambda record: record.positions + 1.0)
-    assert "goal" in list_words(runs)  # which is no centroid
+    runs = replace_goals(lambda record: record.positions + 1.0)
+    assert "goal" in list_labels(runs)  # These goals are no centroids.

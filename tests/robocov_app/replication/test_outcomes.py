@@ -1,3 +1,5 @@
+"""Outcomes read from the tables of sweeps, best gains, and degradations."""
+
 import csv
 import json
 import math
@@ -63,24 +65,24 @@ def test_every_value_is_that_of_its_run(study, folder):
     assert len(rows) == 12
     for row in rows:
         k = outcomes.instances.index(ProblemInstance(row["map"], row["start"], int(row["seed"])))
-        law = {"rapf": "rapf-shared", "rpf": "rpf-shared", "lloyd": "lloyd"}[row["controller"]]
+        key = {"rapf": "rapf-shared", "rpf": "rpf-shared", "lloyd": "lloyd"}[row["controller"]]
         final = float(row["mean_distance_m"])
-        assert outcomes.get_values(law, "final")[k] == final
-        assert outcomes.get_values(law, "gap")[k] == pytest.approx(final / 1.5 - 1.0)
-        assert outcomes.get_values(law, "contacts")[k] == float(row["contacts"])
-        assert outcomes.get_values(law, "work")[k] == float(row["work_J"]) > 0.0
-        assert outcomes.get_values(law, "clearance")[k] == float(row["min_clearance_m"])
+        assert outcomes.get_values(key, "final")[k] == final
+        assert outcomes.get_values(key, "gap")[k] == pytest.approx(final / 1.5 - 1.0)
+        assert outcomes.get_values(key, "contacts")[k] == float(row["contacts"])
+        assert outcomes.get_values(key, "work")[k] == float(row["work_J"]) > 0.0
+        assert outcomes.get_values(key, "clearance")[k] == float(row["min_clearance_m"])
         with np.load(folder / "runs" / row["run"] / "record.npz") as record:
-            assert outcomes.values[law, "placement"][k] == pytest.approx(record["positions"][-1])
-        # a run of a second is averaged over all of it
-        whole = float(row["mean_distance_over_run_m"])
-        assert outcomes.get_values(law, "first_minute")[k] == pytest.approx(whole, rel=1e-9)
+            assert outcomes.values[key, "placement"][k] == pytest.approx(record["positions"][-1])
+        # The first minute of a run of one second is the whole run.
+        mean = float(row["mean_distance_over_run_m"])
+        assert outcomes.get_values(key, "first_minute")[k] == pytest.approx(mean, rel=1e-9)
     assert (outcomes.get_values("rapf-best", "final") == outcomes.get_values("rapf-shared", "final")).all()
     assert np.isnan(outcomes.get_values("rapf-default", "final")).all()
     assert outcomes.share_sides["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
 
 
-def test_a_run_that_failed_is_nan(study, folder, tmp_path):
+def test_values_of_failed_runs_are_nan(study, folder, tmp_path):
     broken = tmp_path / "sweep"
     shutil.copytree(folder, broken)
     row = next(row for row in read_rows(folder) if row["controller"] == "lloyd")
@@ -106,22 +108,22 @@ def test_sets_of_gains_are_distinguished(study, folder):
     grids = read_gain_outcomes(folder, study.study, REFERENCES)
     plain = read_outcomes(folder, study, REFERENCES)
     assert set(grids) == {"rapf", "rpf", "lloyd"}
-    for law, key in (("rapf", "rapf-shared"), ("rpf", "rpf-shared")):
-        assert grids[law].excess.shape == (1, 4)
-        assert grids[law].excess[0] == pytest.approx(plain.get_values(key, "gap") + 1.0)
-        assert grids[law].gains[0]["k_rep"] == 1.0
+    for controller, key in (("rapf", "rapf-shared"), ("rpf", "rpf-shared")):
+        assert grids[controller].excess.shape == (1, 4)
+        assert grids[controller].excess[0] == pytest.approx(plain.get_values(key, "gap") + 1.0)
+        assert grids[controller].gains[0]["k_rep"] == 1.0
     assert TINY.tuning_seed not in {scenario.seed for scenario in grids["rapf"].instances}
 
 
 @given(st.lists(st.floats(0.5, 9.0), min_size=2, max_size=40), st.floats(0.1, 30.0))
-def test_the_mean_over_time_is_that_of_the_curve(values, until):
+def test_the_mean_over_time_is_the_integral_of_the_curve(values, until):
     time = np.arange(len(values)) * 0.5
     cost = np.array(values)
-    found = compute_mean_until(CostHistory(time, cost, cost, cost), until)
+    mean = compute_mean_until(CostHistory(time, cost, cost, cost), until)
     end = min(until, time[-1])
     fine = np.linspace(0.0, end, 20_001)
-    assert found == pytest.approx(np.interp(fine, time, cost).mean(), rel=2e-3)
-    assert cost.min() - 1e-9 <= found <= cost.max() + 1e-9
+    assert mean == pytest.approx(np.interp(fine, time, cost).mean(), rel=2e-3)
+    assert cost.min() - 1e-9 <= mean <= cost.max() + 1e-9
 
 
 def test_the_mean_of_a_single_sample_is_its_value():
@@ -129,7 +131,7 @@ def test_the_mean_of_a_single_sample_is_its_value():
     assert compute_mean_until(CostHistory(np.zeros(1), one, one, one), 20.0) == 2.5
 
 
-def test_outcomes_are_joined_by_scenario(study, folder):
+def test_selected_outcomes_can_be_merged(study, folder):
     whole = read_outcomes(folder, study, REFERENCES)
     left = whole.select([True, True, False, False])
     right = whole.select([False, False, True, True])
@@ -151,12 +153,12 @@ def build_gain_outcomes(*excess: tuple[float, ...]) -> GainOutcomes:
     return GainOutcomes(scenarios, tuple(sets), np.array(excess))
 
 
-def test_the_set_with_the_least_mean_is_taken():
+def test_the_best_gains_have_the_smallest_mean():
     found = {"range-limited": build_gain_outcomes((1.2, 1.2, 1.2), (1.0, 1.0, 1.7), (1.1, 1.1, 1.3))}
     assert find_best_gains(found) == {"range-limited": {**DEFAULTS, "interaction_range": 22.0}}
 
 
-def test_without_an_instance_where_all_runs_finished_the_defaults_stay():
+def test_without_complete_instances_the_defaults_are_kept():
     found = build_gain_outcomes((1.2, np.nan), (np.nan, 1.1))
     assert find_best_gains({"range-limited": found}) == {}
     assert describe_tuning("range-limited", found).startswith("Gains: its defaults; in every scenario")
@@ -191,8 +193,8 @@ class TestDegradations:
                     values = (0.6, 0.9) if self.name == "conditions-loss" else (0.6,)
                     others = "others" in self.name
                     rows = [
-                        {"controller": law, "map": "rooms", "seed": seed, "loss": value}
-                        for law in (("rpf",) if others else ("rapf", "lloyd"))
+                        {"controller": controller, "map": "rooms", "seed": seed, "loss": value}
+                        for controller in (("rpf",) if others else ("rapf", "lloyd"))
                         for value in values
                         for seed in ((0,) if others else (0, 1))
                     ]
@@ -210,7 +212,7 @@ class TestDegradations:
 
         return make_up_outcomes
 
-    def test_ratios_are_of_the_same_map_and_seed(self, finals):
+    def test_runs_are_compared_on_the_same_map_and_seed(self, finals):
         def cost(name, row):
             bad = 1.5 if name == "conditions-loss" and row["loss"] == 0.9 else 1.0
             return (2.0 + row["seed"]) * bad
@@ -218,11 +220,11 @@ class TestDegradations:
         found = finals(cost)
         assert found["loss", 0.9, "rapf"].ratio.estimate == 1.5
         assert found["loss", 0.0, "rapf"].ratio.estimate == found["loss", 0.6, "lloyd"].ratio.estimate == 1.0
-        # a table has no column of what has one value
+        # Tables have no column for parameters with a single value.
         assert found["communication_range", 4.0, "lloyd"].ratio.estimate == 1.0
         assert len(found) == 2 * (1 + 3 + 2) + 3
-        runs = {law: {each.runs for key, each in found.items() if key[2] == law} for law in ("rapf", "rpf")}
-        assert runs == {"rapf": {2}, "rpf": {1}}
+        assert {each.runs for key, each in found.items() if key[2] == "rapf"} == {2}
+        assert {each.runs for key, each in found.items() if key[2] == "rpf"} == {1}
 
     def test_ideal_runs_are_compared_with_rapfs(self, finals):
         found = finals(lambda name, row: (1.0 + row["seed"]) * (3.0 if row["controller"] == "rpf" else 2.0))

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -40,16 +41,15 @@ def test_each_disturbance_has_a_panel_and_each_controller_a_curve(theme: str) ->
         low, high = axes.get_ylim()
         assert low < 1.0
         assert high > 1.4
-    # nothing is written over anything else
+    # The panels do not overlap.
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     boxes = [axes.get_tightbbox(renderer) for axes in panels]
-    for k, one in enumerate(boxes):
-        assert not any(one.overlaps(other) for other in boxes[k + 1 :])
-        assert one.x0 >= 0 and one.x1 <= figure.bbox.x1
+    assert not any(first.overlaps(second) for first, second in combinations(boxes, 2))
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 for box in boxes)
 
 
 def test_degradations_without_a_ratio_are_left_out() -> None:
-    nothing = Interval(float("nan"), float("nan"), float("nan"))
-    rows = [replace(each, ratio=nothing) if each.value == 0.1 else each for each in build_degradations()]
+    unknown = Interval(float("nan"), float("nan"), float("nan"))
+    rows = [replace(row, ratio=unknown) if row.value == 0.1 else row for row in build_degradations()]
     figure = draw_degradations(rows)
     assert figure.axes[2].get_ylim() == figure.axes[0].get_ylim()

@@ -1,4 +1,4 @@
-"""What is run: maps, starts, contenders and their gains."""
+"""The runs of the study: maps, starts, contenders and their gains."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ from robocov_app.replication.design.plan import (
     UNSEEN,
 )
 from robocov_app.replication.evidence import load_profile
-from robocov_app.sweep.study.parameters import TEAM_PARAMETERS as TEAM_PARAMETERS
+from robocov_app.sweep.study.parameters import TEAM_PARAMETERS
 from robocov_app.sweep.tasks import generate_tasks
 
 BEST = {
@@ -52,7 +52,7 @@ both = pytest.mark.parametrize(
 
 class TestMaps:
     @pytest.mark.parametrize("name", [*NON_CONVEX, *CONVEX])
-    def test_every_kind_of_start_has_room_on_every_map(self, name):
+    def test_every_kind_of_start_fits_on_every_map(self, name):
         environment = study_maps.load_study_map(name, CONVEX_KINDS).environment
         assert tuple(environment.starts) == CONVEX_KINDS
         for kind, spec in environment.starts.items():
@@ -60,12 +60,12 @@ class TestMaps:
             if isinstance(spec, DiscStart):
                 assert environment.free.contains(shapely.Point(spec.center).buffer(spec.radius - 0.01))
 
-    def test_they_are_all_but_three_of_those_that_are_not_convex(self):
+    def test_all_bundled_maps_except_for_three_are_used(self):
         convex = {name for name in list_bundled_maps() if load_map(name).blocked.is_empty}
         assert convex == set(CONVEX)
         assert set(list_bundled_maps()) - convex - set(NON_CONVEX) == {"campus", "forklifts", "hospital"}
 
-    def test_clustered_starts_are_as_near_as_can_be(self):
+    def test_clustered_starts_are_as_near_to_the_corner_and_middle_as_possible(self):
         ring = ((0, 0), (8, 0), (8, 6), (0, 6))
         pillar = Environment("pillar", ring, (CircleObstacle((4.0, 3.0), 1.0),))
         starts = study_maps.replace_starts(pillar).starts
@@ -74,12 +74,14 @@ class TestMaps:
         assert isinstance(center, DiscStart)
         assert np.hypot(center.center[0] - 4.0, center.center[1] - 3.0) == pytest.approx(1.8, abs=0.02)
 
-    def test_narrow_maps_get_smaller_discs_and_too_narrow_ones_none(self):
+    def test_discs_of_starts_are_smaller_on_narrow_maps(self):
         for width, radius in ((1.3, 0.6), (1.0, 0.45)):
             alley = Environment("alley", ((0, 0), (9, 0), (9, width), (0, width)))
             spec = study_maps.replace_starts(alley).starts["corner"]
             assert isinstance(spec, DiscStart)
             assert spec.radius == radius
+
+    def test_maps_without_space_for_a_start_are_rejected(self):
         block = PolygonObstacle(((0.5, 0.5), (8.5, 0.5), (8.5, 8.5), (0.5, 8.5)))
         ring = Environment("ring", ((0, 0), (9, 0), (9, 9), (0, 9)), (block,))
         with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.45 m radius"):
@@ -93,10 +95,10 @@ class TestMaps:
         assert polygon.area >= 40.0 and region.blocked.is_empty
         assert region == study_maps.generate_convex_region(seed).environment
         assert region.boundary != study_maps.generate_convex_region(seed + 1).environment.boundary
-        assert not polygon.buffer(-1.8).is_empty  # no strip
+        assert not polygon.buffer(-1.8).is_empty  # It is no strip.
 
     @pytest.mark.parametrize("seed", [1, 2, 3, pytest.param(101, marks=pytest.mark.slow)])
-    def test_generated_maps_are_as_they_are_described(self, seed):
+    def test_generated_maps_have_the_described_properties(self, seed):
         each = study_maps.generate_study_map(seed)
         environment = each.environment
         assert (
@@ -109,7 +111,7 @@ class TestMaps:
         assert len(environment.free.geoms) == 1
         assert environment.region.bounds == (0.0, 0.0, 10.0, 10.0)
 
-    def test_the_same_density_is_drawn_again(self):
+    def test_densities_are_reproducible(self):
         first = study_maps.build_density_maps(QUICK)[0]
         again = study_maps.build_density_maps(QUICK)[0]
         assert first.environment == again.environment
@@ -118,7 +120,7 @@ class TestMaps:
         assert (density.min_value, density.max_value) == (1.0, 41.0)
 
     @both
-    def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):
+    def test_gains_are_tuned_on_separate_maps_and_starts(self, plan):
         assert not set(plan.tuning) & set(plan.generated)
         assert not set(plan.tuning_families) & {*plan.families, *plan.beyond.unseen}
         assert not set(plan.families) & set(plan.beyond.unseen)
@@ -128,11 +130,11 @@ class TestMaps:
         claim_maps = study_maps.build_claim_maps(plan)
         claim_obstacles = {study_map.environment.obstacles for study_map in claim_maps}
         assert not tuning_obstacles & claim_obstacles
-        # a claim on gains is judged on these maps; regrets need two starts
+        # Claims on gains are judged on these maps, and regrets need two starts.
         assert len(tuning_maps) >= MIN_MAPS and len(plan.tuning_starts) >= 2
 
     @both
-    def test_every_claim_of_the_paper_has_maps_enough(self, plan):
+    def test_every_claim_of_the_paper_has_enough_maps(self, plan):
         claim_maps = study_maps.build_claim_maps(plan)
         assert len(claim_maps) >= MIN_MAPS
         kinds = {study_maps.get_map_kind(study_map.name) for study_map in claim_maps}
@@ -144,10 +146,10 @@ class TestMaps:
         for count in (len(study_maps.build_claim_maps(FULL)), len(CONVEX) + len(FULL.convex_generated)):
             lows = []
             p_values = []
-            for others in range(6):
-                there = estimate_fraction(np.arange(count) >= others, range(count))
-                lows.append(there.low)
-                p_values.append(claims * there.compute_p_value(NEARLY_ALWAYS, np.inf))
+            for exceptions in range(6):
+                fraction = estimate_fraction(np.arange(count) >= exceptions, range(count))
+                lows.append(fraction.low)
+                p_values.append(claims * fraction.compute_p_value(NEARLY_ALWAYS, np.inf))
             assert [low >= NEARLY_ALWAYS for low in lows] == [True] * 5 + [False]
             assert [p <= ALPHA for p in p_values] == [True] * 2 + [False] * 4
 
@@ -160,16 +162,16 @@ class TestMaps:
         assert len(set(unseen.values())) == len(unseen) == MIN_MAPS
         assert all(tuple(each.starts) == KINDS for each in unseen.values())
         contest = studies.build_beyond_contests(FULL, {}, UNTUNED)["unseen"]
-        assert [law.key for law in contest.contenders] == [OURS[0], "rapf-default", "lloyd"]
+        assert [contender.key for contender in contest.contenders] == [OURS[0], "rapf-default", "lloyd"]
         assert len(contest.study) == len(unseen) * 3 * 3
         tuned = studies.build_beyond_contests(FULL, {}, PAPERS)["unseen"]
-        assert [law.key for law in tuned.contenders] == [OURS[0], "rapf-best", "lloyd"]
+        assert [contender.key for contender in tuned.contenders] == [OURS[0], "rapf-best", "lloyd"]
         assert "unseen" not in studies.build_beyond_contests(QUICK, {}, PAPERS)
 
 
 class TestPaper:
     @pytest.mark.slow
-    def test_the_full_study_is_as_large_as_it_is_said_to_be(self):
+    def test_the_full_study_has_the_documented_size(self):
         assert len(study_maps.build_claim_maps(FULL)) == len(study_maps.build_convex_maps(FULL)) == 100
         study = studies.build_claims_contest(FULL, PAPERS).study
         assert study.starts == KINDS
@@ -178,16 +180,16 @@ class TestPaper:
         assert len(limited) == 100 * 3 * 7 and limited.maps == study.maps
         assert len(studies.build_gains_study(FULL)) == 12 * 2 * (20 + 80)
 
-    def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
+    def test_all_contenders_have_equal_teams_and_starts(self):
         tasks = list(generate_tasks(studies.build_claims_contest(TINY, PAPERS).study))
         assert len({(task.duration, task.dt, task.lattice, str(task.team)) for task in tasks}) == 1
         scenarios = {(task.map, task.start, task.seed) for task in tasks}
         for scenario in scenarios:
-            laws = [task for task in tasks if (task.map, task.start, task.seed) == scenario]
-            assert len(laws) == 7
-            assert len({task.document for task in laws}) == 1
+            own_tasks = [task for task in tasks if (task.map, task.start, task.seed) == scenario]
+            assert len(own_tasks) == 7
+            assert len({task.document for task in own_tasks}) == 1
 
-    def test_shared_gains_are_shared_and_the_papers_formula_is_not_limited(self):
+    def test_rapf_and_rpf_share_gains_and_attractions_are_not_limited(self):
         rapf = RAPF_SHARED.all_gains
         rpf = RPF_SHARED.all_gains
         assert {name: rapf[name] for name in rpf} == rpf
@@ -196,11 +198,11 @@ class TestPaper:
         assert all(gains["attraction_limit"] is None for gains in grids["rapf"])
         potentials = {(gains["k_rep"], gains["rho_0"]) for gains in grids["rapf"]}
         assert potentials == {(gains["k_rep"], gains["rho_0"]) for gains in grids["rpf"]}
-        # no sensor cuts a repulsion off
+        # The sensing range does not cut off a repulsion.
         assert TEAM["sensing_range"] >= max(*FULL.rho_0, *QUICK.rho_0)
         assert set(TEAM) <= set(TEAM_PARAMETERS)
 
-    def test_best_gains_that_are_the_shared_ones_are_run_once(self):
+    def test_best_gains_equal_to_the_shared_ones_run_once(self):
         same = build_paper_contenders({"rapf": RAPF_SHARED.gains, "rpf": RPF_SHARED.gains})
         assert len(studies.build_claims_contest(TINY, same).study) == 2 * 3 * 5
         assert {
@@ -210,7 +212,7 @@ class TestPaper:
             "lloyd": 1,
         }
 
-    def test_figures_4_and_6_begin_in_the_same_places_and_8_elsewhere(self):
+    def test_figures_4_and_6_have_equal_starts_and_figure_8_another(self):
         first = load_map("blocks-a")
         second = load_map("blocks-b")
         assert first.starts["paper"] == second.starts["paper"] != second.starts["other"]
@@ -226,18 +228,18 @@ class TestPaper:
         (half,) = {task.dt for task in generate_tasks(found["figures-a-half-step"])}
         assert half == TINY.dt / 2.0
 
-    def test_figures_4_to_8_are_run_at_the_best_gains_from_the_same_places(self):
+    def test_figures_4_to_8_are_repeated_with_the_best_gains_from_equal_starts(self):
         shared = studies.build_figure_studies(TINY)
         best = studies.build_best_figure_studies(TINY, PAPERS)
         assert list(best) == ["figures-a-best", "figures-b-best"]
         for name, study in best.items():
             tasks = list(generate_tasks(study))
             assert all(BEST[task.controller].items() <= task.gains.items() for task in tasks)
-            beside = generate_tasks(shared[name.removesuffix("-best")])
-            places = [(task.document, task.start, task.seed, task.controller) for task in beside]
-            assert [(task.document, task.start, task.seed, task.controller) for task in tasks] == places
+            shared_tasks = generate_tasks(shared[name.removesuffix("-best")])
+            expected = [(task.document, task.start, task.seed, task.controller) for task in shared_tasks]
+            assert [(task.document, task.start, task.seed, task.controller) for task in tasks] == expected
 
-    def test_the_quick_study_is_a_small_part(self):
+    def test_the_quick_study_is_small(self):
         size = len(studies.build_claims_contest(QUICK, PAPERS).study) + len(studies.build_gains_study(QUICK))
         assert size < 600
         beyond = [each.study for each in studies.build_beyond_contests(QUICK, {}, UNTUNED).values()]
@@ -246,21 +248,21 @@ class TestPaper:
 
 
 def select_baseline_contests(plan):
-    """Return the sweeps of baselines and ours."""
+    """Return the sweeps of the baselines and of our own controllers."""
     contests = studies.build_beyond_contests(plan, {}, UNTUNED)
     return {name: each for name, each in contests.items() if name == "rivals" or name.startswith("ours-")}
 
 
 class TestBeyond:
     @both
-    def test_every_registered_controller_takes_part_once(self, plan):
+    def test_every_registered_controller_runs_once(self, plan):
         contests = select_baseline_contests(plan).values()
-        others = [law.key for each in contests for law in each.contenders]
+        others = [contender.key for contest in contests for contender in contest.contenders]
         assert len(others) == len(set(others))
         assert {*others, *PAPER} == set(CONTROLLERS)
 
     @both
-    def test_baselines_begin_where_the_papers_controllers_began(self, plan):
+    def test_baselines_start_where_the_papers_controllers_start(self, plan):
         papers = list(generate_tasks(studies.build_claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
@@ -270,7 +272,7 @@ class TestBeyond:
                 assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
 
     @pytest.mark.slow
-    def test_in_full_ours_is_run_as_often_as_rapf_and_baselines_on_every_map(self):
+    def test_our_controller_runs_as_often_as_rapf_in_the_full_study(self):
         assert FULL.beyond.own_seeds == FULL.seeds
         assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= MIN_MAPS
         assert len(study_maps.build_baseline_maps(FULL)) == 33
@@ -278,15 +280,15 @@ class TestBeyond:
             seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
             assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
 
-    def test_who_knows_the_density_begins_where_the_other_does(self):
+    def test_runs_with_and_without_the_density_have_equal_starts(self):
         contests = studies.build_beyond_contests(QUICK, {}, UNTUNED)
         known = generate_tasks(contests["density"].study)
         ignored = generate_tasks(contests["density-ignored"].study)
-        for with_, without in zip(known, ignored, strict=True):
-            assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
-            assert with_.document != without.document
+        for one, other in zip(known, ignored, strict=True):
+            assert (one.map, one.start, one.seed) == (other.map, other.start, other.seed)
+            assert one.document != other.document
 
-    def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
+    def test_contenders_of_mixed_teams_differ_only_in_their_cells(self):
         tasks = list(generate_tasks(studies.build_beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
         by_distance = [task for task in tasks if task.gains["cells"] == "distance"]
         by_time = [task for task in tasks if task.gains["cells"] == "time"]
@@ -295,7 +297,7 @@ class TestBeyond:
             assert {**one.gains, "cells": "time"} == other.gains
             assert (one.team, one.map, one.start) == (other.team, other.map, other.start)
 
-    def test_each_disturbance_stands_alone(self):
+    def test_each_sweep_has_one_disturbance(self):
         found = {
             name: list(generate_tasks(study))
             for name, study in studies.build_conditions_studies(TINY).items()
@@ -316,7 +318,7 @@ class TestBeyond:
         assert all(values[0] in (None, 0.0) for values in studies.AXES.values())
 
     @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {*PAPER, *OURS}))
-    def test_every_baseline_has_a_grid_and_its_defaults_are_in_it(self, name):
+    def test_the_grid_of_every_baseline_contains_its_defaults(self, name):
         known = get_gains(CONTROLLERS[name])
         usual = get_gain_values(make_controller(name))
         sets = [
@@ -325,15 +327,19 @@ class TestBeyond:
         ]
         assert usual in sets
         assert len(sets) > 2 and all(each not in sets[:k] for k, each in enumerate(sets))
-        # what a set does not name would change with the defaults
+        # All sets name the same gains, so that changed defaults do not change some of them.
         assert len({tuple(gains) for gains in GAIN_GRIDS[name]}) == 1
         assert 1 <= len(GAIN_GRIDS[name][0]) <= 3
 
     @pytest.mark.slow
-    def test_in_full_they_are_tuned_where_nothing_is_tested(self):
+    def test_baselines_are_tuned_on_separate_maps_in_the_full_study(self):
         study = studies.build_baseline_gains_study(FULL)
         assert study is not None
-        assert set(study.controllers) == set(GAIN_GRIDS) == {law.controller for law in build_baselines({})}
+        assert (
+            set(study.controllers)
+            == set(GAIN_GRIDS)
+            == {contender.controller for contender in build_baselines({})}
+        )
         assert len(study) == 4 * 2 * sum(len(grid) for grid in GAIN_GRIDS.values())
         tested = {each.environment.obstacles for each in study_maps.build_claim_maps(FULL)}
         assert not tested & {each.environment.obstacles for each in study.maps}
@@ -341,19 +347,17 @@ class TestBeyond:
         assert (study.seeds, study.starts) == ((FULL.tuning_seed,), ("corner", "uniform"))
         assert studies.build_baseline_gains_study(QUICK) is None
 
-    def test_a_baseline_has_its_best_gains(self):
+    def test_baselines_have_their_best_gains(self):
         tuned = {"range-limited": {"interaction_range": 9.0}}
         for each in build_baselines(tuned):
             assert each.gains == tuned.get(each.controller, {})
 
-    def test_every_built_in_controller_is_accounted_for(self):
+    def test_every_built_in_controller_has_a_profile(self):
         for name in CONTROLLERS:
-            account = load_profile(name)
-            assert (
-                account.short_source != "–"
-                and account.source.endswith(".")
-                and account.behavior.endswith(".")
-            )
+            profile = load_profile(name)
+            assert profile.short_source != "–"
+            assert profile.source.endswith(".")
+            assert profile.behavior.endswith(".")
         assert load_profile("geodesic-lloyd").information == "whole map"
         assert load_profile("rapf").information == "own"
         assert "not from its text" in load_profile("howard").source

@@ -17,27 +17,27 @@ gaps = st.dictionaries(
 
 def find_dots(svg: str) -> list[tuple[float, str]]:
     """Return the x of all dots, and their titles."""
-    found = re.findall(r'<circle class="\w+" cx="([\d.]+)" cy="[\d.]+" r="3"><title>(.*?)</title>', svg)
-    return [(float(x), words) for x, words in found]
+    matches = re.findall(r'<circle class="\w+" cx="([\d.]+)" cy="[\d.]+" r="3"><title>(.*?)</title>', svg)
+    return [(float(x), title) for x, title in matches]
 
 
 @given(gaps)
 def test_dots_are_in_the_order_of_their_values(maps):
     svg = str(draw_strips([DotStrip("one", True, maps)], 3.0))
-    found = find_dots(svg)
-    assert len(found) == len(maps)
-    places = [x for x, _ in found]
-    assert places == sorted(places)
-    assert all(0.0 <= x <= 440.0 for x in places)
-    for value, (_, words) in zip(sorted(maps.values()), found, strict=True):
-        assert words.endswith(f": {format_amount(value, '%')}")
+    dots = find_dots(svg)
+    assert len(dots) == len(maps)
+    positions = [x for x, _ in dots]
+    assert positions == sorted(positions)
+    assert all(0.0 <= x <= 440.0 for x in positions)
+    for value, (_, title) in zip(sorted(maps.values()), dots, strict=True):
+        assert title.endswith(f": {format_amount(value, '%')}")
 
 
 def test_equal_values_have_equal_positions_in_all_strips():
     first = find_dots(str(draw_strips([DotStrip("one", True, {"a": 0.1, "b": 0.2})], 2.0)))
     second = find_dots(str(draw_strips([DotStrip("other", False, {"c": 0.1, "d": 2.0})], 2.0)))
     assert first[0][0] == second[0][0]
-    # square roots: four times the gap is twice as far from 0
+    # The scale is that of square roots: four times the gap is twice as far from 0.
     zero = find_dots(str(draw_strips([DotStrip("zero", False, {"c": 0.0, "d": 0.4})], 2.0)))
     assert abs((zero[1][0] - zero[0][0]) - 2.0 * (first[0][0] - zero[0][0])) <= 0.2
 
@@ -62,10 +62,10 @@ def find_marks(svg: str, kind: str) -> list[float]:
     return [float(x) for x in re.findall(r'class="bound" d="M([\d.]+) ', svg)]
 
 
-@given(numbers, numbers, numbers, numbers, numbers)
-def test_a_bar_keeps_the_order_of_what_it_shows(a, b, c, d, e):
-    low, estimate, high = sorted((a, b, c))
-    minimum, maximum = sorted((d, e))
+@given(st.tuples(numbers, numbers, numbers), st.tuples(numbers, numbers))
+def test_marks_on_a_bar_are_in_the_order_of_their_values(interval, bounds):
+    low, estimate, high = sorted(interval)
+    minimum, maximum = sorted(bounds)
     svg = str(draw_interval_bar(Criterion("x", Interval(estimate, low, high), minimum, maximum)))
     (mark,) = find_marks(svg, "estimate")
     left, right = find_marks(svg, "bound")
