@@ -56,6 +56,8 @@ PLAN_ROWS = [
             "local-search",
         )
     ),
+    *((controller, "plans-medium") for controller in ("atlas-shared", "geodesic-lloyd")),
+    ("geodesic-lloyd", "plans-large"),
 ]
 """Controllers and tracks with runs on large plans."""
 UNKNOWN_DENSITY_ROWS = [
