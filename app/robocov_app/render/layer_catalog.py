@@ -150,14 +150,14 @@ def _build_perception_layers() -> list[Layer]:
         ),
         Layer(
             "scan",
-            "Ray scan",
+            "Ray scans",
             ray_scans.draw_scans,
             needs=("scans",),
             legend=ray_scans.build_scans_legend,
             is_default=False,
         ),
-        perception.build_range_layer("sensing", "Sensing range"),
-        perception.build_range_layer("communication", "Comm. range"),
+        perception.build_range_layer("sensing", "Sensing"),
+        perception.build_range_layer("communication", "Communication"),
         Layer(
             "links",
             "Neighbors",
@@ -189,7 +189,7 @@ def _build_mark_layers(trails: ColorScheme) -> list[Layer]:
         ),
         Layer(
             "obstacle_points",
-            "Nearest obstacle",
+            "Nearest obstacles",
             perception.draw_obstacle_points,
             needs=("snapshot",),
             legend=perception.build_obstacle_points_legend,

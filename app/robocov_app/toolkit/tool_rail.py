@@ -11,20 +11,23 @@ from robocov_app.toolkit.overlay import draw_edge
 from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.tools.tool import Tool, Toolbox
 from robocov_app.toolkit.widgets.ui import Ui
-from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window.layout import RAIL_WIDTH_PX, Box, Layout
 from robocov_app.toolkit.window_part import CommandPart
 
-VIEW_COMMANDS = ("fit", "zoom:in", "zoom:out")
+VIEW_COMMANDS = {"fit": "Whole map", "zoom:in": "Zoom in", "zoom:out": "Zoom out"}
 """Commands of the camera; those that fit are shown below the tools."""
 
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 4.0
 _BUTTON_HEIGHT_PX = 36.0
+_MIN_BUTTON_HEIGHT_PX = 28.0
+"""Height to which buttons shrink so that those of the camera fit, too."""
 _GAP_PX = 2.0
 _GROUP_GAP_PX = 7.0
 """Space between groups, with a line in its middle."""
 _GROUP_LINE_PX = 26.0
 """Length of this line."""
+_COUNT_TOLERANCE = 1e-6
 _SHIFT_SYMBOL = "⇧"
 
 
@@ -46,15 +49,21 @@ class ToolRail(CommandPart):
     ) -> None:
         super().__init__(commands, run_command)
         self._toolbox = toolbox
+        self._has_labels = False
 
     def get_box(self, layout: Layout) -> Box:
         """Return the box of the rail."""
         return layout.rail
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt a layout and a theme; tips are next to the rail, so that they do not cover other tools."""
+        """Adopt a layout and a theme; tips are next to the rail, so that they do not cover other tools.
+
+        A narrow rail has no space for names. There, tips appear at once.
+        """
         super().arrange(layout, theme)
         self.ui.has_tips_beside = True
+        self._has_labels = layout.rail.width > round(RAIL_WIDTH_PX * layout.scale)
+        self.ui.tool_tip.is_immediate = not self._has_labels
 
     def draw(self, screen: Surface) -> None:
         """Draw the rail, with a line at its right edge."""
@@ -74,7 +83,7 @@ class ToolRail(CommandPart):
         ui.inset(_MARGIN_PX, _MARGIN_PX, _MARGIN_PX)
         height = ui.box.height / ui.scale - 2 * _MARGIN_PX
         tools_height = height - (len(groups) - 1) * _GROUP_GAP_PX
-        pitch = min(_BUTTON_HEIGHT_PX + _GAP_PX, (tools_height + _GAP_PX) / count)
+        pitch = _choose_pitch(count, tools_height)
         for number, group in enumerate(groups):
             if number:
                 _show_line(ui)
@@ -83,22 +92,40 @@ class ToolRail(CommandPart):
                 is_selected = tool is self._toolbox.current
                 tip = _build_tip(tool, self.commands[f"tool:{tool.name}"])
                 self._show_button(ui, tool.name, tip, f"tool:{tool.name}", tool.title, selected=is_selected)
-        view_count = int((tools_height - count * pitch - _GROUP_GAP_PX) / pitch)
+        # The tolerance keeps rounding errors from hiding a button that just fits.
+        view_count = int((tools_height - count * pitch - _GROUP_GAP_PX) / pitch + _COUNT_TOLERANCE)
         if view_count < 1:
             return
         _show_line(ui)
         ui.row(height=pitch - _GAP_PX, below=_GAP_PX)
-        for command in VIEW_COMMANDS[:view_count]:
-            entry = self.commands[command]
-            self._show_button(ui, command, entry.tip, command, entry.title)
+        for command, label in list(VIEW_COMMANDS.items())[:view_count]:
+            self._show_button(ui, command, self.commands[command].tip, command, label)
 
     def _show_button(
         self, ui: Ui, icon: str, tip: str, command: str, title: str, *, selected: bool = False
     ) -> None:
         """Show a button with the key of its command."""
         shortcut = _abbreviate_key(self.commands[command].key_text)
-        if ui.icon_button(icon, title, key=command, tip=tip, selected=selected, shortcut=shortcut):
+        is_clicked = ui.icon_button(
+            icon,
+            title,
+            key=command,
+            tip=tip,
+            selected=selected,
+            shortcut=shortcut,
+            has_label=self._has_labels,
+        )
+        if is_clicked:
             self._run_command(command)
+
+
+def _choose_pitch(tool_count: int, height: float) -> float:
+    """Return the height of a button with the gap below it, at which tools fit, and the camera if possible."""
+    max_pitch = _BUTTON_HEIGHT_PX + _GAP_PX
+    pitch_with_camera = (height - _GROUP_GAP_PX) / (tool_count + len(VIEW_COMMANDS))
+    if pitch_with_camera >= _MIN_BUTTON_HEIGHT_PX + _GAP_PX:
+        return min(max_pitch, pitch_with_camera)
+    return min(max_pitch, (height + _GAP_PX) / tool_count)
 
 
 def _build_tip(tool: Tool[Any, Any], command: Command) -> str:

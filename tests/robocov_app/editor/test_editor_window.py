@@ -306,6 +306,15 @@ def test_the_palette_runs_commands(driver: EditorDriver) -> None:
     assert driver.editor.dialogs.current is None
 
 
+def test_the_rail_has_space_for_all_tools_and_the_camera(tmp_path: Path) -> None:
+    with open_editor(tmp_path, size=(1280, 720)) as driver:
+        rail = driver.window.tool_rail.ui
+        for command in ("fit", "zoom:in", "zoom:out"):
+            button = rail.find("button", command)
+            assert button is not None
+            assert rail.box.contains(button.rect)
+
+
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
 def test_the_help_lists_all_keys(tmp_path: Path, size, scale: float, monkeypatch) -> None:
     words: set[str] = set()

@@ -51,13 +51,13 @@ def click(window: ViewerWindow, box: pygame.Rect) -> None:
 @pytest.mark.parametrize("controllers", [("rpf", "lloyd"), ("lloyd", "rpf")])
 def test_chips_explain_centroids_in_any_order_of_panes(tmp_path: Path, controllers: tuple[str, str]) -> None:
     with open_window(tmp_path, *controllers) as window:
-        assert "Cell centroid" in list_texts(window)
+        assert "Centroids" in list_texts(window)
 
 
 def test_chips_explain_each_symbol_once(tmp_path: Path) -> None:
     with open_window(tmp_path, "rpf", "lloyd", "atlas") as window:
         texts = list_texts(window)
-    assert {"Cell centroid", "Goal"} < set(texts)
+    assert {"Centroids", "Goals"} < set(texts)
     assert len(texts) == len(set(texts))
 
 
@@ -99,7 +99,7 @@ def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], pres
 
 def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path) -> None:
     with open_window(tmp_path, size=(900, 600)) as window:
-        assert "Cell centroid" in list_texts(window)
+        assert "Centroids" in list_texts(window)
         window.do("tour")
         for _ in range(10):
             window.run_frame(1 / 30)

@@ -97,7 +97,7 @@ def test_the_command_and_the_script_repeat_the_run(name: str, tmp_path: Path) ->
         assert np.array_equal(found, expected)
 
 
-def test_several_controllers_are_compared(tmp_path: Path) -> None:
+def test_several_controllers_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with open_viewer(tmp_path, GAINS, LLOYD, environment=ROOMS, map_name="rooms") as driver:
         advance_session(driver.session, STEPS)
         command = copy_text(driver, "share:command")
@@ -107,7 +107,11 @@ def test_several_controllers_are_compared(tmp_path: Path) -> None:
     by_command = run_command(command, tmp_path)
     # The folders of a comparison are sorted by name.
     assert all(np.array_equal(*pair) for pair in zip(by_command, reversed(expected), strict=True))
+    capsys.readouterr()
     assert all(np.array_equal(*pair) for pair in zip(run_python(script), expected, strict=True))
+    printed = capsys.readouterr().out
+    assert "mean distance" in printed
+    assert [line.split()[0] for line in printed.splitlines()[1:]] == ["RAPF", "Lloyd"]
 
 
 def test_a_controller_that_is_compared_with_itself_has_a_command_for_each(tmp_path: Path) -> None:

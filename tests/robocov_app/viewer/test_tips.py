@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pygame
 import pytest
-from driven_window import Driver
+from driven_window import Driver, open_viewer
 
 from robocov_app.look.theme import LIGHT
-from robocov_app.toolkit.widgets import tool_tip
+from robocov_app.toolkit.widgets import icon_buttons, tool_tip
 from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, draw_tool_tip
+from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.viewer.panel.sketches import get_sketch
 
 WIDGET = pygame.Rect(100, 80, 36, 36)
@@ -70,6 +73,33 @@ def test_every_button_of_the_rail_shows_a_tip_with_its_key_beside_it(driver: Dri
         driver.window.draw()
         differs = (driver.copy_frame() != before).any(axis=2)
         assert differs[:, rail.box.right : rail.box.right + 60].any(), widget.key
+
+
+def test_tools_show_their_names_at_once(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, size=(900, 600)) as driver:
+        failure = driver.get_widget("button", "tool:failure")
+        assert failure.tip.startswith("Fail robot (D)")
+        before = driver.copy_frame()
+        driver.move(*failure.rect.center)
+        driver.window.draw()
+        left, top, width, height = driver.window.layout.arena
+        differs = (driver.copy_frame() != before).any(axis=2)
+        assert differs[top : top + height, left : left + width].any()
+
+
+def test_wide_windows_show_the_names_of_tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    draw_text = icon_buttons.draw_text
+
+    def draw_and_list(page: Ui, text: str, *args: object, **options: object) -> None:
+        texts.append(text)
+        draw_text(page, text, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(icon_buttons, "draw_text", draw_and_list)
+    with open_viewer(tmp_path, size=(1280, 720)) as driver:
+        driver.window.draw()
+        for tool in driver.viewer.toolbox.by_name.values():
+            assert tool.title in texts
 
 
 @pytest.mark.usefixtures("quick_tips")

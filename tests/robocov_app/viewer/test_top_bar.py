@@ -108,7 +108,7 @@ def test_icons_have_ink_and_stay_within_their_square(name: str) -> None:
 FIRST_ACTIONS = {
     "pause": "Play",
     "tool:wall": "Wall",
-    "tool:failure": "Failure",
+    "tool:failure": "Fail",
     "pane:add": "Compare",
     "undo": "Undo",
     "save:session": "Save",

@@ -21,7 +21,6 @@ from robocov_app.editor.ui.field_focus import FieldFocus
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
-from robocov_app.editor.ui.page_controls import read_page_controls
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
@@ -29,6 +28,7 @@ from robocov_app.editor.ui.team_preview import TeamPreview
 from robocov_app.editor.ui.top_bar import EditorTopBar
 from robocov_app.editor.ui.typed_commands import list_typed_commands
 from robocov_app.editor.ui.typed_values import edit_typed_value
+from robocov_app.editor.ui.window_controls import read_window_controls
 from robocov_app.look.theme import get_theme
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.commands.command import CommandTable
@@ -172,7 +172,7 @@ class EditorWindow(CommandWindow):
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        return read_page_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
+        return read_window_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
 
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state of the document after an unexpected error."""

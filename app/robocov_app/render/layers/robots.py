@@ -50,8 +50,8 @@ _BELIEF_RING_WIDTH_PX = 1.6
 _BELIEF_DASH_PX = 3.0
 _FAILED_SIZE_FACTOR = 0.85
 """Size of failed robots compared with working ones."""
-_NUMBER_GAP_PX = 3.0
-"""Space between a failed robot and its number."""
+_NUMBER_GAP_PX = 7.0
+"""Space between a failed robot and its number, where the ring of a selected robot has space."""
 _INK_HALF_HEIGHT = 0.4
 """Half the height of digits, as a fraction of the text size."""
 _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))

@@ -14,6 +14,8 @@ from robocov_app.toolkit.window.page_view import PageAppearance
 
 _WINDOW_EVENTS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 """Events that are passed on to the window even while a dialog is open."""
+_WHEEL_BUTTONS = (4, 5)
+"""Buttons that pygame reports in addition to the event of the wheel."""
 _INITIAL_HEIGHT_PX = 100
 _SCREEN_MARGIN_PX = 24
 
@@ -127,7 +129,7 @@ class Dialogs:
             if not dialog.handle_wheel(get_wheel_notches(event)):
                 ui.handle_event(event)
         elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):
-            if dialog.closes_on_outside_click:
+            if dialog.closes_on_outside_click and event.button not in _WHEEL_BUTTONS:
                 self.close()
         else:
             ui.handle_event(event)

@@ -50,7 +50,7 @@ class Answer:
 
 @dataclass
 class Question(Dialog):
-    """A question with answers as buttons.
+    """A question with answers as buttons; a click outside only closes it, as Escape does.
 
     Attributes
     ----------
@@ -69,6 +69,8 @@ class Question(Dialog):
     answers: Sequence[Answer]
     on_cancel: Callable[[], object] = _do_nothing
     highlighted: int = 0
+
+    closes_on_outside_click = True
 
     def show_content(self, ui: Ui) -> None:
         """Show the title, the text and the answers."""

@@ -43,9 +43,16 @@ class _Line(NamedTuple):
 
 
 class ToolTip:
-    """Decides when the tool tip of a widget is due."""
+    """Decides when the tool tip of a widget is due.
+
+    Attributes
+    ----------
+    is_immediate : bool
+        Whether tips appear at once, because the widgets show no names.
+    """
 
     def __init__(self) -> None:
+        self.is_immediate = False
         self._hovered = ""
         self._rested_since_s = perf_counter()
 
@@ -70,7 +77,7 @@ class ToolTip:
     @property
     def is_due(self) -> bool:
         """Whether the mouse has rested long enough."""
-        return perf_counter() - self._rested_since_s >= TIP_DELAY_S
+        return self.is_immediate or perf_counter() - self._rested_since_s >= TIP_DELAY_S
 
 
 def draw_tool_tip(

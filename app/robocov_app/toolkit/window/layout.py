@@ -9,6 +9,10 @@ from robocov_app.render.panel_grid import choose_column_count
 PANEL_WIDTH_PX = 320
 BAR_HEIGHT_PX = 44
 RAIL_WIDTH_PX = 44
+LABELED_RAIL_WIDTH_PX = 122
+"""Width of a tool rail that shows the names of the tools next to their icons."""
+MIN_LABELED_WINDOW_PX = 1150
+"""Width of a window from which on the tool rail shows names."""
 CHART_HEIGHT_PX = 118
 TIME_SLIDER_HEIGHT_PX = 26
 STATUS_HEIGHT_PX = 26
@@ -148,7 +152,7 @@ def build_layout(
     legend_height = 0
     if panes > 1:
         legend_height = round(LEGEND_HEIGHT_PX * scale)
-    rail_width = 0 if is_compact else round(RAIL_WIDTH_PX * scale)
+    rail_width = _choose_rail_width(width, scale, is_compact=is_compact)
     if handle.height:
         left_width = width
         rows = _choose_rows_above_sheet(handle.top, scale, is_compact=is_compact)
@@ -175,11 +179,48 @@ def build_layout(
     )
 
 
+def compute_aspect(bounds: tuple[float, float, float, float]) -> float:
+    """Return the width of a map divided by its height, from its bounds (x, y, x, y), m."""
+    low_x, low_y, high_x, high_y = bounds
+    return (high_x - low_x) / (high_y - low_y)
+
+
+def find_scroll_box(size: tuple[int, int], layout: Layout, *, is_covered: bool) -> Box | None:
+    """Return the part of a window that a vertical drag of a finger scrolls.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    layout : Layout
+    is_covered : bool
+        Whether a dialog or a menu covers the window.
+
+    Returns
+    -------
+    Box or None
+        The whole window if it is covered, or else the panel; None if there is neither.
+    """
+    if is_covered:
+        return Box(0, 0, *size)
+    if layout.has_panel:
+        return layout.panel
+    return None
+
+
 def uses_sheet(size: tuple[int, int], scale: float, *, is_compact: bool = False) -> bool:
     """Return whether the panel of a window is a sheet over its lower part; see `build_layout`."""
     width, height = size
     scale = min(scale, find_max_scale(size, is_compact=is_compact))
     return width < height and width < MAX_SHEET_WIDTH_PX * scale
+
+
+def _choose_rail_width(window_width: int, scale: float, *, is_compact: bool) -> int:
+    """Return the width of the tool rail, px; wide windows have space for the names of the tools."""
+    if is_compact:
+        return 0
+    if window_width >= MIN_LABELED_WINDOW_PX * scale:
+        return round(LABELED_RAIL_WIDTH_PX * scale)
+    return round(RAIL_WIDTH_PX * scale)
 
 
 def _place_panel(size: tuple[int, int], scale: float, *, is_shown: bool, is_compact: bool) -> tuple[Box, Box]:

@@ -9,7 +9,7 @@ import pygame
 from pygame import Rect
 
 from robocov_app.look.colors import Color, mix
-from robocov_app.look.legend import merge_legends
+from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.scene import Scene
@@ -32,8 +32,8 @@ _RADIUS_PX = 11.0
 _ROW_RADIUS_PX = 4.0
 _ICON_WIDTH_PX = 16.0
 
-MAX_ENTRY_CHARS = 20
-"""Longer texts of a legend are replaced by the title of the layer."""
+_MARK_TEXTS = {CELL_CENTROID: "centroids", GOAL: "goals"}
+"""Texts of the marks that the same layer draws, depending on the controller."""
 _DIMMED_ALPHA = 150
 """Opacity, up to 255, of the veil over the symbols of hidden layers."""
 
@@ -86,17 +86,17 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
     Returns
     -------
     tuple of LegendEntry
-        Empty if no scene has anything to draw in this layer.
+        Empty if no scene has anything to draw in this layer. A single symbol has the title of the layer, so
+        that all chips name what they show and hide in the same way.
     """
     legends = [layer.legend(scene) for scene in scenes if layer.can_draw(scene)]
     entries = merge_legends(legends, lambda entry: entry.key)
-    texts = [entry.text for entry in entries]
-    if len(entries) == 1 and len(texts[0]) > MAX_ENTRY_CHARS:
-        texts = [layer.title]
-    return tuple(
-        LegendEntry(to_sentence_case(text), entry.draw, entry.style)
-        for text, entry in zip(texts, entries, strict=True)
-    )
+    chip_entries = []
+    for entry in entries:
+        text = layer.title if len(entries) == 1 else entry.text
+        text = _MARK_TEXTS.get(entry.text, text)
+        chip_entries.append(LegendEntry(to_sentence_case(text), entry.draw, entry.style))
+    return tuple(chip_entries)
 
 
 def measure_chip(canvas: Canvas, chip: Chip) -> int:

@@ -25,8 +25,9 @@ def build_python(run: SharedRun) -> str:
     Returns
     -------
     str
-        The script assigns a `robocov.Record` to ``record``; with several controllers, a `robocov.Comparison`
-        to ``comparison``. Edits that it does not repeat are listed in comments.
+        The script assigns a `robocov.Record` to ``record`` and prints it; with several controllers, it
+        assigns a `robocov.Comparison` to ``comparison`` and prints its table. Edits that it does not repeat
+        are listed in comments.
     """
     lines = ["import robocov as rc", ""]
     if run.later_edits:
@@ -44,10 +45,12 @@ def build_python(run: SharedRun) -> str:
         if gains:
             arguments.append(f"gains={_format_gains(controllers[0])}")
         lines += _format_call("record = rc.run", [*arguments, *_list_arguments(run)])
+        lines.append("print(record)")
     else:
         names = ", ".join(_format_controller(controller) for controller in controllers)
         arguments = [json.dumps(run.map_name), f"[{names}]"]
         lines += _format_call("comparison = rc.compare", [*arguments, *_list_arguments(run)])
+        lines.append("print(comparison)")
     return "\n".join(lines) + "\n"
 
 

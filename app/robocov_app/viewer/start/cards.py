@@ -87,8 +87,8 @@ START_CARDS = (
         "Draw a map, then let robots cover it.",
     ),
     StartCard(
-        StartChoice("Lesson 1", Target.LESSON),
-        "What holds robots back? Eleven short chapters.",
+        StartChoice("Lesson: what holds robots back", Target.LESSON),
+        "Eleven short chapters with questions to answer.",
         ("lesson",),
     ),
 )

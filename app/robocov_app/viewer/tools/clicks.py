@@ -48,7 +48,7 @@ class FailureTool(ViewerTool):
     """Makes robots fail, and revives them."""
 
     name = "failure"
-    title = "Failure"
+    title = "Fail robot"
     key = "d"
     hint = "click a robot to make it fail; click it again to revive it"
     takes_robots = True

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from robocov_app.look.theme import Theme, get_theme
-from robocov_app.toolkit.window.layout import Layout, build_layout, uses_sheet
+from robocov_app.toolkit.window.layout import Layout, build_layout, compute_aspect, uses_sheet
 from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
@@ -79,7 +79,7 @@ class Arrangement:
     def update(self, size: tuple[int, int], scale: float) -> None:
         """Lay out the parts of a window of the given size, px, and scale; do nothing without a change."""
         before = self.key
-        aspect = self._compute_aspect()
+        aspect = compute_aspect(self._viewer.session.displayed.environment.region.bounds)
         frame = self._build_frame_settings(size, scale)
         panes = len(self._viewer.session.timeline.panes)
         key = LayoutKey(frame, panes, round(aspect, _ASPECT_DECIMALS))
@@ -96,11 +96,6 @@ class Arrangement:
         if before is None or frame != before.frame:
             for part in self._parts:
                 part.arrange(self.layout, self.theme)
-
-    def _compute_aspect(self) -> float:
-        """Return the width of the map divided by its height."""
-        low_x, low_y, high_x, high_y = self._viewer.session.displayed.environment.region.bounds
-        return (high_x - low_x) / (high_y - low_y)
 
     def _build_frame_settings(self, size: tuple[int, int], scale: float) -> _FrameSettings:
         view = self._viewer.view

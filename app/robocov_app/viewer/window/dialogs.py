@@ -67,7 +67,7 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
         "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
         "and what helps, in a few minutes. Reopen it any time with F2."
     )
-    answers = [Answer("Lesson 1", play_lesson), Answer("Just let me play", play)]
+    answers = [Answer("Start the lesson", play_lesson), Answer("Just let me play", play)]
     return Question("Welcome to robocov", text, answers, play)
 
 

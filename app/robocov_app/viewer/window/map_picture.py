@@ -8,7 +8,7 @@ import pygame
 
 from robocov_app.look.theme import get_theme
 from robocov_app.toolkit.window.cover_picture import CoverPicture
-from robocov_app.toolkit.window.layout import build_layout, is_inside
+from robocov_app.toolkit.window.layout import build_layout, compute_aspect, is_inside
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.lessons.guide import LessonGuide
@@ -146,9 +146,7 @@ class MapPicture:
         if key == self._layout_key:
             return
         self._layout_key = key
-        low_x, low_y, high_x, high_y = bounds
-        aspect = (high_x - low_x) / (high_y - low_y)
-        layout = build_layout(size, scale, panes, aspect, panel=has_lesson, is_compact=True)
+        layout = build_layout(size, scale, panes, compute_aspect(bounds), panel=has_lesson, is_compact=True)
         self._canvas.arrange(layout, get_theme(theme))
         self._chart.arrange(layout, get_theme(theme))
 

@@ -38,13 +38,13 @@ from robocov_app.viewer.window.arrangement import Arrangement
 from robocov_app.viewer.window.dialogs import build_branch_dialog, build_file_dialog
 from robocov_app.viewer.window.map_picture import MapPictures, PictureSources
 from robocov_app.viewer.window.menus import WindowMenus
-from robocov_app.viewer.window.page_controls import PageControls
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import HINT, list_facts
 from robocov_app.viewer.window.status_display import StatusDisplay
 from robocov_app.viewer.window.top_bar import TopBar
 from robocov_app.viewer.window.video_recorder import VideoRecorder
+from robocov_app.viewer.window.window_controls import WindowControlsReader
 
 KEYS_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 PALETTE_HINT = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
@@ -161,7 +161,9 @@ class ViewerWindow(CommandWindow):
         sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
         self.map_pictures = MapPictures(viewer, sources, lambda: self.screen, self._find_cover)
         self._inspector = RobotInspector(viewer, self.panel)
-        self._page_controls = PageControls(viewer, self.lesson, self.layer_bar, self.dialogs, self.parts)
+        self._controls_reader = WindowControlsReader(
+            viewer, self.lesson, self.layer_bar, self.dialogs, self.parts
+        )
         self._arrangement = Arrangement(viewer, self.lesson, self.canvas, self.chart, self.parts)
         self._arrange()
         self.draw()
@@ -261,7 +263,7 @@ class ViewerWindow(CommandWindow):
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        controls = self._page_controls.read(self.screen.get_size(), self.layout)
+        controls = self._controls_reader.read(self.screen.get_size(), self.layout)
         return replace(controls, is_covered=self.map_pictures.is_covered)
 
     def _find_cover(self) -> pygame.Rect | None:

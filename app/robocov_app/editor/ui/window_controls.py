@@ -1,15 +1,15 @@
-"""State of the editor's window that the page of a phone needs, for its buttons and for scrolling."""
+"""Controls of the editor's window on the page of a phone: their state, and where a drag scrolls."""
 
 from collections.abc import Sequence
 
 from robocov_app.editor.canvas.canvas import measure_legend_height
 from robocov_app.editor.editor import Editor
-from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window.layout import Box, Layout, find_scroll_box
 from robocov_app.toolkit.window.page_view import WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 
 
-def read_page_controls(
+def read_window_controls(
     editor: Editor, size: tuple[int, int], layout: Layout, parts: Sequence[WindowPart]
 ) -> WindowControls:
     """Return the state of the editor that the buttons of a phone's page show.
@@ -38,22 +38,13 @@ def read_page_controls(
         lesson="",
         has_panel=editor.shows_panel,
         is_typing=editor.dialogs.is_typing or any(part.is_typing for part in parts),
-        scroll_box=_find_scroll_box(editor, size, layout),
+        scroll_box=find_scroll_box(size, layout, is_covered=editor.dialogs.is_open),
         kind="editor",
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
         is_covered=editor.dialogs.is_open,
         map_box=_find_map_box(editor, layout),
     )
-
-
-def _find_scroll_box(editor: Editor, size: tuple[int, int], layout: Layout) -> Box | None:
-    """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""
-    if editor.dialogs.is_open:
-        return Box(0, 0, *size)
-    if layout.has_panel:
-        return layout.panel
-    return None
 
 
 def _find_map_box(editor: Editor, layout: Layout) -> Box:

@@ -1,9 +1,9 @@
-"""State of the viewer's window that the page of a phone needs, for its buttons and for scrolling."""
+"""Controls of the viewer's window on the page of a phone: their state, and where a drag scrolls."""
 
 from collections.abc import Sequence
 
 from robocov_app.toolkit.dialogs import Dialogs
-from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window.layout import Box, Layout, find_scroll_box
 from robocov_app.toolkit.window.page_view import WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX, LayerBar
@@ -11,7 +11,7 @@ from robocov_app.viewer.lessons.guide import LessonGuide
 from robocov_app.viewer.presenter import Presenter
 
 
-class PageControls:
+class WindowControlsReader:
     """Reads the state of the window that the page of a phone shows.
 
     Parameters
@@ -55,7 +55,9 @@ class PageControls:
             lesson=self._describe_lesson(),
             has_panel=viewer.view.has_panel,
             is_typing=self._dialogs.is_typing or any(part.is_typing for part in self._parts),
-            scroll_box=self._find_scroll_box(size, layout),
+            scroll_box=find_scroll_box(
+                size, layout, is_covered=self._dialogs.is_open or self._layer_bar.is_open
+            ),
             map_box=_find_map_box(layout),
         )
 
@@ -63,14 +65,6 @@ class PageControls:
         if self._lesson.shown is not None:
             return "shown"
         return "left" if self._lesson.is_waiting else ""
-
-    def _find_scroll_box(self, size: tuple[int, int], layout: Layout) -> Box | None:
-        """Return the part of the window that a vertical drag of a finger scrolls; None if there is none."""
-        if self._dialogs.is_open or self._layer_bar.is_open:
-            return Box(0, 0, *size)
-        if layout.has_panel:
-            return layout.panel
-        return None
 
 
 def _find_map_box(layout: Layout) -> Box:
