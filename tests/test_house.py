@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import pickle
+import re
 import subprocess
 import sys
 import tomllib
@@ -59,6 +60,20 @@ def test_no_class_has_too_many_methods() -> None:
             if method_count > MAX_METHODS:
                 too_large.append(f"{path.relative_to(ROOT)}: {node.name}: {method_count} methods")
     assert not too_large
+
+
+def test_percent_signs_follow_their_numbers_without_a_space() -> None:
+    # "95%" as in the output of Python's format "%", not "95 %". A brace after the sign ends a Jinja tag.
+    spaced = re.compile(r"[0-9}][ \u00a0\u202f\u2009]%(?!})")
+    paths = [ROOT / "README.md", ROOT / "CHANGELOG.md", *ROOT.glob("app/handbook/*.md")]
+    for root in ("coverage", "app"):
+        paths += [path for suffix in (".py", ".jinja", ".toml") for path in ROOT.glob(f"{root}/**/*{suffix}")]
+    found = []
+    for path in paths:
+        for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+            if spaced.search(line):
+                found.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()}")
+    assert not found
 
 
 @pytest.mark.parametrize("root", ["coverage", "app"])

@@ -110,7 +110,7 @@ def measure_drags(browser: Browser, drags: int, state: str) -> None:
     times_ms = sorted(browser.driver.execute_async_script(MEASURE_DRAGS, drags))
     print(
         f"response to a drag while {state}: median {median(times_ms):.0f} ms, "
-        f"95 % within {times_ms[int(0.95 * len(times_ms))]:.0f} ms, {len(times_ms)} drags"
+        f"95% within {times_ms[int(0.95 * len(times_ms))]:.0f} ms, {len(times_ms)} drags"
     )
 
 

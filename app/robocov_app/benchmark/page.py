@@ -305,7 +305,7 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         values = [point.x for point in points]
         if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
             continue
-        texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f} %" for point in points]
+        texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f}%" for point in points]
         description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
         figure = draw_pareto_figure(points, quantity.axis_label)
         svg = inline_svg(figure, f"{name}-{key}", description)

@@ -18,8 +18,8 @@ from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_
 NO_VALUE = "–"
 """Text of a cell whose value is unknown."""
 MIN_INTERVAL_MAPS = 12
-"""Minimum number of maps for an interval. A 95 % bootstrap interval contains the true value in 82 % of all
-cases with 5 maps, and in 92 % with 12."""
+"""Minimum number of maps for an interval. A 95% bootstrap interval contains the true value in 82% of all
+cases with 5 maps, and in 92% with 12."""
 CONTACT_FACTOR = 0.5
 """Factor for the score of a run in which a robot touched a wall or another robot."""
 MOTION_FACTOR = 0.5
@@ -31,10 +31,10 @@ HEAD = (
     "Score, %",
     "Runs",
     "Gap, %",
-    "95 %",
+    "95%",
     "Mean",
     "Worst",
-    "To 5 %, s",
+    "To 5%, s",
     "∫J / J_ref, s",
     "Path, m",
     "Work, J",
@@ -49,9 +49,9 @@ _SUMMARY_COLUMNS = (
     "Score, %",
     "Runs",
     "Gap, %",
-    "95 %",
+    "95%",
     "Worst",
-    "To 5 %, s",
+    "To 5%, s",
     "Path, m",
     "Contacts",
     "At rest",
@@ -63,12 +63,12 @@ NOTES = (
     "another robot, and halved again if the team had not come to rest by the end. A failed run counts 0, "
     "and so does a run that covers a different area from the reference. The score of an entry depends on no "
     "other entry. Only entries with all runs of a track are ranked on it.",
-    "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95 % interval of the median "
+    "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95% interval of the median "
     "(bootstrap over maps, for at least 12 maps), the mean and the worst. J_ref is the best placement "
     "known, not a proven optimum, so gaps may be too small. The number in brackets cannot be too small: it "
     "is the median gap to proven lower bounds, given if all of them are known. They are certified for J as "
     "it is computed, a sum over 128 x 128 sites, not for the integral that it approximates.",
-    "To 5 %: the time from which J stays within 5 % of its final value. ∫J / J_ref: the integral of J over "
+    "To 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J over "
     "the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so are "
     "the other columns, with these exceptions. Contacts: the runs in which a robot touched a wall or "
     "another robot. At rest: the fraction of runs at whose end no robot moves 5 cm or more within 4 s. "
@@ -310,10 +310,10 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         "Score, %": format_number(100.0 * rating.score, ".1f"),
         "Runs": _format_runs(rating, len(gaps)),
         "Gap, %": format_number(100.0 * gap.estimate, ".1f") + _format_bound(rating, len(gaps)),
-        "95 %": interval,
+        "95%": interval,
         "Mean": format_number(mean_gap, ".1f"),
         "Worst": format_number(worst_gap, ".1f"),
-        "To 5 %, s": format_number(rating.compute_median("near_final_s"), ".0f"),
+        "To 5%, s": format_number(rating.compute_median("near_final_s"), ".0f"),
         "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
         "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
         "Work, J": format_number(rating.compute_median("work_J"), ".0f"),

@@ -147,7 +147,7 @@ def describe_method() -> list[str]:
         "The gap is J / J_ref - 1 at the end; J_ref is the lowest of 24 searches for the best placement with "
         "the whole map known, for the number of robots that work at the end. It is an upper bound of the "
         "optimum.",
-        "near_final_s: the time from which J stays within 5 % of its final value. settled_at_s: the time "
+        "near_final_s: the time from which J stays within 5% of its final value. settled_at_s: the time "
         "from which no robot moves 5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of "
         "|F v|, all robots.",
         "told_bytes: what all robots send, received or not: 20 bytes (number and position) a robot and "

@@ -23,9 +23,9 @@ _OPTIONS_BY_ACTION = {
 }
 """The options of each action, in addition to --json."""
 _LEGEND = """\
-Gap: excess of the final cost over the best placement known (median, its 95 % interval for at least 12 maps,
-worst); in brackets the median excess over proven lower bounds. To 5 %: time from which the cost stays within
-5 % of its final value. Path: mean path length of a robot. Contacts: runs in which a robot touched something.
+Gap: excess of the final cost over the best placement known (median, its 95% interval for at least 12 maps,
+worst); in brackets the median excess over proven lower bounds. To 5%: time from which the cost stays within
+5% of its final value. Path: mean path length of a robot. Contacts: runs in which a robot touched something.
 At rest: runs that settled. B/s, µs/s: bytes sent and computing time per robot.
 robocov benchmark page explains all columns."""
 """Explanation of the columns of the table of ratings."""

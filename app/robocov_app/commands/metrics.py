@@ -26,7 +26,7 @@ _COLUMNS = {
     "work": ("work_J", "{:.1f} J"),
     "effort": ("effort_N2_s", "{:.1f} N²s"),
     "path length": ("path_length_m", "{:.2f} m"),
-    "within 5 %": ("near_final_s", "{:.1f} s"),
+    "within 5%": ("near_final_s", "{:.1f} s"),
     "components": ("components", "{:.0f}"),
     "to walls": ("wall_clearance_m", "{:z.3f} m"),
     "to robots": ("robot_clearance_m", "{:z.3f} m"),

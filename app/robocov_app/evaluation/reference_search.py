@@ -71,7 +71,7 @@ class ReferencePlacement:
     positions : tuple of (x, y), m
         Position of each robot.
     agreement : float
-        Fraction of the descents whose mean distance is within 0.5 % of the best.
+        Fraction of the descents whose mean distance is within 0.5% of the best.
     """
 
     mean_distance: float

@@ -21,7 +21,7 @@ from robocov_app.figures.page import (
 )
 from robocov_app.look.axes import MAX_TIME_INTERVALS
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
-from robocov_app.look.labels import spread_labels
+from robocov_app.look.labels import append_unit, spread_labels
 from robocov_app.look.theme import Theme
 
 DISTANCE = "mean distance to the nearest robot (m)"
@@ -124,7 +124,8 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     str
     """
     last = float(curve.values[np.isfinite(curve.values)][-1])
-    return f"{curve.label}  {_format_end_value(last, unit)} {unit}".rstrip()
+    value = append_unit(_format_end_value(last, unit), unit)
+    return f"{curve.label}  {value}"
 
 
 def _format_end_value(value: float, unit: str) -> str:

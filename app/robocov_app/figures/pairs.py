@@ -44,7 +44,7 @@ class Pairs(NamedTuple):
     ratios : (m,) array
         Above 0.
     interval : Interval
-        The typical ratio with its 95 % interval.
+        The typical ratio with its 95% interval.
     """
 
     label: str
@@ -57,7 +57,7 @@ class Pairs(NamedTuple):
 def plot_pairs(
     pairs: Sequence[Pairs], label: str, *, width: int, scale: float, theme: Theme = LIGHT
 ) -> Figure:
-    """Plot all ratios in one row per comparison, and the typical ratio with its 95 % interval.
+    """Plot all ratios in one row per comparison, and the typical ratio with its 95% interval.
 
     Parameters
     ----------

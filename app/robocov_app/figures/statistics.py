@@ -19,7 +19,7 @@ CONFIDENCE_LEVEL = 0.95
 RESAMPLES = 4000
 """Number of bootstrap samples, for which interval limits vary by about a fortieth of the interval width."""
 MIN_BOOTSTRAP_MAPS = 5
-"""Minimum number of maps: five have 126 different resamples, which are enough for a 95 % interval."""
+"""Minimum number of maps: five have 126 different resamples, which are enough for a 95% interval."""
 _MAX_BATCH_VALUES = 1_000_000
 """Maximum number of values that are resampled at once, which limits memory."""
 
@@ -31,7 +31,7 @@ _BatchStatistic: TypeAlias = Callable[[IntArray], ArrayLike]
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate with its 95 % interval.
+    """An estimate with its 95% interval.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def estimate_fraction(values: ArrayLike, clusters: Sequence[object]) -> Interval
     Interval
         The mean with the exact interval of Clopper and Pearson (1934). Each cluster counts as one trial,
         since the runs of a cluster are correlated. The interval is one-sided if the fraction is 0 or 1: if
-        the event occurs on none of 33 maps, the fraction is at most 8.7 %.
+        the event occurs on none of 33 maps, the fraction is at most 8.7%.
     """
     from scipy.special import betaincinv
 

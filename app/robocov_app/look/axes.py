@@ -1,7 +1,7 @@
 """Limits and ticks of the axes of curves.
 
 The same rule applies in windows, figures and replays. A value axis starts at zero if the curves then still
-use 60 % of its height: proportions can be read off, and little space is lost. Otherwise it starts just below
+use 60% of its height: proportions can be read off, and little space is lost. Otherwise it starts just below
 the lowest value, since controllers often differ by only a few percent.
 """
 

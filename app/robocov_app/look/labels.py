@@ -7,6 +7,19 @@ _WORD_TAIL_CHARS = 12
 """Number of characters at the end of a long word that are kept when it is shortened in the middle."""
 
 
+def append_unit(number: str, unit: str) -> str:
+    """Append a unit to a formatted number, with a space unless the unit is a percent sign or empty.
+
+    Examples
+    --------
+    >>> append_unit("1.5", "m"), append_unit("12", "%"), append_unit("3", "")
+    ('1.5 m', '12%', '3')
+    """
+    if unit in ("", "%"):
+        return number + unit
+    return f"{number} {unit}"
+
+
 def spread_labels(positions: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Move labels along a line so that they do not overlap.
 

@@ -17,12 +17,12 @@ def format_amount(value: float, unit: str = "") -> str:
     ----------
     value : float
     unit : str
-        For "%", a value of 0.5 is written as 50 %.
+        For "%", a value of 0.5 is written as 50%.
 
     Examples
     --------
     >>> format_amount(0.0512, "%"), format_amount(0.643), format_amount(1.0042)
-    ('5.1 %', '0.643', '1.004')
+    ('5.1%', '0.643', '1.004')
     >>> format_amount(1.5, "m"), format_amount(6420.9, "J")
     ('1.5 m', '6,421 J')
     """
@@ -33,7 +33,7 @@ def format_amount(value: float, unit: str = "") -> str:
     if unit == "%":
         percent = 100.0 * value
         has_decimal = percent < 99.95 and round(percent, 1) % 1
-        return f"{percent:.1f} %" if has_decimal else f"{percent:.0f} %"
+        return f"{percent:.1f}%" if has_decimal else f"{percent:.0f}%"
     if not unit and 1.0 < value < 1.1:
         # Ratios near 1 differ in their third decimal place.
         text = f"{value:.3f}"
@@ -45,7 +45,7 @@ def format_amount(value: float, unit: str = "") -> str:
 
 
 def format_interval(interval: Interval, unit: str = "") -> str:
-    """Format an estimate with its interval, for example "5.2 % (3.1 % to 8 %)"."""
+    """Format an estimate with its interval, for example "5.2% (3.1% to 8%)"."""
     estimate = format_amount(interval.estimate, unit)
     if math.isnan(interval.low):
         return estimate

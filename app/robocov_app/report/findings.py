@@ -55,7 +55,7 @@ def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
     text = f"At the end the nearest robot is {run.final_distance:.3f} m away on average"
     gap = result.compute_gap(run)
     if np.isfinite(gap):
-        text += f", {100 * gap:.1f} % above the best placement known"
+        text += f", {100 * gap:.1f}% above the best placement known"
     settled_at = run.figures.get("settled_at_s")
     if settled_at is None:
         return f"{text}; not settled by the end."
@@ -70,7 +70,7 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
     for run in sorted(runs, key=lambda run: run.final_distance):
         text = f"{labels[run]} {run.final_distance:.3f} m"
         if run.final_distance > lowest > 0:
-            text += f" (+{100 * (run.final_distance / lowest - 1):.0f} %)"
+            text += f" (+{100 * (run.final_distance / lowest - 1):.0f}%)"
         texts.append(text)
     subject = "Final mean distance to the nearest robot"
     if format_densities(result):

@@ -70,7 +70,7 @@ _METRIC_COLUMNS = (
     Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null for a single robot"),
     Column("sent_bytes_per_s", "double", "B/s", "size of a robot's messages per second, without positions"),
     Column(
-        "near_final_s", "double", "s", "time after which the mean distance stays within 5 % of its last value"
+        "near_final_s", "double", "s", "time after which the mean distance stays within 5% of its last value"
     ),
 )
 

@@ -585,7 +585,7 @@ def compute_free_distances(points: Array, directions: Array, clearance: float, m
         Unit vectors.
     clearance : float, m
         Distance that the center keeps from the points. Points that are already nearer may be approached to
-        95 % of their distance.
+        95% of their distance.
     max_distance : float, m
         Upper limit of the distances.
 

@@ -26,7 +26,7 @@ _BAR_DEPTH_M = 3 * GRID_M
 not on the grid, and a bar that ended there might leave a crack."""
 _EDGES_PER_QUARTER = 32
 """Edges per quarter circle around corners when the free space is eroded, for an error of 3e-4 of the radius.
-GEOS also simplifies walls with closely spaced vertices, by up to 1 % of the radius."""
+GEOS also simplifies walls with closely spaced vertices, by up to 1% of the radius."""
 _NO_FACE = -1
 """Used in place of the index of a face if there is none."""
 

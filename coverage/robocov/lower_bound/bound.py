@@ -73,7 +73,7 @@ _MAX_TRIANGLES = 1_000_000
 _EROSION = 0.98
 """Distance by which the free space is eroded, as a fraction of the radius.
 
-Before GEOS offsets walls, it simplifies them by up to 1 % of the offset. Eroding by less ensures that no
+Before GEOS offsets walls, it simplifies them by up to 1% of the offset. Eroding by less ensures that no
 possible position is lost.
 """
 

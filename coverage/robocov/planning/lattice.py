@@ -1,7 +1,7 @@
 """A lattice of nodes in a window: its graph, shortest distances on it, and lines of sight.
 
 Edges lead from a node to its neighbors in 16 directions: straight, diagonal, and a knight's move away. In
-open space, a path on the lattice is therefore at most 2.8 % longer than the straight line. Two nodes are
+open space, a path on the lattice is therefore at most 2.8% longer than the straight line. Two nodes are
 connected if no cell on the straight line between them is near a wall. Nodes near walls can be reached, but
 paths do not pass through them.
 """

@@ -398,7 +398,7 @@ class Record(Drawable):
             raise OutputError(f"{folder}: cannot be created: {describe_error(error)}") from error
         arrays = {name: getattr(self, name) for name in self.arrays}
         with replace_file(folder / RECORD_FILE) as temporary, temporary.open("wb") as file:
-            # Compression would make the file 10 % smaller and take 20 times as long.
+            # Compression would make the file 10% smaller and take 20 times as long.
             np.savez(file, **arrays)
         text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
         with replace_file(folder / RUN_FILE) as temporary:

@@ -152,7 +152,7 @@ def draw_cluttered_halls(draw: st.DrawFn) -> Environment:
 @settings(deadline=None, max_examples=60)
 @given(draw_cluttered_halls(), st.sampled_from([0.05, 0.1, 0.3]))
 def test_connections_are_those_of_a_disc(hall: Environment, radius: float) -> None:
-    # Erosion by 2 % more and 2 % less than the radius brackets the errors of both methods.
+    # Erosion by 2% more and 2% less than the radius brackets the errors of both methods.
     narrow = hall.free.buffer(-1.02 * radius, quad_segs=64)
     wide = hall.free.buffer(-0.98 * radius, quad_segs=64)
     closed = np.array(hall.close_gaps(radius).free.geoms)

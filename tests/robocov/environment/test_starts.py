@@ -54,7 +54,7 @@ def test_positions_are_those_of_the_last_version(cluttered: Environment) -> None
 
 
 def test_a_tight_start_is_filled_by_a_lattice() -> None:
-    """75 discs of radius 0.1 m fill 75 % of a disc of radius 1 m. Random darts cannot place so many."""
+    """75 discs of radius 0.1 m fill 75% of a disc of radius 1 m. Random darts cannot place so many."""
     start = Start("tight", DiscStart((5.0, 5.0), 0.9), SQUARE)
     points = start.sample(62, seed=0)
     distances = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) + 99 * np.eye(62)

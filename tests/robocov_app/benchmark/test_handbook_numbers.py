@@ -102,9 +102,9 @@ def test_the_goals_in_the_handbook_are_the_thresholds_of_the_study() -> None:
         cells = [cell.strip() for cell in row.strip("|").split("|")]
         if len(cells) == 4:
             expected[cells[0]] = cells[1]
-    assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g} %"
-    assert f"median above {100 * MAX_MAP_GAP:g} % on no map" in expected
-    assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g} %"
+    assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g}%"
+    assert f"median above {100 * MAX_MAP_GAP:g}% on no map" in expected
+    assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g}%"
 
 
 FAILURES_PAGE = Path(__file__).parents[3] / "app/handbook/where-controllers-fail.md"
@@ -141,7 +141,7 @@ def build_failure_row(track: str, map_name: str, controllers: Sequence[str]) -> 
         selected = [row for row in rows if (row["track"], row["map"]) == (track, map_name)]
         gap = 100.0 * np.median([row["gap"] for row in selected])
         path_length = np.median([row["path_length_m"] for row in selected])
-        cells.append(f"{gap:.1f} %, {path_length:.1f} m")
+        cells.append(f"{gap:.1f}%, {path_length:.1f} m")
     return f"| {' | '.join(cells)} |"
 
 

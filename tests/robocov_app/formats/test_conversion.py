@@ -55,7 +55,7 @@ def test_inside_keeps_the_part_around_a_position() -> None:
     assert environment.boundary_polygon.equals(CLOSET)
     edge, note = report.notes
     assert edge == "the boundary is the inner edge of the walls around the free space"
-    assert note.startswith("only 3.3 % of the free area stays: --inside ")
+    assert note.startswith("only 3.3% of the free area stays: --inside ")
     assert note.endswith("keeps another part, --keep all every part")
     assert len(report.others) == 2
     for x, y in report.others:
@@ -69,7 +69,7 @@ def test_inside_keeps_the_part_around_a_position() -> None:
 def test_a_large_omitted_part_is_noted() -> None:
     _, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(), "plan")
     assert report.notes[0].startswith(
-        "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
+        "89% of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
     )
     assert build_environment(build_foreign_map(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
     # A speck next to it, such as the inside of a letter, is not offered.
@@ -336,7 +336,7 @@ def test_the_deviation_of_walls_is_measured() -> None:
     _, report = build_environment(build_foreign_map(bumpy), Shaping(), "plan")
     assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
     assert report.changed == (
-        "walls moved by at most 0.015 m; 0.003 m² changed between free and solid, 0.0038 % of the free area",
+        "walls moved by at most 0.015 m; 0.003 m² changed between free and solid, 0.0038% of the free area",
     )
     assert (report.to_dict()["moved_m"], report.to_dict()["moved_area_m2"]) == (
         report.moved,

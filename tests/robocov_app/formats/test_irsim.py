@@ -274,6 +274,6 @@ def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_transparency_is_reported_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
-    cause = "no cell is free: 100 % of the pixels are transparent; their hidden color is used"
+    cause = "no cell is free: 100% of the pixels are transparent; their hidden color is used"
     with pytest.raises(MapError, match=cause):
         read(tmp_path, "  obstacle_map: dark.png\n")

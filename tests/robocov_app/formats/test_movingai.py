@@ -34,7 +34,7 @@ def test_characters_have_their_meaning(tmp_path: Path) -> None:
     assert foreign.cell == 1.0
     assert foreign.notes == (
         "no cell size was given: 1 m taken",
-        "6 x 5 cells of 1 m: 30 % free, 70 % blocked",
+        "6 x 5 cells of 1 m: 30% free, 70% blocked",
     )
     assert read(tmp_path, GRID, trees="free").free.area == 10
     # the water touches free cells at two corners, where obstacles touch too

@@ -41,7 +41,7 @@ def test_a_plan_on_paper_is_taken_without_the_paper(tmp_path: Path) -> None:
     area, report, _ = import_picture(tmp_path, draw_flat())
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.05)
     (note,) = [note for note in report.notes if "paper around a plan" in note]
-    assert "the largest part of the free space, 208 m²" in note and "100 % of the edge" in note
+    assert "the largest part of the free space, 208 m²" in note and "100% of the edge" in note
     assert "--inside" in note
     place = report.others[0]
     assert import_picture(tmp_path, draw_flat(), inside=place)[0] == pytest.approx(20 * 12 - 8 * 4, abs=0.1)
@@ -211,7 +211,7 @@ def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: 
     area, report, _ = import_picture(tmp_path, draw_on_transparency())
     assert area == pytest.approx(6.4 * 4.4)
     assert any(note.startswith("only dark paint on a transparent ground") for note in report.notes)
-    with pytest.raises(MapError, match=r"no cell is free: .* % of the pixels are transparent"):
+    with pytest.raises(MapError, match=r"no cell is free: .*% of the pixels are transparent"):
         import_picture(tmp_path, draw_on_transparency(), unknown="obstacle")
 
 
@@ -220,7 +220,7 @@ def test_transparency_is_reported_if_nothing_is_solid(tmp_path: Path) -> None:
     ImageDraw.Draw(picture).rectangle((10, 10, 19, 19), fill=(0, 0, 0, 100))
     _, report, _ = import_picture(tmp_path, picture, unknown="free")
     (note,) = [note for note in report.notes if note.startswith("nothing is solid")]
-    assert "6.25 % of the pixels are transparent (less than half opaque)" in note
+    assert "6.25% of the pixels are transparent (less than half opaque)" in note
 
 
 def test_brightness_is_reported_if_everything_is_solid_or_free(tmp_path: Path) -> None:

@@ -228,6 +228,6 @@ def test_included_files_are_limited_together(tmp_path: Path) -> None:
 
 def test_transparency_is_reported_as_the_cause(tmp_path: Path) -> None:
     Image.new("LA", (4, 4), (0, 0)).save(tmp_path / "dark.png")
-    cause = "got only dark pixels: 100 % of the pixels are transparent; their hidden color is used"
+    cause = "got only dark pixels: 100% of the pixels are transparent; their hidden color is used"
     with pytest.raises(MapError, match=cause):
         read(tmp_path, 'model ( size [4 4 1] bitmap "dark.png" )')

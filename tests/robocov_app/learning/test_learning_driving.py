@@ -35,7 +35,7 @@ def test_actions_are_recovered_from_forces(action: str) -> None:
 
 
 def test_robots_follow_a_velocity(empty: Environment) -> None:
-    """After five time constants, simulated velocities are within 1 % of those requested."""
+    """After five time constants, simulated velocities are within 1% of those requested."""
     simulation = Simulation(
         empty, ExternalController(), [[2.0, 2.0], [6.0, 6.0]], Team.homogeneous(2, mass=2.0), 0.01
     )

@@ -173,10 +173,10 @@ class TestVerdicts:
         ("value", "unit", "text"),
         [
             (0.643, "", "0.643"),
-            (0.5, "%", "50 %"),
-            (0.052, "%", "5.2 %"),
-            (0.9999, "%", "100 %"),
-            (-0.031, "%", "−3.1 %"),
+            (0.5, "%", "50%"),
+            (0.052, "%", "5.2%"),
+            (0.9999, "%", "100%"),
+            (-0.031, "%", "−3.1%"),
             (1.234, "m", "1.23 m"),
             (np.inf, "m", "–"),
         ],
@@ -186,7 +186,7 @@ class TestVerdicts:
 
     @pytest.mark.parametrize(
         ("low", "high", "text"),
-        [(-np.inf, 0.05, "at most 5 %"), (0.9, np.inf, "at least 90 %"), (0.1, 0.2, "between 10 % and 20 %")],
+        [(-np.inf, 0.05, "at most 5%"), (0.9, np.inf, "at least 90%"), (0.1, 0.2, "between 10% and 20%")],
     )
     def test_the_range_of_a_criterion_is_described(self, low, high, text):
         assert Criterion("x", Interval(0.0, 0.0, 0.0), low, high, "%").range_text == text
@@ -318,7 +318,7 @@ class TestLloydAndGaps:
         }
         claim = judge_lloyd_unusable(Outcomes(instances, values))
         assert claim.verdict == verdict
-        assert "RAPF, shared gains: walls touched in 0 %, 25 % of the robots blocked." in claim.explanation
+        assert "RAPF, shared gains: walls touched in 0%, 25% of the robots blocked." in claim.explanation
 
     @pytest.mark.parametrize(
         ("controller", "gains", "gap", "verdict"),

@@ -44,7 +44,7 @@ def test_equal_values_have_equal_positions_in_all_strips():
 
 def test_strips_have_a_description_and_escape_names():
     svg = str(draw_strips([DotStrip("<b>", False, {"x&y": 0.5})], 1.0))
-    assert 'role="img"' in svg and "&lt;b&gt;: 50 % to 50 %" in svg and "x&amp;y: 50 %" in svg
+    assert 'role="img"' in svg and "&lt;b&gt;: 50% to 50%" in svg and "x&amp;y: 50%" in svg
     assert "<b>" not in svg
 
 

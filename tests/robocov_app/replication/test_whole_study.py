@@ -513,7 +513,7 @@ class TestPages:
                 "rho_0 2 m",
             ),
             *("RAPF (k_rep 1, rho_0 2, k_att 3, no limit); RPF (k_rep 1, rho_0 2)", "attraction_limit 2"),
-            *("equal within 2 %", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
+            *("equal within 2%", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
         ):
             assert words in text, words
         assert "all non-convex ones except campus" not in text

@@ -42,7 +42,7 @@ def test_every_metric_has_a_plot_that_is_described_with_its_final_values() -> No
     assert list(plots) == ["Sensed area", "Visible area", "Energy", "Path", "Clearance", "Separation"]
     metrics = compute_run_metrics(replay_runs[0].record, 15.0)
     assert f"to {metrics.path_length[-1]:.4g} m; RPF" in plots["Path"]
-    assert f"to {100.0 * metrics.visible_area[-1] / metrics.free_area:.4g} %" in plots["Visible area"]
+    assert f"to {100.0 * metrics.visible_area[-1] / metrics.free_area:.4g}%" in plots["Visible area"]
     first_ids = {svg.partition('id="')[2].partition('"')[0] for svg in plots.values()}
     assert len(first_ids) == len(plots)
 

@@ -36,7 +36,7 @@ RUNS = [
         (
             build_result([build_run(final=3.0), build_run("rpf", final=2.0)], kind="comparison"),
             "RAPF, RPF on rooms",
-            "Final mean distance to the nearest robot: RPF 2.000 m, RAPF 3.000 m (+50 %).",
+            "Final mean distance to the nearest robot: RPF 2.000 m, RAPF 3.000 m (+50%).",
         ),
         (build_result([build_run(final=None)], kind="run"), "RAPF on rooms", "No run has a result."),
         (
@@ -57,7 +57,7 @@ def test_the_findings_on_a_single_run_have_its_gap_to_the_reference() -> None:
     references = {run.setting: Reference(2.0, 0.0)}
     result = replace(build_result([run], kind="run"), references=references)
     (finding,) = list_findings(result, [])
-    assert ", 10.0 % above the best placement known" in finding
+    assert ", 10.0% above the best placement known" in finding
 
 
 def test_a_complete_result_has_no_missing_runs() -> None:

@@ -87,7 +87,7 @@ def test_every_image_has_a_description() -> None:
     )
     assert "cost" not in parse_svg(draw_run(record, None)).get("aria-label")
     assert parse_svg(draw_map(HALL)).get("aria-label") == (
-        "Map hall: 14 m by 11 m without obstacles, 98 m² free, 22 % of the known region blocked."
+        "Map hall: 14 m by 11 m without obstacles, 98 m² free, 22% of the known region blocked."
     )
     hidden = parse_svg(draw_run(record, None, is_hidden=True))
     assert hidden.get("aria-hidden") == "true"

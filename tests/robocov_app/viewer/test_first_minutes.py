@@ -130,7 +130,7 @@ def test_each_of_four_panes_shows_its_cost(
         free_width = left + width - driver.window.chart.times.right - 9 * scale
         name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
         text_size = round(driver.window.theme.small_text * scale)
-        assert measure_text(f"{name}  8.888  +88.8 %", text_size, True) <= free_width
+        assert measure_text(f"{name}  8.888  +88.8%", text_size, True) <= free_width
 
 
 def test_a_controller_name_is_not_cut_beside_a_large_cost(tmp_path: Path, drawn_texts: list[str]) -> None:
@@ -139,7 +139,7 @@ def test_a_controller_name_is_not_cut_beside_a_large_cost(tmp_path: Path, drawn_
             pane.distance_curve.add(0.0, value)
         drawn_texts.clear()
         driver.window.draw()
-        assert "RAPF  4.023  +117 %" in drawn_texts
+        assert "RAPF  4.023  +117%" in drawn_texts
 
 
 def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None:

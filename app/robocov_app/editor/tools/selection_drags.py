@@ -280,9 +280,9 @@ class ScaleDrag(Drag):
         self.change = None
         if not is_unchanged:
             self.change = transform.scale(self.context.sketch, self.selection, factor_x, factor_y, center)
-        percent = f"{100 * factor_x:.0f} %"
+        percent = f"{100 * factor_x:.0f}%"
         if abs(factor_x - factor_y) >= _FACTOR_TOLERANCE:
-            percent += f" x {100 * factor_y:.0f} %"
+            percent += f" x {100 * factor_y:.0f}%"
         new_width = geometry.format_length(abs(width * factor_x))
         new_height = geometry.format_length(abs(height * factor_y))
         self.label = f"{new_width} x {new_height}   {percent}"

@@ -103,7 +103,7 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
     Returns
     -------
     Layer
-        Arrow lengths saturate: 63 % of the maximum length (1 - 1/e) at the force that gives a robot its
+        Arrow lengths saturate: 63% of the maximum length (1 - 1/e) at the force that gives a robot its
         maximum acceleration.
     """
 

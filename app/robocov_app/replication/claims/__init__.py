@@ -1,12 +1,12 @@
 """The paper's claims, and those beyond it: from the outcomes of many runs to a verdict.
 
-A claim has one or several *criteria* (`claim`): an estimate, its 95 % interval, and the range in which it
+A claim has one or several *criteria* (`claim`): an estimate, its 95% interval, and the range in which it
 has to lie. A criterion is met if the whole interval is in that range, refuted if all of it is outside, and
 open if it extends over an end of the range. The p-value of a claim is the highest of its criteria
 (intersection-union test). Those of the registered claims are adjusted by Holm.
 
 All thresholds (`thresholds`) were set before the study was run. Statistics are medians over problem
-instances; their 95 % bootstrap intervals draw whole maps.
+instances; their 95% bootstrap intervals draw whole maps.
 
 `convex_claims`, `nonconvex_claims`, `gain_claims` and `start_claims` judge the paper's claims, `goals`,
 `rivals` and `extensions` those beyond it.

@@ -39,11 +39,11 @@ class Criterion:
     measure : str
         Description of the measured value.
     interval : Interval
-        Its estimate and 95 % interval.
+        Its estimate and 95% interval.
     low, high : float
         Ends of the range, both included.
     unit : str
-        "", "%", "m" or "s". For "%", a value of 0.5 is written as 50 %.
+        "", "%", "m" or "s". For "%", a value of 0.5 is written as 50%.
     """
 
     measure: str
@@ -76,7 +76,7 @@ class Criterion:
 
     @property
     def range_text(self) -> str:
-        """The range as text, for example "at most 5 %"."""
+        """The range as text, for example "at most 5%"."""
         low = format_amount(self.low, self.unit)
         high = format_amount(self.high, self.unit)
         if math.isinf(self.high):

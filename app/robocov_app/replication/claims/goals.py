@@ -38,7 +38,7 @@ from robocov_app.replication.results.outcomes import Outcomes, PairedComparison
 
 _RESAMPLES = 2000
 _LIMIT_QUANTILES = (0.025, 0.975)
-"""Quantiles of the resampled values that are the limits of a 95 % interval."""
+"""Quantiles of the resampled values that are the limits of a 95% interval."""
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,7 @@ def _describe_miss(goal: Claim) -> str:
 
 
 def describe_goal(goal: Claim) -> str:
-    """Return the outcome of a goal, such as "met" or "missed: 1.8 % instead of at most 1.4 %"."""
+    """Return the outcome of a goal, such as "met" or "missed: 1.8% instead of at most 1.4%"."""
     (criterion,) = goal.criteria
     text = "met" if is_goal_met(goal) else f"missed: {_describe_miss(goal)}"
     if criterion.is_met is None and math.isfinite(criterion.interval.low):

@@ -8,9 +8,9 @@ about controllers.
 from robocov_app.replication.design.plan import CONVEX_KINDS, ROBOTS
 
 SAME_COST = 0.02
-"""Two costs are the same if the median of their ratio is within 2 % of 1."""
+"""Two costs are the same if the median of their ratio is within 2% of 1."""
 NEARLY_SAME = 0.05
-"""In single runs two costs are nearly the same if they differ by at most 5 %."""
+"""In single runs two costs are nearly the same if they differ by at most 5%."""
 NEARLY_ALWAYS = 0.9
 """Minimum fraction of runs for which a statement that the paper makes without exceptions must be true.
 
@@ -25,11 +25,11 @@ OFTEN_BLOCKED = 1.0 / ROBOTS
 CLEARLY_BELOW = 0.95
 """A controller is clearly better than another if the median ratio of their costs is below this."""
 BARELY = 0.05
-"""A result barely depends on the gains if its standard deviation is below 5 % of its mean."""
+"""A result barely depends on the gains if its standard deviation is below 5% of its mean."""
 REGRET = 0.02
-"""The best gains depend on the environment if the best gains of other maps raise the cost by over 2 %."""
+"""The best gains depend on the environment if the best gains of other maps raise the cost by over 2%."""
 BARELY_BY_START = 0.1
-"""A result barely depends on the starts if its standard deviation over them is below 10 % of its mean.
+"""A result barely depends on the starts if its standard deviation over them is below 10% of its mean.
 
 Starts matter more than gains for any controller that descends to a local optimum, so the bound is wider.
 """
@@ -39,9 +39,9 @@ SAME_PLACEMENT = 0.25
 In units of the side of a square with the mean free area per robot.
 """
 NEAR_OPTIMUM = 0.1
-"""A team is near the reference if its cost exceeds that of the reference by at most 10 %."""
+"""A team is near the reference if its cost exceeds that of the reference by at most 10%."""
 FAR_FROM_OPTIMUM = 0.25
-"""A team is far from the reference if its cost exceeds that of the reference by at least 25 %."""
+"""A team is far from the reference if its cost exceeds that of the reference by at least 25%."""
 CLUSTERED = CONVEX_KINDS[:-1]
 """Kinds of starts in convex regions from which the robots start close together."""
 
@@ -65,7 +65,7 @@ MAX_STEP_RATIO = 10.0
 MIN_CLOSED_FRACTION = 0.5
 """Minimum fraction of a gap that must be closed to say that most of it is."""
 
-TOLERATED = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
+TOLERATED = ((("loss", 0.6), "60% of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
 """Disturbances that RAPF should tolerate: axis and value, and their description."""
 
 ALPHA = 0.05
@@ -73,6 +73,6 @@ ALPHA = 0.05
 MIN_MAPS = 12
 """Minimum number of maps for judging a claim.
 
-A 95 % percentile interval of the mean contains the true value in 82 % of all cases with 5 normally
-distributed clusters, and in 92 % with 12.
+A 95% percentile interval of the mean contains the true value in 82% of all cases with 5 normally
+distributed clusters, and in 92% with 12.
 """

@@ -36,7 +36,7 @@ def load_study_map(name: str, kinds: Iterable[str] = KINDS) -> StudyMap:
 def generate_study_map(seed: int) -> StudyMap:
     """Generate a non-convex map with the study's starts.
 
-    Four to eight obstacles, about three in five of them convex, one an L and one a U, block 16 to 25 % of a
+    Four to eight obstacles, about three in five of them convex, one an L and one a U, block 16 to 25% of a
     square with a side of ten meters. Every passage is at least 0.6 m wide, and the free space is connected.
     """
     rng = np.random.default_rng([seed, 2])

@@ -83,7 +83,7 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
         labelcolor=to_plot_color(theme.ink),
     )
     pairs = format_count(max(degradation.runs for degradation in degradations), "pair")
-    note = f"medians of {pairs} of runs, and 95 % intervals; only working robots count"
+    note = f"medians of {pairs} of runs, and 95% intervals; only working robots count"
     page.write(note, page.margin, height - 18, points=SMALL, color=quiet)
     return page.figure
 

@@ -283,7 +283,7 @@ def _draw_distance(
     _simplify_axes(axes, theme, "height h (m)", grid="y")
     worst = max(inner, key=lambda optimum: optimum.loss)
     note = (
-        f"A sensor over the centroid loses\nat most {100.0 * worst.loss:.2g} % of the optimum,\n"
+        f"A sensor over the centroid loses\nat most {100.0 * worst.loss:.2g}% of the optimum,\n"
         f"at h = {worst.height:.2g} m."
     )
     axes.annotate(

@@ -40,7 +40,7 @@ _COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=34)
 _HIDDEN_M = 0.25
 """Distance within which the disc of a robot hides its goal, on a map of ten meters."""
 _ARRIVED = 0.05
-"""A cost counts as settled from the time after which it stays within 5 % of its last value."""
+"""A cost counts as settled from the time after which it stays within 5% of its last value."""
 _SAME_COST = 0.0005
 """Relative difference below which two costs are called the same."""
 
@@ -162,7 +162,7 @@ def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
     return (
         f"Averaged over the first {FIRST_MINUTE_S:g} s RAPF has {rapf_mean:.3f} m, {label} "
         f"{other_mean:.3f} m: {_describe_difference(rapf_mean, other_mean)}. RAPF's is the lower one "
-        f"{format_amount(lower, '%')} of the time. RAPF stays within 5 % of its last value from "
+        f"{format_amount(lower, '%')} of the time. RAPF stays within 5% of its last value from "
         f"{find_arrival_time(rapf.history):.0f} s on, "
         f"{label} from {find_arrival_time(other.history):.0f} s on."
     )
@@ -214,7 +214,7 @@ def _describe_difference(cost: float, other_cost: float) -> str:
 
 
 def find_arrival_time(history: CostHistory) -> float:
-    """Return the time, s, from which a cost stays within 5 % of its last value."""
+    """Return the time, s, from which a cost stays within 5% of its last value."""
     cost = history.mean_distance
     is_away = np.abs(cost - cost[-1]) > _ARRIVED * cost[-1]
     rows = np.flatnonzero(is_away)

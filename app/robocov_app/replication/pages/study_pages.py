@@ -89,7 +89,7 @@ _MAX_IMAGINARY_PART = 1e-9
 """Imaginary part up to which a root counts as real, 1/m."""
 _REPORTED_GAPS = (0.25, 0.5, 1.0)
 """Gaps for which the page reports the fraction of runs that exceed them."""
-_SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N|J)(?![\w³²]))")
+_SPACE_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m|s|m²|m³|N|J)(?![\w³²]))")
 
 
 class ShownFailure(NamedTuple):

@@ -1,4 +1,4 @@
-"""Comparison of two groups by pairs of runs: ratios of final mean distances, with 95 % intervals."""
+"""Comparison of two groups by pairs of runs: ratios of final mean distances, with 95% intervals."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -10,6 +10,7 @@ from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.curves import TIME
 from robocov_app.figures.runs import to_free_area_percent
+from robocov_app.look.labels import append_unit
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import has_path
 from robocov_app.report.plots.plot import PANEL_SIZE_PX, GroupStyles, PagePlot
@@ -193,7 +194,8 @@ def _build_metric_plot(metric_curves: _MetricCurves, bands: Sequence[Band], key:
     for band in bands:
         finite_values = band.values[0][np.isfinite(band.values[0])]
         first, last = finite_values[[0, -1]]
-        texts.append(f"{band.label}: from {first:.4g} to {last:.4g} {unit}".rstrip())
+        last_value = append_unit(f"{last:.4g}", unit)
+        texts.append(f"{band.label}: from {first:.4g} to {last_value}")
     description = f"{title}: {label} against time. {'; '.join(texts)}."
     figure = plot_cost_bands(bands, PANEL_SIZE_PX, label, unit)
     svg_key = f"{key}-{title.lower().replace(' ', '-')}"

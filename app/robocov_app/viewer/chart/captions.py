@@ -113,10 +113,10 @@ def format_gap(value: float, best: float) -> str:
     Examples
     --------
     >>> format_gap(2.2, 2.0), format_gap(5.0, 2.0), format_gap(2.0, 2.0)
-    ('  +10.0 %', '  +150 %', '  best')
+    ('  +10.0%', '  +150%', '  best')
     """
     if value <= best:
         return "  best"
     percent = 100 * (value / best - 1)
     decimals = 1 if percent < _MAX_PERCENT_WITH_DECIMAL else 0
-    return f"  +{percent:.{decimals}f} %"
+    return f"  +{percent:.{decimals}f}%"

@@ -26,7 +26,7 @@ BOTTOM_PX = 20
 """Space below, for the numbers of the time axis."""
 MIN_TICK_GAP_PX = 22
 """Minimum distance between grid lines."""
-_WIDEST_VALUE = "  8.888  +88.8 %"
+_WIDEST_VALUE = "  8.888  +88.8%"
 _MAX_NAMES_FRACTION = 0.4
 """Maximum fraction of the chart's width for captions with names of controllers."""
 

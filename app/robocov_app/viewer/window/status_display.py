@@ -61,7 +61,7 @@ class StatusDisplay:
         is_error = bool(message) and viewer.has_error_message
         progress = self.seek_progress
         if progress is not None and not is_error:
-            message = f"Recomputing the session: {100 * progress:.0f} %"
+            message = f"Recomputing the session: {100 * progress:.0f}%"
         if not message and self.can_suggest and self._lesson.shown is None:
             message = suggest_actions(viewer)
         draw_message(screen, message, layout.arena, theme, layout.scale, is_error=is_error)

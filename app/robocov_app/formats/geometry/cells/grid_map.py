@@ -170,13 +170,13 @@ def _describe_cells(cells: Cells, cell: float, unknown_meaning: Meaning, unknown
 
 
 def _format_share(number: int, total: int) -> str:
-    """Format a share of the cells in percent. A share other than 0 and 1 is not rounded to 0 or 100 %."""
+    """Format a share of the cells in percent. A share other than 0 and 1 is not rounded to 0 or 100%."""
     share = 100 * number / total
     if 0.0 < share < 0.1:
-        return "<0.1 %"
+        return "<0.1%"
     if 99.9 < share < 100.0:
-        return ">99.9 %"
-    return f"{share:.3g} %"
+        return ">99.9%"
+    return f"{share:.3g}%"
 
 
 def _find_main_island(known: BoolArray, free: BoolArray) -> BoolArray:

@@ -210,7 +210,7 @@ def _report_large_cells(conversion: Conversion) -> None:
 
 def _report_deviation(deviation: Deviation, free: MultiPolygon, conversion: Conversion) -> None:
     if deviation.distance >= _MIN_REPORTED_MOVE_M:
-        share = f"{100 * deviation.area / free.area:.2g} % of the free area"
+        share = f"{100 * deviation.area / free.area:.2g}% of the free area"
         walls = f"walls moved by at most {deviation.distance:.2g} m"
         conversion.changed.append(
             f"{walls}; {format_area(deviation.area, 2)} changed between free and solid, {share}"

@@ -188,7 +188,7 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
     edge_share = edge_lengths[0] / page.length
     if edge_share < _MIN_PAGE_EDGE_SHARE:
         return None
-    edge = f"{100 * edge_share:.0f} % of the edge of the image"
+    edge = f"{100 * edge_share:.0f}% of the edge of the image"
     description = f"{format_area(largest.area, 3)}, runs along {edge}"
     enclosed = [k for k, length in enumerate(edge_lengths) if length == 0.0]
     if enclosed and parts[enclosed[0]].area >= _MIN_PLAN_SHARE * largest.area:
@@ -231,7 +231,7 @@ def _report_dropped_parts(
     ]
     only = "only " if share < _MIN_KEPT_SHARE else ""
     conversion.notes.append(
-        f"{only}{100 * share:.2g} % of the free area stays: {' or '.join(choices)} keeps another part, "
+        f"{only}{100 * share:.2g}% of the free area stays: {' or '.join(choices)} keeps another part, "
         "--keep all every part"
     )
     return positions

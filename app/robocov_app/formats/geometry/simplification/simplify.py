@@ -141,8 +141,8 @@ def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]
     """Return the lines of the import report about places that were simplified less."""
     reasons = {
         "narrow passage": f"so that a robot of radius {radius:g} m still fits through",
-        "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
-        "outline": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g} %",
+        "thin part": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g}%",
+        "outline": f"whose area would have changed by more than {100 * MAX_OUTLINE_CHANGE:g}%",
         "point": "where walls would have touched",
     }
     lines = []
@@ -150,6 +150,6 @@ def _describe_problems(problems: Counter[str], radius: float) -> tuple[str, ...]
         if problems[kind]:
             lines.append(f"simplified less at {format_count(problems[kind], kind)}, {reason}")
     if problems["area"]:
-        limit = f"{100 * MAX_AREA_CHANGE:g} %"
+        limit = f"{100 * MAX_AREA_CHANGE:g}%"
         lines.append(f"simplified less, so that the free area changes by less than {limit}")
     return tuple(lines)

@@ -74,4 +74,4 @@ def describe_transparency(picture: Brightness) -> str:
     percentage = 100 * np.count_nonzero(picture.alpha < OPAQUE_ALPHA) / picture.alpha.size
     if percentage == 0.0:
         return ""
-    return f"{percentage:.3g} % of the pixels are transparent; their hidden color is used"
+    return f"{percentage:.3g}% of the pixels are transparent; their hidden color is used"

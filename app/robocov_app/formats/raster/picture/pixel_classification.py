@@ -77,7 +77,7 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
         if names:
             percentage = 100 * np.count_nonzero(roles == ROLE_CODES[role]) / roles.size
             colors = ", ".join(names)
-            note = f"{percentage:.3g} % of the pixels are {colors}, treated as {_ROLE_LABELS[role]}"
+            note = f"{percentage:.3g}% of the pixels are {colors}, treated as {_ROLE_LABELS[role]}"
             notes.append(note)
     return notes
 
@@ -166,7 +166,7 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, source_n
         return
     if counts[UNKNOWN]:
         percentage = 100 * counts[UNKNOWN] / cells.size
-        cause = f"{percentage:.3g} % of the pixels are transparent, which counts as solid"
+        cause = f"{percentage:.3g}% of the pixels are transparent, which counts as solid"
         advice = "--unknown free treats transparent cells as free"
     else:
         darkest = picture.level.min() / picture.max_level
@@ -182,12 +182,12 @@ def describe_doubts(cells: Cells, unknown: str, picture: Brightness) -> list[str
     if not counts[BLOCKED] and unknown == "free" and counts[UNKNOWN]:
         percentage = 100 * counts[UNKNOWN] / cells.size
         return [
-            f"nothing is solid: {percentage:.3g} % of the pixels are transparent (less than half opaque), "
+            f"nothing is solid: {percentage:.3g}% of the pixels are transparent (less than half opaque), "
             "which --unknown free treats as free"
         ]
     if _is_line_drawing(cells):
         percentage = 100 * counts[FREE] / cells.size
-        light = f"only {percentage:.2g} % of the pixels are light, all of them thin lines"
+        light = f"only {percentage:.2g}% of the pixels are light, all of them thin lines"
         return [f"{light}: use --invert if they are the walls"]
     if not counts[BLOCKED] and not counts[UNKNOWN]:
         darkest = picture.level.min() / picture.max_level

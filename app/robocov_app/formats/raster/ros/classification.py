@@ -5,7 +5,7 @@ of a pixel from 0 to 1, or its brightness if `negate` is set. In the mode
 
 - trinary, a cell is occupied if p > occupied_thresh, free if p < free_thresh, and unknown otherwise; an alpha
   channel is included in the average like a color;
-- scale, a cell is unknown if it is not opaque; between the thresholds, its occupancy rises from 0 to 100 %;
+- scale, a cell is unknown if it is not opaque; between the thresholds, its occupancy rises from 0 to 100%;
 - raw, the value of the pixel is the occupancy of the cell in %, and the cell is unknown if the value exceeds
   100; `negate` and the thresholds are ignored.
 """
@@ -129,5 +129,5 @@ def _compute_darkness(max_level: int, negate: bool) -> Array:
 
 
 def _find_blocked_cells(occupancy: Array, threshold: float) -> Cells:
-    """Return `BLOCKED` or `FREE` for each occupancy in percent; an occupancy of 0 % is always free."""
+    """Return `BLOCKED` or `FREE` for each occupancy in percent; an occupancy of 0% is always free."""
     return np.where(occupancy >= max(100.0 * threshold, 1.0), BLOCKED, FREE).astype(np.uint8)

@@ -1,6 +1,6 @@
 """ROS maps: a YAML file and a picture, as written by map_server and nav2.
 
-In the modes scale and raw, cells with an occupancy of 50 % or more are obstacles; the option ``threshold``
+In the modes scale and raw, cells with an occupancy of 50% or more are obstacles; the option ``threshold``
 changes this limit. Single blocked cells in the free space are dropped as noise unless `Shaping.specks` is
 given.
 """
