@@ -88,7 +88,7 @@ def test_rows_agree_with_the_entries(controller: str, track: str) -> None:
 def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
     first_table = PAGE.read_text(encoding="utf-8").partition("## List of controllers")[0]
     names = re.findall(r"`([a-z-]+)`", first_table)
-    gaps = re.findall(r"(\d+\.\d) %", first_table)
+    gaps = re.findall(r"(\d+\.\d)%", first_table)
     expected = []
     for name in names:
         rows = [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"]
