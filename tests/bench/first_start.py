@@ -136,7 +136,7 @@ def describe(times_s: Sequence[float]) -> str:
     ordered = sorted(times_s)
     return (
         f"{len(ordered)} answers: median {1000 * median(ordered):.0f} ms, "
-        f"95 % within {1000 * ordered[int(0.95 * len(ordered))]:.0f} ms, longest {ordered[-1]:.2f} s"
+        f"95% within {1000 * ordered[int(0.95 * len(ordered))]:.0f} ms, longest {ordered[-1]:.2f} s"
     )
 
 

@@ -79,7 +79,7 @@ class GpUcb(BaseController):
     *Process.* The kernel is the squared exponential with the length `correlation`. The mean of the prior is
     the mean of the measurements that a robot knows, and its standard deviation their root mean square; no
     absolute scale of the density has to be known. A measurement counts as if it was made in the center of its
-    square, with a variance of 1 % of that of the prior. Between the centers, mean and standard deviation are
+    square, with a variance of 1% of that of the prior. Between the centers, mean and standard deviation are
     interpolated bilinearly.
 
     *Updates.* With the prior covariance K, the posterior covariance C is updated for each newly measured

@@ -63,7 +63,7 @@ def test_robots_that_stay_get_almost_no_reward(cost: CoverageCost) -> None:
 
 
 def test_no_placement_costs_less_than_the_reference(empty: Environment) -> None:
-    """In a square, regular grids of 1, 4 and 9 robots cost at most 3 % more than the reference."""
+    """In a square, regular grids of 1, 4 and 9 robots cost at most 3% more than the reference."""
     cost = CoverageCost(empty, 40)
     for n in (1, 4, 9):
         side = round(n**0.5)
