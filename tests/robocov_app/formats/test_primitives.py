@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, box
 
@@ -44,6 +44,20 @@ def build_map(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Enviro
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@example(
+    # The first circle ends at the boundary, and extends from it by a little more than the tolerance.
+    [CircleObstacle((0.0, 1.0), 0.21875), CircleObstacle((2.0, 2.0), 1.0)],
+    [],
+    [],
+    0.2,
+)
+@example(
+    # The first circle would leave a pocket in the corner, which was a part of its own and left out.
+    [CircleObstacle((1.0, 1.0), 1.25), CircleObstacle((2.0, 4.0), 1.0)],
+    [],
+    [],
+    0.2,
+)
 @given(
     st.lists(_CIRCLE, max_size=5),
     st.lists(_WALL, max_size=5),

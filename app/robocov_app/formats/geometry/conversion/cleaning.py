@@ -67,18 +67,22 @@ def remove_hairs(free: MultiPolygon, width: float, length: float) -> Cleaned:
     return Cleaned(cleaned, len(slits) + len(spurs), area)
 
 
-def remove_slivers(solid: list[Polygon], solid_before: BaseGeometry, tolerance: float) -> list[Polygon]:
+def remove_slivers(
+    solid: list[Polygon], solid_before: BaseGeometry, boundary: Polygon, tolerance: float
+) -> list[Polygon]:
     """Remove slivers between a boundary and the free space next to it.
 
     Slivers arise where simplification moved the boundary and the outline of the free space apart: they are
-    thinner than the tolerance, and were not solid before.
+    thinner than the tolerance, and most of their area was not solid before. What was solid extends from the
+    boundary by at most the tolerance, so that removing it moves no wall by more.
     """
     if not solid or tolerance == 0.0:
         return solid
     parts = np.array(solid, dtype=object)
     is_thin = shapely.is_empty(shapely.buffer(parts, -tolerance, quad_segs=2))
-    area_before = shapely.area(shapely.intersection(parts[is_thin], solid_before))
-    is_new = area_before < shapely.area(parts[is_thin]) / 2
+    before = shapely.intersection(parts[is_thin], solid_before)
+    is_new = shapely.area(before) < shapely.area(parts[is_thin]) / 2
+    is_new &= shapely.covered_by(before, shapely.buffer(boundary.exterior, tolerance))
     return list(np.delete(parts, np.flatnonzero(is_thin)[is_new]))
 
 

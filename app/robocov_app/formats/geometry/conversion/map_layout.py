@@ -94,7 +94,8 @@ def build_layout(
         digits=conversion.digits,
     )
     if outer is not None:
-        solid = remove_slivers(solid, shapely.difference(outer, original), simplified.tolerance)
+        solid_before = shapely.difference(outer, original)
+        solid = remove_slivers(solid, solid_before, boundary, simplified.tolerance)
     return MapLayout(boundary, solid, [], measure_deviation(unsimplified, free))
 
 

@@ -41,8 +41,8 @@ def restore_primitives(
 ) -> MapLayout:
     """Replace polygons of a layout that consist of circles and walls by these primitives.
 
-    A polygon stays if its primitives would leave a pocket, a tiny enclosed piece of free space, next to them.
-    All polygons stay if walls would have moved by more than the tolerance.
+    A polygon stays if its primitives would leave a pocket next to them: an enclosed piece of free space that
+    is tiny, or that was solid. All polygons stay if walls would have moved by more than the tolerance.
 
     Parameters
     ----------
@@ -58,12 +58,13 @@ def restore_primitives(
     MapLayout
     """
     max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (unsimplified, simplified.free))
+    free_before = layout.compute_free()
     rejected: frozenset[Primitive] = frozenset()
     for _ in range(_MAX_ROUNDS):
         candidate = _match_primitives(layout, simplified.tolerance, max_rooms, rejected, conversion)
         if not candidate.primitives:
             return layout
-        pockets = _find_pockets(candidate)
+        pockets = _find_pockets(candidate, free_before)
         next_to_pockets = {
             primitive
             for primitive in candidate.primitives
@@ -168,11 +169,15 @@ def _find_matches(
     return matches
 
 
-def _find_pockets(layout: MapLayout) -> Array:
-    """Return the parts of the free space that are so small that they are due to rounding."""
+def _find_pockets(layout: MapLayout, free_before: MultiPolygon) -> Array:
+    """Return the parts of the free space that are due to rounding, or that mostly were solid before."""
     parts = shapely.get_parts(layout.compute_free())
     area = shapely.area(parts)
     is_pocket: BoolArray = area < min(MAX_CRUMB_M2, area.max(initial=0.0))
+    # The largest part is the free space of the map itself.
+    others = np.flatnonzero(~is_pocket & (area < area.max(initial=0.0)))
+    area_before = shapely.area(shapely.intersection(parts[others], free_before))
+    is_pocket[others] = area_before < area[others] / 2
     return np.asarray(parts[is_pocket])
 
 
