@@ -58,6 +58,13 @@ def build_map(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Enviro
     [],
     0.2,
 )
+@example(
+    # The second circle would leave out the block that extends from it by more than the tolerance.
+    [CircleObstacle((2.0, 2.0), 1.0), CircleObstacle((5.5, 0.25), 1.25)],
+    [],
+    [box(5.0, 0.0, 6.0, 1.75)],
+    0.2,
+)
 @given(
     st.lists(_CIRCLE, max_size=5),
     st.lists(_WALL, max_size=5),

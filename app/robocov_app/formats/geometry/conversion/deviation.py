@@ -45,12 +45,38 @@ def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
     """
     distance = 0.0
     for first, second in ((before, after), (after, before)):
-        points = shapely.points(_sample_walls(first))
-        walls = STRtree(shapely.linestrings(extract_sides(second)))
-        _, distances = walls.query_nearest(points, return_distance=True, all_matches=False)
+        _, distances = _measure_distances(first, second)
         distance = max(distance, float(distances.max()))
     area = float(shapely.symmetric_difference(before, after).area)
     return Deviation(area, round(distance, _DIGITS))
+
+
+def find_moved_walls(before: MultiPolygon, after: MultiPolygon, limit: float) -> Array:
+    """Find where walls have moved by more than a limit.
+
+    Parameters
+    ----------
+    before, after : MultiPolygon, m
+    limit : float, m
+
+    Returns
+    -------
+    (n,) array of shapely.Point, m
+        Points on walls of one of the free spaces that are farther than the limit from all walls of the other.
+    """
+    moved = []
+    for first, second in ((before, after), (after, before)):
+        points, distances = _measure_distances(first, second)
+        moved.append(points[distances > limit])
+    return np.concatenate(moved)
+
+
+def _measure_distances(first: MultiPolygon, second: MultiPolygon) -> tuple[Array, Array]:
+    """Return points on the walls of an area, and their distances from the walls of another one, m."""
+    points = shapely.points(_sample_walls(first))
+    walls = STRtree(shapely.linestrings(extract_sides(second)))
+    _, distances = walls.query_nearest(points, return_distance=True, all_matches=False)
+    return points, distances
 
 
 def _sample_walls(area: MultiPolygon) -> Array:

@@ -20,7 +20,7 @@ from robocov.environment import (
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
-from robocov_app.formats.geometry.conversion.deviation import measure_deviation
+from robocov_app.formats.geometry.conversion.deviation import find_moved_walls, measure_deviation
 from robocov_app.formats.geometry.conversion.map_layout import MapLayout
 from robocov_app.formats.geometry.conversion.starts import find_rooms
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
@@ -42,7 +42,7 @@ def restore_primitives(
     """Replace polygons of a layout that consist of circles and walls by these primitives.
 
     A polygon stays if its primitives would leave a pocket next to them: an enclosed piece of free space that
-    is tiny, or that was solid. All polygons stay if walls would have moved by more than the tolerance.
+    is tiny, or that was solid. It also stays if walls would have moved by more than the tolerance.
 
     Parameters
     ----------
@@ -78,8 +78,12 @@ def restore_primitives(
         deviation = measure_deviation(unsimplified, candidate.compute_free())
         # A circle and its polygon may differ by the sagitta of the polygon's sides.
         limit = conversion.tolerance + conversion.grid + MAX_SAGITTA_M
-        if deviation.distance > max(limit, layout.deviation.distance):
-            return layout
+        limit = max(limit, layout.deviation.distance)
+        if deviation.distance > limit:
+            moved = find_moved_walls(unsimplified, candidate.compute_free(), limit)
+            nearest = STRtree([primitive.polygon for primitive in candidate.primitives]).nearest(moved)
+            rejected |= {candidate.primitives[index] for index in nearest}
+            continue
         return candidate._replace(boundary=boundary, deviation=deviation)
     return layout
 
