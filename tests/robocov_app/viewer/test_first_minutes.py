@@ -186,7 +186,7 @@ def test_new_users_are_offered_the_lesson_once(monkeypatch: pytest.MonkeyPatch, 
         with launcher.window() as window:
             assert isinstance(window.dialogs.current, Question)
             texts = [answer.text for answer in window.dialogs.current.answers]
-            assert texts == ["Start the lesson", "Just let me play"]
+            assert texts == ["Start the lesson", "Explore on my own"]
             window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0, "the session waits for the answer"
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
@@ -194,12 +194,12 @@ def test_new_users_are_offered_the_lesson_once(monkeypatch: pytest.MonkeyPatch, 
             assert window.dialogs.current is None
             assert (window.lesson.player is not None) is starts_lesson
             window.run_frame(0.5)
-            assert window.viewer.session.displayed.time > 0.0
+            assert (window.viewer.session.displayed.time > 0.0) is starts_lesson
         with build_visible_launcher(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.current is None
 
 
-def test_a_click_on_play_behind_the_offer_leaves_the_session_playing(
+def test_the_first_click_on_play_after_the_offer_starts_the_session(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     launcher = build_visible_launcher(monkeypatch, tmp_path, offers_lesson=True)
@@ -208,11 +208,14 @@ def test_a_click_on_play_behind_the_offer_leaves_the_session_playing(
         window.run_frame(0.0)
         play = window.top_bar.ui.find("button", "pause")
         assert play is not None
-        for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
-            pygame.event.post(pygame.event.Event(kind, pos=play.rect.center, button=1))
-        window.run_frame(0.0)
-        assert not window.dialogs.is_open
-        assert window.viewer.session.playback.is_playing
+        states = []
+        # The first click only closes the dialog.
+        for _ in range(2):
+            for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
+                pygame.event.post(pygame.event.Event(kind, pos=play.rect.center, button=1))
+            window.run_frame(0.0)
+            states.append((window.dialogs.is_open, window.viewer.session.playback.is_playing))
+        assert states == [(False, False), (False, True)]
 
 
 def test_drafts_are_offered_and_the_session_waits_for_the_answer(

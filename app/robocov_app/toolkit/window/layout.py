@@ -11,7 +11,7 @@ BAR_HEIGHT_PX = 44
 RAIL_WIDTH_PX = 44
 LABELED_RAIL_WIDTH_PX = 122
 """Width of a tool rail that shows the names of the tools next to their icons."""
-MIN_LABELED_WINDOW_PX = 1150
+MIN_LABELED_WINDOW_PX = 1100
 """Width of a window from which on the tool rail shows names."""
 CHART_HEIGHT_PX = 118
 TIME_SLIDER_HEIGHT_PX = 26

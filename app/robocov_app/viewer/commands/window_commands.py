@@ -107,7 +107,7 @@ def _list_share_commands(share: ShareActions, actions: ViewerWindowActions) -> l
     group.add("share", "Share", actions.open_share_menu, "ctrl+shift+e")
     group.add("share:command", "Copy as command", share.copy_command)
     group.add("share:python", "Copy as Python", share.copy_python)
-    group.add("share:copy", "Save a copy", share.save_copy)
+    group.add("share:copy", "Save a copy to send", share.save_copy)
     group.add("share:link", "Copy link", share.copy_link)
     return group.commands
 

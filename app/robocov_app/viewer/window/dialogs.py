@@ -19,6 +19,8 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
 
+_START_HINT = "Press Play, or Space, to let the robots move."
+
 
 def build_file_dialog(viewer: Presenter) -> Choice:
     """Return the dialog that opens a session or a map."""
@@ -56,23 +58,32 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
 
 
 def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:
-    """Return the dialog that offers the lesson to a new user, and pause the session until the answer."""
-    play = _pause(viewer)
+    """Return the dialog that offers the lesson to a new user, and pause the session.
+
+    Without the lesson, the session stays paused: whoever saw the button *Play* behind the dialog presses it
+    next, and must not pause the robots by that.
+    """
+    resume = _pause(viewer)
 
     def play_lesson() -> None:
-        play()
+        resume()
         start_lesson()
+
+    def explore() -> None:
+        viewer.show_message(_START_HINT)
 
     text = (
         "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
         "and what helps, in a few minutes. Reopen it any time with F2."
     )
-    answers = [Answer("Start the lesson", play_lesson), Answer("Just let me play", play)]
-    return Question("Welcome to robocov", text, answers, play)
+    answers = [Answer("Start the lesson", play_lesson), Answer("Explore on my own", explore)]
+    return Question("Welcome to robocov", text, answers, explore)
 
 
 def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft]) -> None:
-    """Open a dialog that offers to recover unsaved work, and pause the session until the answer.
+    """Open a dialog that offers to recover unsaved work, and pause the session.
+
+    If nothing is recovered, it stays paused, as after `build_lesson_offer`.
 
     Parameters
     ----------
@@ -85,24 +96,29 @@ def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft])
     """
     newest = drafts[0]
     others = drafts[1:]
-    play = _pause(viewer)
+    resume = _pause(viewer)
 
     def recover() -> None:
-        play()
+        resume()
         viewer.attempt(partial(viewer.files.recover, newest))
 
     def discard() -> None:
         remove_draft(newest.folder)
-        play()
         if others:
+            resume()
             offer_recovery(viewer, dialogs, others)
+        else:
+            postpone()
+
+    def postpone() -> None:
+        viewer.show_message(_START_HINT)
 
     question = create_recovery_question(
         f"A window ended without saving: {describe_draft(newest)}.",
         other_count=len(others),
         recover=recover,
         discard=discard,
-        postpone=play,
+        postpone=postpone,
     )
     dialogs.ask(question)
 

@@ -12,7 +12,7 @@ ROBOT_COMMANDS = ("robot:fail", "robot:follow", "", "robot:remove")
 WALL_COMMANDS = ("wider", "narrower", "", "duplicate", "delete")
 OBSTACLE_COMMANDS = ("duplicate", "delete")
 FLOOR_COMMANDS = ("robot:add", "", "undo", "redo", "", "fit")
-SHARE_COMMANDS = ("share:command", "share:python", "share:copy")
+SHARE_COMMANDS = ("share:copy", "screenshot", "video", "", "share:command", "share:python")
 LINK_COMMAND = "share:link"
 
 
@@ -55,7 +55,7 @@ class WindowMenus:
         """Open the menu of what can be shared at a pixel; links need a served window."""
         names = list(SHARE_COMMANDS)
         if self._share.has_link:
-            names.append(LINK_COMMAND)
+            names.insert(0, LINK_COMMAND)
         self._open_menu(names, pixel)
 
     def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
