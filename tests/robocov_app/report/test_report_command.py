@@ -158,7 +158,7 @@ def test_the_best_placement_is_cached(run, tmp_path, monkeypatch, capsys) -> Non
     assert main(["report", str(run)]) == 0
     assert "above the best" not in page.read_text()
     assert main(["report", str(run), "--optimum"]) == 0
-    (above,) = re.findall(r"average, ([\d.]+) % above the best placement known", page.read_text())
+    (above,) = re.findall(r"average, ([\d.]+)% above the best placement known", page.read_text())
     assert float(above) > 0.0
     before = page.read_bytes()
     # From now on, a search would fail.
