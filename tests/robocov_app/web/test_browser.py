@@ -328,9 +328,9 @@ def test_drags_with_shift_select_and_with_alt_copy(browser, tmp_path):
 
         alt = 1
         shift = 8
-        drag(alt, (699, 160), (690, 190), (680, 215))  # Copy the round table.
+        drag(alt, (738, 160), (729, 190), (719, 215))  # Copy the round table.
         wait_for_message("copied")
-        drag(shift, (600, 90), (700, 200), (785, 248))  # Select from the floor of its room.
+        drag(shift, (639, 90), (739, 200), (824, 248))  # Select from the floor of its room.
         wait_for_message("2 obstacles selected")
         assert browser.read_console() == []
 
