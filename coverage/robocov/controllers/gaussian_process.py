@@ -8,14 +8,13 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
+from robocov.controllers.square_grid import SquareGrid
 from robocov.observation.region import Region
 
 NOISE_VARIANCE = 1e-2
 """Variance of a measurement, relative to that of the prior. It includes changes of φ within a square."""
 SAMPLES_PER_SQUARE = 2
 """Number of samples along each side of a square."""
-_ROUNDING_TOLERANCE = 1e-9
-"""Fraction of a square by which the region may exceed the grid because of rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,23 +44,20 @@ class ProcessGrid:
         correlation : float
             Correlation length of the process, relative to this side.
         """
-        low_x, low_y, high_x, high_y = region.bounds
-        longer_side = max(high_x - low_x, high_y - low_y)
-        side = longer_side / squares
-        columns = int(np.ceil((high_x - low_x) / side - _ROUNDING_TOLERANCE))
-        rows = int(np.ceil((high_y - low_y) / side - _ROUNDING_TOLERANCE))
-        low = np.array([low_x, low_y])
-        centers = low + side * (_list_cells(rows, columns) + 0.5)
+        grid = SquareGrid.build(region, squares)
+        rows, columns = grid.shape
+        low, high = np.reshape(region.bounds, (2, 2))
+        length = correlation * float((high - low).max())
         sample_cells = _list_cells(SAMPLES_PER_SQUARE * rows, SAMPLES_PER_SQUARE * columns)
         # Coordinates of the samples in squares, from the lower left corner of the grid.
         coordinates = (sample_cells + 0.5) / SAMPLES_PER_SQUARE
-        samples = low + side * coordinates
+        samples = low + grid.side * coordinates
         is_inside = region.contains(samples)
         corners, corner_weights = _find_corners(coordinates[is_inside], rows, columns)
-        squared_distances = ((centers[:, None] - centers) ** 2).sum(axis=2)
+        squared_distances = ((grid.centers[:, None] - grid.centers) ** 2).sum(axis=2)
         return cls(
-            squares=centers,
-            prior_correlations=np.exp(-squared_distances / (2.0 * (correlation * longer_side) ** 2)),
+            squares=grid.centers,
+            prior_correlations=np.exp(-squared_distances / (2.0 * length**2)),
             samples=samples[is_inside],
             corners=corners,
             corner_weights=corner_weights,

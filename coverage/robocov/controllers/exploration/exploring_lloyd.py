@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.ndimage import uniform_filter
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import BaseController, Information, is_plan_due
@@ -20,6 +19,7 @@ from robocov.controllers.density_exchange import (
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.exploration.sightings import Sightings
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.controllers.square_grid import SquareGrid
 from robocov.observation import Decision, Message, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
@@ -27,60 +27,11 @@ from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_sam
 
 NO_SQUARE = -1
 """Index that stands for no square."""
-_ROUNDING_TOLERANCE = 1e-9
-"""Fraction of a square by which the region may exceed the grid because of rounding."""
 _MIN_RELATIVE_MASS = 1e-6
 """Lower limit of the mass of a square, relative to an unknown one.
 
 Without it, the centroid of a cell in which φ is zero would be undefined.
 """
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SquareGrid:
-    """Squares that cover a region, in which robots measure the density."""
-
-    centers: Array
-    """(s, 2) m, row by row from the lowest."""
-    is_inside: BoolArray
-    """(s,) Whether the center of each square lies in the region."""
-    shape: tuple[int, int]
-    """Number of rows and columns."""
-    side: float
-    """m"""
-
-    @classmethod
-    def build(cls, region: Region, squares: int) -> SquareGrid:
-        """Build a grid with a given number of squares along the longer side of the bounding box."""
-        low_x, low_y, high_x, high_y = region.bounds
-        side = max(high_x - low_x, high_y - low_y) / squares
-        columns = int(np.ceil((high_x - low_x) / side - _ROUNDING_TOLERANCE))
-        rows = int(np.ceil((high_y - low_y) / side - _ROUNDING_TOLERANCE))
-        x, y = np.meshgrid(
-            low_x + (np.arange(columns) + 0.5) * side,
-            low_y + (np.arange(rows) + 0.5) * side,
-        )
-        centers = np.column_stack([x.ravel(), y.ravel()])
-        return cls(centers=centers, is_inside=region.contains(centers), shape=(rows, columns), side=side)
-
-    def count_nearby(self, is_counted: BoolArray, half_width: float) -> Array:
-        """Count the marked squares in a box around each square.
-
-        Parameters
-        ----------
-        is_counted : (s,) bool array
-            Which squares are counted.
-        half_width : float, m
-            Half the width of the box.
-
-        Returns
-        -------
-        (s,) array
-        """
-        width = 2 * int(half_width / self.side) + 1
-        # The number is the mean over the box times the number of squares in the box.
-        mean = uniform_filter(is_counted.reshape(self.shape).astype(np.float64), width, mode="constant")
-        return np.asarray(np.rint(mean * width**2).ravel())
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -8,7 +8,8 @@ import pytest
 from robocov.arrays import Array
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Lloyd
-from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd, ExploringMemory, SquareGrid
+from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd, ExploringMemory
+from robocov.controllers.square_grid import SquareGrid
 from robocov.density import Gaussian, Gaussians
 from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
