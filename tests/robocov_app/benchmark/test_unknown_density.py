@@ -24,75 +24,50 @@ from robocov_app.terminal.interruption import Interruption
 
 TRACK = "unknown-density"
 MAP = "dense-polygons-7001"
-IMPORTS = HEAD.partition("@dataclass")[0] + "import numpy as np\nimport robocov as rc\n"
-
-HONEST = """
+IMPORTS = HEAD.partition("@dataclass")[0] + "import gc\nimport numpy as np\nimport robocov as rc\n"
+START = """
 @dataclass(frozen=True)
 class Mine:
     def begin(self, region, team):
         return None
 
     def decide(self, seen, memory):
+"""
+END = """
+        return rc.Decision(np.column_stack([values, -values]))
+"""
+# Statements of `decide`, between these two, which compute a value for each robot.
+
+HONEST = """
         assert seen.density is None
         robots = np.arange(len(seen.positions))
         values = seen.measure_density(robots, seen.positions + [0.1, 0.0])
-        return rc.Decision(np.column_stack([values, -values]))
 """
 
 FAR = """
-@dataclass(frozen=True)
-class Mine:
-    def begin(self, region, team):
-        return None
-
-    def decide(self, seen, memory):
         values = seen.measure_density(np.arange(len(seen.positions)), seen.positions + [30.0, 0.0])
-        return rc.Decision(np.column_stack([values, -values]))
 """
 """Robots measure far beyond their sensing range."""
 
 CLOSURE = """
-@dataclass(frozen=True)
-class Mine:
-    def begin(self, region, team):
-        return None
-
-    def decide(self, seen, memory):
         values = np.ones(len(seen.positions))
         for cell in seen.density_sensor._measure.__closure__ or ():
             if isinstance(cell.cell_contents, rc.Density):
                 values = values * cell.cell_contents.max_value
-        return rc.Decision(np.column_stack([values, -values]))
 """
 """Robots look for the density in the variables of their sensor."""
 
 MEMORY = """
-import gc
-
-@dataclass(frozen=True)
-class Mine:
-    def begin(self, region, team):
-        return None
-
-    def decide(self, seen, memory):
         values = np.ones(len(seen.positions))
-        for thing in gc.get_objects():
-            if isinstance(thing, rc.Gaussians):
-                values = values * thing.max_value
-        return rc.Decision(np.column_stack([values, -values]))
+        for candidate in gc.get_objects():
+            if isinstance(candidate, rc.Gaussians):
+                values = values * candidate.max_value
 """
 """Robots look for the density among all objects of the process."""
 
 OTHERS = """
-@dataclass(frozen=True)
-class Mine:
-    def begin(self, region, team):
-        return None
-
-    def decide(self, seen, memory):
         robots = np.roll(np.arange(len(seen.positions)), 1)
         values = seen.measure_density(robots, seen.positions[robots])
-        return rc.Decision(np.column_stack([values, -values]))
 """
 """Robots use what others measure, which nobody has sent them."""
 
@@ -126,7 +101,7 @@ def isolate(controller: str, information: Information) -> str | None:
 
 
 def write_controller(folder: Path, code: str) -> str:
-    (folder / "mine.py").write_text(IMPORTS + code)
+    (folder / "mine.py").write_text(IMPORTS + START + code + END)
     return f"{folder / 'mine.py'}:Mine"
 
 
