@@ -3,7 +3,8 @@
 import json
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,22 @@ class Browser:
         for name, value in preferences.items():
             features.append({"name": f"prefers-{name.replace('_', '-')}", "value": value})
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": medium, "features": features})
+
+    def set_touch(self, *, is_enabled: bool) -> None:
+        """Emulate a touch screen, or stop emulating it."""
+        touch: dict[str, object] = {"enabled": is_enabled}
+        if is_enabled:
+            touch["maxTouchPoints"] = 2
+        self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+
+    @contextmanager
+    def emulate_touch(self, *, is_enabled: bool = True) -> Iterator[None]:
+        """Emulate a touch screen, if enabled, for the duration of a with block."""
+        self.set_touch(is_enabled=is_enabled)
+        try:
+            yield
+        finally:
+            self.set_touch(is_enabled=False)
 
     def run_script(self, script: str, *values: object) -> Any:
         """Run JavaScript in the page, and return its result."""

@@ -204,8 +204,7 @@ def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser,
         projector = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
         set_size(browser, 390, 844, 2.0)
-        touch = {"enabled": True, "maxTouchPoints": 2}
-        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+        browser.set_touch(is_enabled=True)
         browser.driver.get(link)
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
@@ -336,9 +335,7 @@ def test_drags_with_shift_select_and_with_alt_copy(browser, tmp_path):
 
 
 def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser, tmp_path):
-    touch = {"enabled": True, "maxTouchPoints": 2}
-    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
-    try:
+    with browser.emulate_touch():
         set_size(browser, 390, 844, 3.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
@@ -388,14 +385,10 @@ def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser
             moved_slider = touch(*([(60 + 10 * k, 700)] for k in range(6)))
             assert {kind for kind, *_ in moved_slider} == {"button"}, "to the side, it moves a slider"
             assert browser.read_console() == []
-    finally:
-        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
 def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
-    touch = {"enabled": True, "maxTouchPoints": 2}
-    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
-    try:
+    with browser.emulate_touch():
         set_size(browser, 390, 844, 2.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
@@ -423,14 +416,10 @@ def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(brow
             browser.wait_until(lambda: browser.find("#lesson").get_attribute("aria-pressed") == "true")
             assert not browser.find("#panel").is_enabled()
             assert browser.read_console() == []
-    finally:
-        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
 def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
-    touch = {"enabled": True, "maxTouchPoints": 2}
-    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
-    try:
+    with browser.emulate_touch():
         set_size(browser, 390, 844, 2.0)
         path = tmp_path / "plan.json"
         path.write_text(EMPTY_MAP)
@@ -479,8 +468,6 @@ def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
             browser.find("#save").click()
             browser.wait_until(lambda: not json.loads(path.read_text())["obstacles"])
             assert browser.read_console() == []
-    finally:
-        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
 
 def find_covering_elements(browser):
@@ -500,11 +487,7 @@ def find_covering_elements(browser):
 def test_saved_files_cover_the_window_only_when_the_user_opens_them(
     browser, tmp_path, width, height, has_touch
 ):
-    touch = {"enabled": has_touch}
-    if has_touch:
-        touch["maxTouchPoints"] = 2
-    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
-    try:
+    with browser.emulate_touch(is_enabled=has_touch):
         set_size(browser, width, height)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
@@ -529,5 +512,3 @@ def test_saved_files_cover_the_window_only_when_the_user_opens_them(
             browser.find("#to-tools").click()
             assert find_covering_elements(browser) == [], "another sheet replaces it"
             assert browser.read_console() == []
-    finally:
-        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})

@@ -36,8 +36,7 @@ return [left, top, right, bottom];
 
 def set_page(browser: Browser, width: int, height: int, *, is_touched: bool) -> None:
     """Set the size of the page, and whether it is touched."""
-    touch = {"enabled": True, "maxTouchPoints": 2} if is_touched else {"enabled": False}
-    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    browser.set_touch(is_enabled=is_touched)
     browser.resize(width, height)
 
 
