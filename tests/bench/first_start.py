@@ -2,7 +2,7 @@
 
     python tests/bench/first_start.py --seconds 60
 
-The script opens windows on an invisible display (Xvfb, xdotool) and in headless Chromium. For each, it prints
+The script opens windows on a virtual display (Xvfb, xdotool) and in headless Chromium. For each, it prints
 the time from the command to the first picture, and the response times to a key that switches between light
 and dark. It presses this key again and again: with an empty cache, while kernels are compiled. The last
 window is that of a card of the start page, which is pressed as soon as the page is visible.

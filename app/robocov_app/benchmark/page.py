@@ -484,5 +484,5 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
             runs_by_reason.setdefault(anomaly.reason, []).append(run)
         for reason, runs in runs_by_reason.items():
             rows.append((label, str(len(runs)), reason, runs[0]))
-    head = ("Controller", "Runs", "What happened", "First run")
+    head = ("Controller", "Runs", "Reason", "First run")
     return PageTable("Suspicious runs by controller and reason", head, rows, text_columns=frozenset({2, 3}))

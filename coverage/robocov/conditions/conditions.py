@@ -93,8 +93,8 @@ class Conditions:
         Robots that join during the run, at most once each; also accepted as ``(robot, time)`` or
         ``(robot, time, position)``.
     density : str
-        "known": all robots know the density of the map. "sensed": they do not, and can only measure it within
-        their sensing range, see `Observations.measure_density`. The map that a controller with the
+        "known": all robots know the density of the map. "sensed": they do not know it, and can only measure
+        it within their sensing range, see `Observations.measure_density`. The map that a controller with the
         information "whole map" receives has no density then.
     seed : int
         Seed of the random numbers.

@@ -19,7 +19,7 @@ SAMPLES_PER_SQUARE = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProcessGrid:
-    """Squares in which robots measure a density, and finer samples at which they need it."""
+    """Squares in which robots measure a density, and finer samples of the Voronoi cells."""
 
     squares: Array
     """(s, 2) m, centers of the squares, row by row from the lowest."""
@@ -28,7 +28,7 @@ class ProcessGrid:
     samples: Array
     """(k, 2) m, samples of the region."""
     corners: IntArray
-    """(k, 4) Indices of the squares between whose centers each sample lies."""
+    """(k, 4) Indices of the four squares around each sample."""
     corner_weights: Array
     """(k, 4) Weights of these squares in the bilinear interpolation."""
 
@@ -74,7 +74,7 @@ class ProcessGrid:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
-    """The correlations of φ in the squares, given that it has been measured in some of them. Immutable.
+    """Posterior covariances of φ between squares, after measurements in some of them. Immutable.
 
     They do not depend on the measured values, and are updated whenever another square is measured.
 
@@ -197,7 +197,7 @@ def _add_squares(correlations: Array, new_squares: IntArray, noise_variance: flo
         variance = row[square] + noise_variance
         for i in range(count):
             factor = row[i] / variance
-            # Far squares are hardly correlated, and do not change.
+            # The correlation of distant squares underflows to 0.
             if factor != 0.0:
                 for j in range(count):
                     correlations[i, j] -= factor * row[j]

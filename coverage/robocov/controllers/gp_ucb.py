@@ -42,8 +42,8 @@ class GpUcbMemory(MeasurementMemory):
 class GpUcb(BaseController):
     """Lloyd's algorithm for an unknown density, with upper confidence bounds of a Gaussian process.
 
-    A robot measures the density only at its own position. Robots send each other measurements, their own and
-    received ones. From all measurements that it knows, a robot computes the mean μ and the standard deviation
+    A robot measures the density only at its own position. Robots exchange their own and received
+    measurements. From all measurements that it knows, a robot computes the mean μ and the standard deviation
     σ of a Gaussian process, and moves to the centroid of its Voronoi cell, weighted by the bound μ + β σ.
     Unknown areas attract robots, because σ is large there. β decreases to 0, so that robots end at the
     centroids for the mean.
@@ -55,7 +55,7 @@ class GpUcb(BaseController):
     beta : float, σ
         β at the start: number of standard deviations that are added to the mean.
     exploration : float, s
-        Time in which β decreases linearly to 0.
+        Time over which β decreases linearly to 0.
     squares : float
         Number of squares along the longer side of the region. One measurement is stored for each, so that a
         robot knows at most `squares`² measurements, 400 by default.
@@ -78,7 +78,7 @@ class GpUcb(BaseController):
     -----
     *Process.* The kernel is the squared exponential with the length `correlation`. The mean of the prior is
     the mean of the measurements that a robot knows, and its standard deviation their root mean square; no
-    absolute scale of the density has to be known. A measurement counts as if it was made in the center of its
+    absolute scale of the density has to be known. A measurement is assigned to the center of its
     square, with a variance of 1% of that of the prior. Between the centers, mean and standard deviation are
     interpolated bilinearly.
 
@@ -121,7 +121,7 @@ class GpUcb(BaseController):
     information: ClassVar[Information] = "shared map"
 
     beta: float = gain(3.0, "σ", "β at the start, standard deviations added to the mean", high=100.0)
-    exploration: float = gain(30.0, "s", "time in which β decreases to 0", high=1e6)
+    exploration: float = gain(30.0, "s", "time over which β decreases to 0", high=1e6)
     squares: float = gain(
         20.0, "1", "number of squares along the longer side of the region", low=4.0, high=40.0, whole=True
     )
@@ -150,7 +150,7 @@ class GpUcb(BaseController):
         )
 
     def decide(self, seen: Observations, memory: GpUcbMemory) -> Decision:
-        """Receive messages, update the goals if they are due, and compute the forces toward them."""
+        """Receive messages, replan if it is due, and compute the forces toward the goals."""
         memory = replace(memory, measurements=add_received_measurements(seen, memory.measurements))
         if memory.goals is None or is_plan_due(memory.plan_time, self.period, seen.time):
             memory = self._plan(seen, memory)
@@ -175,7 +175,7 @@ class GpUcb(BaseController):
         # A known uniform density needs no measurements: a factor changes no centroid.
         bounds = np.ones((len(seen.positions), len(samples)))
         if not seen.has_known_uniform_density:
-            memory = _measure(seen, memory)
+            memory = _add_own_measurements(seen, memory)
             beta = self.compute_beta(seen.time)
             for robot, posterior in enumerate(memory.posteriors):
                 bound = compute_bound(posterior, memory.measurements[robot], beta)
@@ -214,7 +214,7 @@ def compute_bound(posterior: Posterior, measurements: Array, beta: float) -> Arr
     return np.maximum(bound, _MIN_RELATIVE_DENSITY * scale)
 
 
-def _measure(seen: Observations, memory: GpUcbMemory) -> GpUcbMemory:
+def _add_own_measurements(seen: Observations, memory: GpUcbMemory) -> GpUcbMemory:
     """Return the memory with a new measurement of each robot, made at its own position."""
     values = seen.measure_density(np.arange(len(seen.positions)), seen.positions)
     measurements = memory.measurements.copy()

@@ -211,7 +211,7 @@ def compute_unreachable_area(environment: Environment, radius: float) -> float:
     center_areas = compute_center_areas(environment.free, closed.free, radius, _EDGES_PER_QUARTER)
     has_robot = ~shapely.is_empty(center_areas)
     reachable_areas = shapely.area(components[has_robot])
-    # The thin bars that close gaps take up a few square micrometers.
+    # The thin bars that close gaps have an area of a few square micrometers.
     unreachable_area = shapely.area(components).sum() - reachable_areas.max(initial=0.0)
     return float(unreachable_area)
 

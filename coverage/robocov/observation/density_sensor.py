@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,7 +14,7 @@ from robocov.errors import ParameterError
 _RANGE_TOLERANCE_M = 1e-9
 """Distance by which a point may exceed the sensing range because of rounding."""
 
-DensityLog: TypeAlias = Mapping[tuple[int, bytes], float]
+DensityLog: TypeAlias = dict[tuple[int, bytes], float]
 """Measured values by robot and by the bytes of the point."""
 
 
@@ -32,7 +32,7 @@ class DensitySensor:
 
     Notes
     -----
-    A sensor that is pickled keeps its log, but not the density. A copy in another process repeats the
+    Pickling a sensor stores its log, but not the density. A copy in another process repeats the
     measurements of the original, and raises an error for all others.
 
     Examples
@@ -48,7 +48,7 @@ class DensitySensor:
 
     def __init__(self, measure: Callable[[IntArray, Array], Array]) -> None:
         self._measure = measure
-        self.log: dict[tuple[int, bytes], float] = {}
+        self.log: DensityLog = {}
 
     @classmethod
     def build(
@@ -84,6 +84,7 @@ class DensitySensor:
                 )
             if density is None:
                 return np.ones(len(points))
+            # Without a localization error, this avoids the rounding of `points - known + true`.
             if known_positions is positions:
                 return density.evaluate(points)
             return density.evaluate(positions[robots] + offsets)
@@ -118,7 +119,7 @@ class DensitySensor:
         return values
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # The density must not get into another process.
+        # The density must not reach another process.
         return RecordedDensitySensor, (self.log,)
 
 

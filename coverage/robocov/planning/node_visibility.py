@@ -83,7 +83,7 @@ class NodeVisibility:
         Returns
         -------
         (k,) int array
-            At most twelve, the nearest one first.
+            At most `_MAX_NEAREST_NODES`, nearest first.
         """
         return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_NEAREST_NODES)
 
@@ -120,8 +120,8 @@ class NodeVisibility:
     def get_entry_nodes(self, position: Array) -> IntArray:
         """Return the nodes at which a path from a position can enter the lattice.
 
-        These are those of the nearest nodes with clearance that are visible from the position. If none of
-        them is visible, it is the nearest one.
+        These are the nodes visible from the position, among the nearest ones with clearance. If none of them
+        is visible, it is the nearest one.
 
         Parameters
         ----------

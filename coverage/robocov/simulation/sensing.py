@@ -71,7 +71,7 @@ def get_known_map(environment: Environment, conditions: Conditions | None) -> En
     Returns
     -------
     Environment
-        The map at rest, without its density if robots do not know it.
+        The map without moving obstacles, and without its density if robots do not know it.
     """
     known_map = environment.static
     if conditions is not None and conditions.hides_density:

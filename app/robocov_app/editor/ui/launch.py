@@ -184,7 +184,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
 
     editor = window.editor
     question = create_recovery_question(
-        f"An editor ended without saving: {draft.describe()}.",
+        f"An editor was closed without saving: {draft.describe()}.",
         other_count=len(others),
         recover=partial(editor.attempt, partial(window.documents.recover, draft)),
         discard=partial(editor.attempt, discard),

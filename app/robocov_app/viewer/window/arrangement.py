@@ -77,7 +77,7 @@ class Arrangement:
         self._parts = parts
 
     def update(self, size: tuple[int, int], scale: float) -> None:
-        """Lay out the parts of a window of the given size, px, and scale; do nothing without a change."""
+        """Lay out the parts of a window of the given size, px, and scale, if anything has changed."""
         before = self.key
         aspect = compute_aspect(self._viewer.session.displayed.environment.region.bounds)
         frame = self._build_frame_settings(size, scale)

@@ -64,13 +64,11 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
     next, and must not pause the robots by that.
     """
     resume = _pause(viewer)
+    explore = partial(viewer.show_message, _START_HINT)
 
     def play_lesson() -> None:
         resume()
         start_lesson()
-
-    def explore() -> None:
-        viewer.show_message(_START_HINT)
 
     text = (
         "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
@@ -83,7 +81,7 @@ def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Q
 def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft]) -> None:
     """Open a dialog that offers to recover unsaved work, and pause the session.
 
-    If nothing is recovered, it stays paused, as after `build_lesson_offer`.
+    The session stays paused if no draft is recovered.
 
     Parameters
     ----------
@@ -97,6 +95,7 @@ def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft])
     newest = drafts[0]
     others = drafts[1:]
     resume = _pause(viewer)
+    show_start_hint = partial(viewer.show_message, _START_HINT)
 
     def recover() -> None:
         resume()
@@ -108,17 +107,14 @@ def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft])
             resume()
             offer_recovery(viewer, dialogs, others)
         else:
-            postpone()
-
-    def postpone() -> None:
-        viewer.show_message(_START_HINT)
+            show_start_hint()
 
     question = create_recovery_question(
-        f"A window ended without saving: {describe_draft(newest)}.",
+        f"A window was closed without saving: {describe_draft(newest)}.",
         other_count=len(others),
         recover=recover,
         discard=discard,
-        postpone=postpone,
+        postpone=show_start_hint,
     )
     dialogs.ask(question)
 
