@@ -114,6 +114,9 @@ def test_it_is_built_without_a_warning_and_its_links_lead_somewhere(tmp_path: Pa
     assert all(f'.{name}"' in reference["names"] for name in rc.__all__)
     assert all(f'id="robocov_app.learning.{name}"' in reference["learning"] for name in learning.__all__)
     assert "Play or pause" in reference["keys"] and "Undo" in reference["keys"]
+    assert 'id="robocov.typing.FloatArray"' in reference["other-names"]
+    for name in ("names", "other-names", "learning"):
+        assert '<span class="pre">ndarray' not in reference[name]
 
 
 def test_nothing_in_a_terminal_is_answered_in_five_lines(

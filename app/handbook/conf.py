@@ -23,8 +23,6 @@ napoleon_custom_sections = [("Attributes", "params_style")]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
-# Types of arrays have the names of the code, instead of what these stand for.
-autodoc_type_aliases = {"Array": "Array", "IntArray": "IntArray", "BoolArray": "BoolArray"}
 python_maximum_signature_line_length = 90
 toc_object_entries_show_parents = "hide"
 # The highlighter knows no language for terminal output and maps with comments; and words such as "path" in

@@ -40,6 +40,9 @@ from robocov_app.viewer.session.setup.scenario import SessionScenario
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+ARRAY_TYPES = ("FloatArray", "IntArray", "BoolArray", "Float32Array", "Int32Array", "AnyArray")
+"""Types of arrays in signatures; names of ``robocov.typing``."""
+
 OTHER_NAMES = {
     "Figures": ("robocov_app.figures.files.save_figure", "robocov_app.figures.files.render_png"),
     "Maps": (
@@ -130,13 +133,25 @@ def write_pages(app: Sphinx) -> None:
         (folder / name).write_text(build_page(), encoding="utf-8")
 
 
-def replace_signature(*event: Any) -> tuple[str, None] | None:
-    """Return the signature to show for a controller: its gains instead of the parameters of ``__new__``."""
-    # Sphinx passes the application, the kind of object, its name, the object and more.
-    _, kind, _, value = event[:4]
-    if kind != "class" or not issubclass(value, BaseController):
+def replace_signature(
+    _app: Sphinx,
+    kind: str,
+    _name: str,
+    value: Any,
+    _options: object,
+    parameters: str | None,
+    result: str | None,
+) -> tuple[str, str | None] | None:
+    """Return the parameters and the type of the result to show, or None if Sphinx shows them well.
+
+    A controller has its gains instead of the parameters of ``__new__``.
+    """
+    if kind == "class" and issubclass(value, BaseController):
+        return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
+    if parameters is None or "<factory>" not in parameters:
         return None
-    return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
+    # Sphinx parses signatures as Python, in which the default of a field with a factory is no expression.
+    return parameters.replace("<factory>", "..."), result
 
 
 # Commands and keys
@@ -350,11 +365,25 @@ def build_other_names_page() -> str:
     """Build the page that documents further names, which are not at the top level of the library."""
     text = build_heading("Python: further names", "=")
     text += "\nWhat public functions return and expect, and what the pages of the handbook import.\n"
+    text += build_array_types()
     for heading, names in OTHER_NAMES.items():
         text += "\n" + build_heading(heading, "-")
         for name in names:
             module, _, attribute = name.rpartition(".")
             text += "\n" + build_directive(name, getattr(import_module(module), attribute))
+    return text
+
+
+def build_array_types() -> str:
+    """Build the section with the types of arrays, which are described by the strings below them."""
+    text = "\n" + build_heading("Arrays", "-")
+    text += (
+        "\nThe types of arrays in signatures. Descriptions of parameters contain the shape and the unit.\n"
+    )
+    descriptions = ModuleAnalyzer.for_module("robocov.typing").find_attr_docs()
+    for name in ARRAY_TYPES:
+        description = " ".join(descriptions["", name])
+        text += f"\n.. py:type:: robocov.typing.{name}\n\n   {description}\n"
     return text
 
 

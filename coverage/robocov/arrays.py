@@ -1,27 +1,20 @@
-"""Array types for signatures, and small functions on arrays."""
+"""Small functions on arrays."""
 
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
-"""Floating-point data; shape and unit are documented where it is used."""
+from robocov.typing import BoolArray as BoolArray
+from robocov.typing import FloatArray
+from robocov.typing import IntArray as IntArray
+from robocov.typing import Point as Point
+from robocov.typing import Ring as Ring
 
-IntArray: TypeAlias = NDArray[np.intp]
-"""Indices."""
-
-BoolArray: TypeAlias = NDArray[np.bool_]
-"""Masks."""
-
-Point: TypeAlias = tuple[float, float]
-"""x and y, m."""
-
-Ring: TypeAlias = tuple[Point, ...]
-"""Points of a polyline, or of a closed ring, whose first point is not repeated."""
+Array: TypeAlias = FloatArray
+"""The former name of `robocov.typing.FloatArray`."""
 
 
-def freeze(values: object) -> Array:
+def freeze(values: object) -> FloatArray:
     """Copy values into a read-only, C-contiguous array of floats.
 
     Parameters
@@ -38,7 +31,7 @@ def freeze(values: object) -> Array:
     return array
 
 
-def compute_lengths(vectors: Array) -> Array:
+def compute_lengths(vectors: FloatArray) -> FloatArray:
     """Compute the Euclidean lengths of plane vectors.
 
     Parameters
@@ -58,7 +51,7 @@ def compute_lengths(vectors: Array) -> Array:
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
-def compute_point_distances(first: Array, second: Array) -> Array:
+def compute_point_distances(first: FloatArray, second: FloatArray) -> FloatArray:
     """Compute the Euclidean distances between points, sqrt(dx² + dy²).
 
     Unlike `compute_lengths`, it uses the square root, so that the result has the same bits as in kernels.
@@ -124,7 +117,7 @@ def concatenate_ranges(starts: IntArray, counts: IntArray) -> IntArray:
     return np.asarray(np.arange(counts.sum()) + (starts - offsets).repeat(counts))
 
 
-def compute_weighted_mean(values: Array, weights: Array | None = None) -> float:
+def compute_weighted_mean(values: FloatArray, weights: FloatArray | None = None) -> float:
     """Compute the weighted mean of some values.
 
     Parameters

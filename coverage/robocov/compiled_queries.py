@@ -22,8 +22,8 @@ import pymunk
 from llvmlite import ir
 from pymunk._chipmunk_cffi import ffi, lib
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import import_numba, kernel
+from robocov.typing import BoolArray, FloatArray
 
 numba = import_numba()
 
@@ -127,7 +127,7 @@ def is_usable() -> bool:
     )
 
 
-def find_nearest_points(space: pymunk.Space, positions: Array, ranges: Array) -> Array:
+def find_nearest_points(space: pymunk.Space, positions: FloatArray, ranges: FloatArray) -> FloatArray:
     """Find the nearest point of any shape for each position, as `pymunk.Space.point_query_nearest` does.
 
     Parameters
@@ -149,7 +149,7 @@ def find_nearest_points(space: pymunk.Space, positions: Array, ranges: Array) ->
     return points
 
 
-def cast_rays(space: pymunk.Space, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
+def cast_rays(space: pymunk.Space, positions: FloatArray, ends: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Cast rays from each position, as `pymunk.Space.segment_query_first` does.
 
     Parameters
@@ -190,7 +190,9 @@ _SEGMENT_QUERY = _get_address(ffi.addressof(lib, "cpSpaceSegmentQueryFirst"))
 
 
 @kernel
-def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array, points: Array) -> None:
+def _find_nearest_points(
+    space: int, query: int, positions: FloatArray, ranges: FloatArray, points: FloatArray
+) -> None:
     """Write the nearest point to each position to `points`; see `find_nearest_points`.
 
     `space` and `query` are the addresses of the space and of the C function.
@@ -217,7 +219,7 @@ def _find_nearest_points(space: int, query: int, positions: Array, ranges: Array
 
 @kernel
 def _cast_rays(
-    space: int, query: int, positions: Array, ends: Array, fractions: Array, is_hit: BoolArray
+    space: int, query: int, positions: FloatArray, ends: FloatArray, fractions: FloatArray, is_hit: BoolArray
 ) -> None:
     """Write the results of rays that meet a shape to `fractions` and `is_hit`; see `cast_rays`.
 

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
 from robocov.text import escape_controls
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from robocov.typing import FloatArray
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices that lead to a value, from the outermost object inwards."""
@@ -436,7 +435,7 @@ def require_number(
 
 def to_floats(
     name: str, values: Any, expected: str, error_type: type[InputError] = ParameterError
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """Convert numbers to a new array of floats.
 
     Parameters

@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 Heartbeat: TypeAlias = Callable[[], None]
 """Function without parameters that is called once per iteration. It may raise an exception to stop."""
@@ -40,9 +40,9 @@ class _NearestSources(NamedTuple):
     owners: IntArray
     """(m,) Index of the nearest source among the sources, from 0 to k - 1; it is not a column of the
     table."""
-    distances: Array
+    distances: FloatArray
     """(m,) Distance to the nearest source."""
-    second_distances: Array
+    second_distances: FloatArray
     """(m,) Distance to the second-nearest source; inf if there is only one source."""
 
 
@@ -57,7 +57,7 @@ class _Swap(NamedTuple):
     """(k,) The sources after the swap."""
 
 
-def seed_sources(table: Array, source_count: int, rng: np.random.Generator) -> IntArray:
+def seed_sources(table: FloatArray, source_count: int, rng: np.random.Generator) -> IntArray:
     """Choose sources at random, so that they tend to be far apart.
 
     Parameters
@@ -94,7 +94,7 @@ def seed_sources(table: Array, source_count: int, rng: np.random.Generator) -> I
     return np.array(sources, dtype=np.intp)
 
 
-def choose_greedily(table: Array, source_count: int) -> IntArray:
+def choose_greedily(table: FloatArray, source_count: int) -> IntArray:
     """Choose sources one after another, each so that the cost becomes as low as possible.
 
     Parameters
@@ -122,7 +122,10 @@ def choose_greedily(table: Array, source_count: int) -> IntArray:
 
 
 def run_lloyd(
-    table: Array, sources: IntArray, is_fixed: BoolArray | None = None, heartbeat: Heartbeat = lambda: None
+    table: FloatArray,
+    sources: IntArray,
+    is_fixed: BoolArray | None = None,
+    heartbeat: Heartbeat = lambda: None,
 ) -> IntArray:
     """Improve sources by Lloyd's iteration.
 
@@ -158,7 +161,7 @@ def run_lloyd(
         sources = next_sources
 
 
-def apply_best_swap(table: Array, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
+def apply_best_swap(table: FloatArray, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
     """Replace one source by another column, so that the cost becomes as low as possible.
 
     Parameters
@@ -181,7 +184,7 @@ def apply_best_swap(table: Array, sources: IntArray, is_fixed: BoolArray, thresh
     return swap.sources if swap.swapped_cost < swap.cost * (1.0 - threshold) else sources
 
 
-def apply_best_swaps(table: Array, sources: IntArray, heartbeat: Heartbeat = lambda: None) -> IntArray:
+def apply_best_swaps(table: FloatArray, sources: IntArray, heartbeat: Heartbeat = lambda: None) -> IntArray:
     """Apply the best swap again and again, as long as it lowers the cost.
 
     Parameters
@@ -208,7 +211,7 @@ def apply_best_swaps(table: Array, sources: IntArray, heartbeat: Heartbeat = lam
 
 
 def improve_sources(
-    table: Array, sources: IntArray, is_fixed: BoolArray, threshold: float, *, removals: bool = True
+    table: FloatArray, sources: IntArray, is_fixed: BoolArray, threshold: float, *, removals: bool = True
 ) -> IntArray:
     """Improve sources by Lloyd's iteration, alternating with larger changes.
 
@@ -249,7 +252,9 @@ def improve_sources(
     return best if _compute_cost(table, best) < max_cost else after_lloyd
 
 
-def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, threshold: float) -> IntArray:
+def move_first_source(
+    table: FloatArray, sources: IntArray, is_allowed: BoolArray, threshold: float
+) -> IntArray:
     """Replace the first source by the best allowed column; the other sources do not change.
 
     Unlike Lloyd's iteration, this takes into account that the nearest source of a target may change.
@@ -279,7 +284,7 @@ def move_first_source(table: Array, sources: IntArray, is_allowed: BoolArray, th
 
 
 @kernel
-def compute_costs_with_column(table: Array, distances: Array) -> Array:
+def compute_costs_with_column(table: FloatArray, distances: FloatArray) -> FloatArray:
     """Compute the cost of given sources and one more column, for every column of the table.
 
     Parameters
@@ -300,7 +305,7 @@ def compute_costs_with_column(table: Array, distances: Array) -> Array:
     return costs
 
 
-def rebuild_sources(table: Array, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
+def rebuild_sources(table: FloatArray, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
     """Replace two or three sources at the same time.
 
     Every pair and every triple of sources is removed and then replaced greedily, one source after another.
@@ -342,13 +347,13 @@ def rebuild_sources(table: Array, sources: IntArray, is_fixed: BoolArray, thresh
     return best
 
 
-def _compute_cost(table: Array, sources: IntArray) -> float:
+def _compute_cost(table: FloatArray, sources: IntArray) -> float:
     """Return the cost of sources: the sum of the distances of all targets to their nearest source."""
     return float(table[:, sources].min(axis=1).sum())
 
 
 @kernel
-def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
+def _find_nearest_sources(table: FloatArray, sources: IntArray) -> _NearestSources:
     """Return the nearest source of each target, and the distances to the two nearest sources."""
     target_count = len(table)
     owners = np.zeros(target_count, dtype=np.intp)
@@ -367,7 +372,7 @@ def _find_nearest_sources(table: Array, sources: IntArray) -> _NearestSources:
 
 
 @kernel
-def _apply_lloyd_step(table: Array, sources: IntArray, is_fixed: BoolArray) -> tuple[float, IntArray]:
+def _apply_lloyd_step(table: FloatArray, sources: IntArray, is_fixed: BoolArray) -> tuple[float, IntArray]:
     """Return the cost of the sources and, for each of them, the best column for its targets.
 
     Targets are rows of the table, sources are columns. Each target belongs to its nearest source.
@@ -396,7 +401,7 @@ def _apply_lloyd_step(table: Array, sources: IntArray, is_fixed: BoolArray) -> t
 
 
 @kernel
-def _find_smallest(sums: Array, is_taken: BoolArray) -> int:
+def _find_smallest(sums: FloatArray, is_taken: BoolArray) -> int:
     """Return the column with the smallest sum that is not taken."""
     best = -1
     min_sum = np.inf
@@ -408,7 +413,7 @@ def _find_smallest(sums: Array, is_taken: BoolArray) -> int:
 
 
 @kernel
-def _find_best_swap(table: Array, sources: IntArray, is_fixed: BoolArray) -> _Swap:
+def _find_best_swap(table: FloatArray, sources: IntArray, is_fixed: BoolArray) -> _Swap:
     """Return the replacement of one source by another column that leads to the lowest cost.
 
     The cost after a swap is the sum of two terms. The first is the cost of all sources and the new column.
@@ -450,7 +455,7 @@ def _find_best_swap(table: Array, sources: IntArray, is_fixed: BoolArray) -> _Sw
 
 @kernel
 def _replace_sources(
-    table: Array, sources: IntArray, order: IntArray, unchanged_count: int
+    table: FloatArray, sources: IntArray, order: IntArray, unchanged_count: int
 ) -> tuple[float, IntArray]:
     """Replace sources greedily, one after another, in a given order; return the cost and the new sources.
 

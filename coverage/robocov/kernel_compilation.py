@@ -25,7 +25,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from filelock import FileLock
 
-from robocov.arrays import Array
 from robocov.compiled import (
     describe_argument_types,
     import_numba,
@@ -48,6 +47,7 @@ from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.window import Window
 from robocov.simulation import Simulation
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 Example: TypeAlias = Callable[[], None]
 """A function that calls kernels in order to compile them."""
@@ -177,7 +177,7 @@ ALL_EXAMPLES: tuple[Example, ...] = (
 """Examples for all kernels."""
 
 
-def _place_robots(robot_count: int) -> Array:
+def _place_robots(robot_count: int) -> FloatArray:
     """Return positions of robots on a grid, the first one in a corner of the map."""
     robots = np.arange(robot_count)
     return np.column_stack([0.3 + 0.5 * (robots % 5), 0.3 + 0.5 * (robots // 5)])

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation.bins import count_starts, find_bin, sort_into_bins
 from robocov.observation.neighbors import NeighborPositions
+from robocov.typing import FloatArray, IntArray
 
 CONTACT_DISTANCE = 0.01
 """Distance below which the repulsion no longer grows, m: a tenth of the default radius of a robot."""
@@ -70,18 +70,18 @@ class PotentialForces(NamedTuple):
         The force (24) from the closest obstacle point.
     """
 
-    total: Array
-    attraction: Array
-    robots: Array
-    obstacle: Array
+    total: FloatArray
+    attraction: FloatArray
+    robots: FloatArray
+    obstacle: FloatArray
 
 
 @kernel
 def compute_potential_forces(
-    positions: Array,
+    positions: FloatArray,
     neighbors: NeighborPositions,
-    obstacle_points: Array,
-    goals: Array,
+    obstacle_points: FloatArray,
+    goals: FloatArray,
     gains: PotentialGains,
 ) -> PotentialForces:
     """Compute the repulsion (25) from neighbors and obstacles, and the attraction (27), of each robot.
@@ -129,7 +129,7 @@ def compute_potential_forces(
 
 
 @kernel
-def compute_separations(robots: IntArray, neighbors: IntArray) -> Array:
+def compute_separations(robots: IntArray, neighbors: IntArray) -> FloatArray:
     """Compute the directions in which pairs of robots at the same position are pushed apart.
 
     Parameters
@@ -150,7 +150,7 @@ def compute_separations(robots: IntArray, neighbors: IntArray) -> Array:
     return directions
 
 
-def compute_spread_directions(numbers: IntArray) -> Array:
+def compute_spread_directions(numbers: IntArray) -> FloatArray:
     """Compute directions that are spread evenly, one for each of several whole numbers.
 
     Parameters
@@ -183,7 +183,9 @@ def _compute_attraction_factor(squared_distance: float, k_att: float, max_attrac
 
 
 @kernel
-def _sum_neighbor_repulsion(positions: Array, neighbors: NeighborPositions, gains: PotentialGains) -> Array:
+def _sum_neighbor_repulsion(
+    positions: FloatArray, neighbors: NeighborPositions, gains: PotentialGains
+) -> FloatArray:
     """Return the sum of the forces (24) on each robot from its neighbors, (n, 2) N."""
     sums = np.zeros((len(positions), 2))
     for i in range(len(positions)):
@@ -200,7 +202,7 @@ def _sum_neighbor_repulsion(positions: Array, neighbors: NeighborPositions, gain
 
 
 @kernel
-def _sum_team_repulsion(positions: Array, gains: PotentialGains) -> Array:
+def _sum_team_repulsion(positions: FloatArray, gains: PotentialGains) -> FloatArray:
     """Return the sum of the forces (24) on each robot from all other robots in range, (n, 2) N.
 
     Robots are sorted into square bins whose sides are at least the range, so that only nearby ones are
@@ -233,7 +235,7 @@ def _sum_team_repulsion(positions: Array, gains: PotentialGains) -> Array:
 
 
 @kernel
-def _add_repulsion(sums: Array, i: int, j: int, dx: float, dy: float, gains: PotentialGains) -> None:
+def _add_repulsion(sums: FloatArray, i: int, j: int, dx: float, dy: float, gains: PotentialGains) -> None:
     """Add the repulsion (24) that robot j exerts on robot i to the sum of i; (dx, dy) leads from j to i."""
     squared_distance = dx * dx + dy * dy
     if squared_distance > gains.rho_0 * gains.rho_0:

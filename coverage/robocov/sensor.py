@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import compute_ray_directions
+from robocov.typing import BoolArray, FloatArray
 from robocov.world.bodies import build_obstacle_space
 from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
 
@@ -57,7 +57,9 @@ class RangeSensor:
     array([[2., 3., 3., 3.]])
     """
 
-    def __init__(self, walls: tuple[Array, ...], moving_obstacles: tuple[MovingObstacle, ...] = ()) -> None:
+    def __init__(
+        self, walls: tuple[FloatArray, ...], moving_obstacles: tuple[MovingObstacle, ...] = ()
+    ) -> None:
         self._walls = walls
         self._moving_obstacles = moving_obstacles
         self._space, self._moving_bodies = build_obstacle_space(Obstacles(walls, moving_obstacles))
@@ -79,7 +81,7 @@ class RangeSensor:
         """Pickle the obstacles only. The space is built again, at time zero."""
         return RangeSensor, (self._walls, self._moving_obstacles)
 
-    def set_time(self, time: float, failed_robots: Array | None = None) -> None:
+    def set_time(self, time: float, failed_robots: FloatArray | None = None) -> None:
         """Move the obstacles to their positions at a given time.
 
         Parameters
@@ -100,7 +102,7 @@ class RangeSensor:
             self._space.add(disc)
             self._failed_robots[x, y, radius] = disc
 
-    def find_nearest_points(self, positions: Array, ranges: Array) -> Array:
+    def find_nearest_points(self, positions: FloatArray, ranges: FloatArray) -> FloatArray:
         """Find the nearest obstacle point of each robot.
 
         Parameters
@@ -118,7 +120,7 @@ class RangeSensor:
         limits = np.minimum(ranges, _MAX_RANGE_M)
         queries = _get_compiled_queries()
         if queries is not None:
-            points: Array = queries.find_nearest_points(self._space, positions, limits)
+            points: FloatArray = queries.find_nearest_points(self._space, positions, limits)
         else:
             points = np.full((len(positions), 2), np.nan)
             for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
@@ -128,7 +130,7 @@ class RangeSensor:
         points.setflags(write=False)
         return points
 
-    def scan(self, positions: Array, rays: int, ranges: Array) -> tuple[Array, BoolArray]:
+    def scan(self, positions: FloatArray, rays: int, ranges: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Cast rays at even angles over a full turn from each position. The first ray points along +x.
 
         Parameters
@@ -159,7 +161,9 @@ class RangeSensor:
         is_hit.setflags(write=False)
         return distances, is_hit
 
-    def scan_from(self, position: Array, rays: int, sensing_range: float) -> tuple[Array, Array]:
+    def scan_from(
+        self, position: FloatArray, rays: int, sensing_range: float
+    ) -> tuple[FloatArray, FloatArray]:
         """Cast rays at even angles over a full turn from one position. The first ray points along +x.
 
         Parameters
@@ -181,7 +185,7 @@ class RangeSensor:
         distances, _ = self.scan(np.asarray(position)[None], rays, np.array([sensing_range]))
         return distances[0], position + distances[0][:, None] * compute_ray_directions(rays)
 
-    def _cast_rays(self, positions: Array, ends: Array) -> tuple[Array, BoolArray]:
+    def _cast_rays(self, positions: FloatArray, ends: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Cast rays by the public query of pymunk; see `compiled_queries.cast_rays`."""
         fractions = np.ones(ends.shape[:2])
         is_hit = np.zeros(ends.shape[:2], dtype=bool)

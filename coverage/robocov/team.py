@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.arrays import freeze
 from robocov.defaults import (
     DEFAULT_COMMUNICATION_RANGE_M,
     DEFAULT_MASS_KG,
@@ -34,6 +34,7 @@ from robocov.errors import (
     quote_json,
     to_floats,
 )
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 MAX_ROBOTS = 10_000
 """Maximum number of robots in a team file or a record."""
@@ -106,7 +107,7 @@ _MISSING = "missing"
 """Used in place of a value that is missing in JSON. Like any text, it is not valid for a parameter."""
 
 
-def _build_default_column() -> Array:
+def _build_default_column() -> FloatArray:
     """Return an empty array, which `Team.__post_init__` replaces with the default value for each robot."""
     return np.zeros(0)
 
@@ -162,15 +163,15 @@ class Team:
     2
     """
 
-    radius: Array
-    mass: Array
-    max_speed: Array
-    max_acceleration: Array
-    viscosity: Array
-    sensing_range: Array
-    communication_range: Array
-    track_width: Array = field(default_factory=_build_default_column)
-    turning_rate: Array = field(default_factory=_build_default_column)
+    radius: FloatArray
+    mass: FloatArray
+    max_speed: FloatArray
+    max_acceleration: FloatArray
+    viscosity: FloatArray
+    sensing_range: FloatArray
+    communication_range: FloatArray
+    track_width: FloatArray = field(default_factory=_build_default_column)
+    turning_rate: FloatArray = field(default_factory=_build_default_column)
 
     def __post_init__(self) -> None:
         robot_count = np.atleast_1d(np.asarray(self.radius)).shape[0]
@@ -182,7 +183,7 @@ class Team:
             _check_column(name, values, robot_count)
             object.__setattr__(self, name, values)
 
-    def __reduce__(self) -> tuple[type[Team], tuple[Array, ...]]:
+    def __reduce__(self) -> tuple[type[Team], tuple[FloatArray, ...]]:
         """Rebuild the team when it is unpickled, because pickled arrays lose their read-only flag."""
         return Team, tuple(getattr(self, name) for name in PARAMETERS)
 
@@ -355,7 +356,7 @@ def _choose_track_width(kinematics: str | None, track_width: float, radius: floa
     return track_width
 
 
-def _check_column(name: str, values: Array, robot_count: int) -> None:
+def _check_column(name: str, values: FloatArray, robot_count: int) -> None:
     """Raise a ParameterError unless there is one value in range for each robot."""
     if values.shape != (robot_count,):
         expected = f"a value for each of {robot_count} robots"
@@ -371,7 +372,7 @@ def _check_column(name: str, values: Array, robot_count: int) -> None:
         )
 
 
-def _read_column(document: Mapping[str, Any], name: str, robot_count: int) -> Array:
+def _read_column(document: Mapping[str, Any], name: str, robot_count: int) -> FloatArray:
     """Return the values of a parameter, (n,). JSON contains a value for each robot, or one for all."""
     parameter = PARAMETERS[name]
     value = document.get(parameter.json_key, _POINT_ROBOT_VALUES.get(name, _MISSING))

@@ -34,9 +34,9 @@ from robocov import (
     load_map,
     make_controller,
 )
-from robocov.arrays import Array
 from robocov.environment import WallObstacle
 from robocov.metrics import compute_path_lengths, find_settling_time
+from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.results import find_reference
 
@@ -301,7 +301,7 @@ def measure_rest(controller: str, count: int, pool: ProcessPoolExecutor) -> Iter
         yield f"after 10 min of rest, {event}: robots move by {distance:.2f} m within 1 min"
 
 
-def time_simulation(controller: str, environment: Environment, starts: Array) -> float:
+def time_simulation(controller: str, environment: Environment, starts: FloatArray) -> float:
     """Return the computing time of a simulated second, s."""
     simulation = Simulation(environment, make_controller(controller), starts)
     # The first step compiles kernels.

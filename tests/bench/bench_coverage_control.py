@@ -29,7 +29,7 @@ import numpy as np
 import scipy
 
 from robocov import Environment, Raster, Simulation, Team, UniformStart, make_controller
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 SIDE_M = 1024.0
 PIXELS = 1024
@@ -81,9 +81,9 @@ class World(NamedTuple):
     """A world, and the starts of the robots."""
 
     peaks: Sequence[Peak]
-    density: Array
+    density: FloatArray
     """(PIXELS, PIXELS) Density by row (y) and column (x), at most 1."""
-    starts: Array
+    starts: FloatArray
     """(ROBOTS, 2) m"""
 
 
@@ -98,7 +98,7 @@ def draw_world(seed: int) -> World:
     return World(peaks=peaks, density=compute_density(peaks), starts=starts)
 
 
-def compute_density(peaks: Sequence[Peak]) -> Array:
+def compute_density(peaks: Sequence[Peak]) -> FloatArray:
     """Compute the mass of the peaks in each pixel, relative to the largest, (PIXELS, PIXELS)."""
     edges = np.linspace(0.0, SIDE_M, PIXELS + 1)
     centers = 0.5 * (edges[:-1] + edges[1:])
@@ -112,7 +112,7 @@ def compute_density(peaks: Sequence[Peak]) -> Array:
     return density / density.max()
 
 
-def compute_cost(density: Array, positions: Array) -> float:
+def compute_cost(density: FloatArray, positions: FloatArray) -> float:
     """Compute the sum of the squared distances to the nearest robot, weighted by the density."""
     x, y = np.meshgrid(np.arange(PIXELS) + 0.5, np.arange(PIXELS) + 0.5)
     pixel_side = SIDE_M / PIXELS

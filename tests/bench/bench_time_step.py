@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robocov import CoverageCost, Environment, Rapf, Simulation, Team, load_map
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 DEFAULT_PERIOD_S = 1.0 / 60.0
 REFINEMENTS = (1, 2, 4, 8)
@@ -36,7 +36,7 @@ LATTICE = 128
 class Run(NamedTuple):
     """A run with one control period."""
 
-    positions: Array
+    positions: FloatArray
     """(T, n, 2) m, after each of the longest control periods."""
     mean_distance: float
     """Mean distance at the end, m."""
@@ -68,7 +68,7 @@ def simulate(setting: Setting, refinement: int, duration: float) -> Run:
     return Run(positions, compute_mean_distance(environment, positions[-1]))
 
 
-def compute_mean_distance(environment: Environment, positions: Array) -> float:
+def compute_mean_distance(environment: Environment, positions: FloatArray) -> float:
     """Return the mean distance to the nearest robot, m."""
     return float(CoverageCost(environment, LATTICE)(positions).mean_distance)
 

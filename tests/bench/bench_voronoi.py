@@ -17,9 +17,9 @@ from time import perf_counter
 import numpy as np
 from scipy.spatial import Delaunay
 
-from robocov.arrays import Array
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
+from robocov.typing import FloatArray
 from robocov.voronoi import partition
 
 DEFAULT_BUDGET = 20_000
@@ -68,7 +68,7 @@ def format_times(times: list[float], delaunay_time: float) -> str:
     return " ".join([f"{delaunay_time * MICROSECONDS_PER_S:9.0f} µs", *cells])
 
 
-def measure_random_points(points: Array, rounds: int) -> dict[str, float]:
+def measure_random_points(points: FloatArray, rounds: int) -> dict[str, float]:
     """Return the median times of the calls for some points, s."""
     neighbors = Neighbors.from_ranges(points, np.full(len(points), COMMUNICATION_RANGE_M))
     calls: dict[str, Call] = {

@@ -23,10 +23,10 @@ import brute_force_geodesic
 from cost_cases import compute_distance_error
 from random_maps import KINDS, SIDE, build_random_map, draw_positions
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
+from robocov.typing import FloatArray
 
 REPORT_INTERVAL_S = 10.0
 MAX_OBSTACLES = 49
@@ -86,13 +86,13 @@ def draw_case(seed: int) -> Case:
     )
 
 
-def list_well_placed(environment: Environment, points: Array) -> list[list[float]]:
+def list_well_placed(environment: Environment, points: FloatArray) -> list[list[float]]:
     """Return the points that rounding cannot move across a wall."""
     free = environment.free
     return [p for p in points.tolist() if brute_force_geodesic.is_well_placed(free, tuple(p), SIDE)]
 
 
-def compute_brute_force_error(environment: Environment, positions: Array) -> float:
+def compute_brute_force_error(environment: Environment, positions: FloatArray) -> float:
     """Return the largest error of a cost on a coarse lattice, relative to the size of the map."""
     cost = CoverageCost(environment, BRUTE_FORCE_LATTICE)
     robots = list_well_placed(environment, positions)[:MAX_BRUTE_FORCE_ROBOTS]

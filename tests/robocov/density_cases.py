@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.density import (
     Density,
     Gaussian,
@@ -15,6 +14,7 @@ from robocov.density import (
     WeightedArea,
     WeightedPolygons,
 )
+from robocov.typing import FloatArray
 
 GAUSSIANS = {
     "one": Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.1),
@@ -49,8 +49,8 @@ KINDS: dict[str, Density] = {"uniform": Uniform(2.5), **GAUSSIANS, **POLYGONS, *
 
 
 def integrate_on_fine_lattice(
-    density: Density, ring: Array, origin: Array, side: int = 300
-) -> tuple[float, Array, float]:
+    density: Density, ring: FloatArray, origin: FloatArray, side: int = 300
+) -> tuple[float, FloatArray, float]:
     """Return mass, centroid and polar moment about a point of a cell, by sums over a fine lattice."""
     low = ring.min(axis=0)
     high = ring.max(axis=0)

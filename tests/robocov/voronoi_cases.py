@@ -17,9 +17,9 @@ from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 
 if TYPE_CHECKING:
-    from robocov.arrays import Array
+    from robocov.typing import FloatArray
 
-Family: TypeAlias = Callable[..., "Array"]
+Family: TypeAlias = Callable[..., "FloatArray"]
 """Builds a number of points for a region."""
 
 SQUARE = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]]))
@@ -39,7 +39,7 @@ seeds = st.integers(0, 2**32 - 1)
 names = st.sampled_from(sorted(REGIONS))
 
 
-def evaluate_performance(f: Performance, r: Array) -> Array:
+def evaluate_performance(f: Performance, r: FloatArray) -> FloatArray:
     """Return f(r) of the locational cost (4)."""
     if isinstance(f, Sensing):
         return 1.0 / (r**2 + f.height**2)
@@ -48,12 +48,12 @@ def evaluate_performance(f: Performance, r: Array) -> Array:
     return r
 
 
-def scatter_points(region: Region, n: int, rng: np.random.Generator) -> Array:
+def scatter_points(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     """Return n points within the region, by convex combinations of its corners."""
     return rng.dirichlet(np.full(len(region.vertices), 0.6), n) @ region.vertices
 
 
-def build_lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
+def build_lattice(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     """Return points of a square lattice about the region's centroid. All are cocircular by fours."""
     side = max(2, int(np.sqrt(n)))
     step = 2.0 ** rng.integers(-6, -2)
@@ -61,27 +61,27 @@ def build_lattice(region: Region, n: int, rng: np.random.Generator) -> Array:
     return region.centroid + step * (np.column_stack([x.ravel(), y.ravel()]) - (side - 1) / 2)
 
 
-def place_on_circle(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_on_circle(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     angle = rng.uniform(0, 1) + np.arange(n) * 2 * np.pi / n
     return region.centroid + 0.3 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def place_on_line(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_on_line(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     a, b = scatter_points(region, 2, rng)
     return a + rng.uniform(0, 1, (n, 1)) * (b - a)
 
 
-def cluster_points(region: Region, n: int, rng: np.random.Generator) -> Array:
+def cluster_points(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     return region.centroid + 10.0 ** rng.uniform(-9, -2) * rng.uniform(-1, 1, (n, 2))
 
 
-def cluster_in_groups(region: Region, n: int, rng: np.random.Generator) -> Array:
+def cluster_in_groups(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     """Return single points and groups with a diameter of about a micrometer."""
     centers = scatter_points(region, max(2, n // 3), rng)
     return centers[rng.integers(0, len(centers), n)] + 1e-6 * rng.uniform(-1, 1, (n, 2))
 
 
-def pair_points(region: Region, n: int, rng: np.random.Generator) -> Array:
+def pair_points(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     """Return points in pairs that nearly coincide."""
     points = scatter_points(region, n, rng)
     distance = 10.0 ** rng.uniform(-12, -3, (n // 2, 1))
@@ -89,12 +89,12 @@ def pair_points(region: Region, n: int, rng: np.random.Generator) -> Array:
     return points
 
 
-def place_on_boundary(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_on_boundary(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     edge = rng.integers(0, len(region.edges), n)
     return region.vertices[edge] + rng.choice([0.0, 0.25, 0.5, 0.71], (n, 1)) * region.edges[edge]
 
 
-def place_half_outside(region: Region, n: int, rng: np.random.Generator) -> Array:
+def place_half_outside(region: Region, n: int, rng: np.random.Generator) -> FloatArray:
     """Return points in an enlarged copy of the region, some of them outside the region."""
     return region.centroid + 1.3 * (scatter_points(region, n, rng) - region.centroid)
 
@@ -114,7 +114,7 @@ families = st.sampled_from(FAMILIES)
 
 
 def compute_exact_cell(
-    robot: int, generators: Array, region: Region
+    robot: int, generators: FloatArray, region: Region
 ) -> tuple[Fraction, Fraction, Fraction, Fraction]:
     """Return area, first moments and polar moment (all about the generator) in rational arithmetic."""
     px, py = map(Fraction, generators[robot].tolist())
@@ -153,7 +153,7 @@ def assert_cells_are_exact(cells: VoronoiPartition, region: Region) -> None:
         assert cells.polar_moments[robot] == pytest.approx(polar, abs=ROUNDING * region.area * size**2)
 
 
-def compute_moment_about_centroid(cells: Cells) -> Array:
+def compute_moment_about_centroid(cells: Cells) -> FloatArray:
     """Return J_{V,C}, (n,) m⁴, by the parallel axis theorem, equation (3)."""
     lever = cells.generators - cells.centroids
     return cells.polar_moments - cells.masses * (lever[:, 0] ** 2 + lever[:, 1] ** 2)
@@ -166,7 +166,7 @@ def estimate_size(cells: VoronoiPartition, region: Region) -> float:
     return region.diameter + outside + 1e-4 * float(np.abs(region.vertices).max())
 
 
-def partition_by_clipping(points: Array, region: Region) -> VoronoiPartition:
+def partition_by_clipping(points: FloatArray, region: Region) -> VoronoiPartition:
     """Return the partition by clipping alone, as with limited communication; all robots are in range."""
     n = len(points)
     all_neighbors = Neighbors(
@@ -178,7 +178,7 @@ def partition_by_clipping(points: Array, region: Region) -> VoronoiPartition:
     return partition(points, region, all_neighbors)
 
 
-def assert_same_ring(a: Array, b: Array, tolerance: float) -> None:
+def assert_same_ring(a: FloatArray, b: FloatArray, tolerance: float) -> None:
     assert len(a) == len(b)
     first = int(np.argmin(np.hypot(*(b - a[0]).T)))
     assert np.roll(b, -first, axis=0) == pytest.approx(a, abs=tolerance)

@@ -32,12 +32,12 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.controllers.base import Information
 from robocov.environment import Environment
 from robocov.observation import Message, Observations, RecordedDensitySensor, Scans, Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.sweep.tasks import Task
 
 _MAX_ATTEMPTS = 1000
@@ -64,8 +64,8 @@ class Transcript:
 
     observations: list[Observations] = field(default_factory=list)
     working: list[BoolArray | None] = field(default_factory=list)
-    forces: list[Array] = field(default_factory=list)
-    goals: list[Array | None] = field(default_factory=list)
+    forces: list[FloatArray] = field(default_factory=list)
+    goals: list[FloatArray | None] = field(default_factory=list)
     messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
 
     def add(self, snapshot: Snapshot) -> None:
@@ -111,13 +111,13 @@ class Decisions:
         Error of the controller that ended the replay; empty if there was none.
     """
 
-    forces: list[Array] = field(default_factory=list)
-    goals: list[Array | None] = field(default_factory=list)
+    forces: list[FloatArray] = field(default_factory=list)
+    goals: list[FloatArray | None] = field(default_factory=list)
     messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
     problem: str = ""
 
 
-def hide_others(observations: Observations, robot: int, substitutes: Array) -> Observations:
+def hide_others(observations: Observations, robot: int, substitutes: FloatArray) -> Observations:
     """Return the observations of one robot, with placeholders in the rows of the others.
 
     Parameters
@@ -202,7 +202,7 @@ def _freeze(array: Any) -> Any:
     return array
 
 
-def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Array:
+def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> FloatArray:
     """Draw random positions in a region, (count, 2) m, as placeholders for the positions of robots."""
     low_x, low_y, high_x, high_y = region.bounds
     for _ in range(_MAX_ATTEMPTS):
@@ -284,7 +284,7 @@ def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions
     return None
 
 
-def _have_same_rows(expected: Array | None, actual: Array | None, robots: Any) -> BoolArray:
+def _have_same_rows(expected: FloatArray | None, actual: FloatArray | None, robots: Any) -> BoolArray:
     """Return a mask of the k robots whose rows are the same in two arrays, bit for bit."""
     if expected is None or actual is None:
         return np.full(len(robots), expected is actual)

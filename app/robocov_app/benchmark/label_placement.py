@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 
 Frame: TypeAlias = tuple[float, float, float, float]
 """Left, bottom, right and top edge of the area in which labels may be placed, px."""
@@ -27,7 +27,7 @@ _MAX_ROUNDS = 6
 """Maximum number of passes over all labels."""
 
 
-def place_labels(marks: Array, labels: Sequence[str], frame: Frame) -> Array:
+def place_labels(marks: FloatArray, labels: Sequence[str], frame: Frame) -> FloatArray:
     """Place labels close to their marks such that, if possible, they hide no marks and no other labels.
 
     Parameters
@@ -59,7 +59,9 @@ def place_labels(marks: Array, labels: Sequence[str], frame: Frame) -> Array:
     return np.array([0.5 * (box[:2] + box[2:]) for box in placed])
 
 
-def _compute_costs(mark: Array, centers: Array, half_size: Array, mark_boxes: Array, frame: Frame) -> Array:
+def _compute_costs(
+    mark: FloatArray, centers: FloatArray, half_size: FloatArray, mark_boxes: FloatArray, frame: Frame
+) -> FloatArray:
     """Return the cost of placing the label of a mark at each of k centers, without other labels, (k,)."""
     boxes = np.hstack([centers - half_size, centers + half_size])
     label_area = 4.0 * half_size.prod()
@@ -67,12 +69,14 @@ def _compute_costs(mark: Array, centers: Array, half_size: Array, mark_boxes: Ar
     covered_areas = _compute_overlaps(boxes, mark_boxes).sum(axis=1)
     distances = np.linalg.norm(compute_nearest_points(mark, centers, half_size) - mark, axis=1)
     heights = np.abs(centers[:, 1] - mark[1])
-    costs: Array = distances + _HEIGHT_COST * heights
+    costs: FloatArray = distances + _HEIGHT_COST * heights
     costs += _OUTSIDE_COST * outside_areas + _OVERLAP_COST * covered_areas
     return costs
 
 
-def _choose_candidates(candidates: Sequence[Array], costs: Sequence[Array], order: IntArray) -> IntArray:
+def _choose_candidates(
+    candidates: Sequence[FloatArray], costs: Sequence[FloatArray], order: IntArray
+) -> IntArray:
     """Choose a box for each of n labels, and choose again until no label moves; (n,) indices of boxes."""
     chosen = np.full(len(candidates), -1, dtype=np.intp)
     for _ in range(_MAX_ROUNDS):
@@ -87,17 +91,17 @@ def _choose_candidates(candidates: Sequence[Array], costs: Sequence[Array], orde
     return chosen
 
 
-def compute_half_sizes(labels: Sequence[str]) -> Array:
+def compute_half_sizes(labels: Sequence[str]) -> FloatArray:
     """Return half the approximate width and height of each label, (n, 2) px."""
     return np.array([(0.5 * CHARACTER_WIDTH_PX * len(label), 0.5 * LINE_HEIGHT_PX) for label in labels])
 
 
-def compute_nearest_points(mark: Array, centers: Array, half_size: Array) -> Array:
+def compute_nearest_points(mark: FloatArray, centers: FloatArray, half_size: FloatArray) -> FloatArray:
     """Return the point of each label that is closest to a mark, with the shape of `centers`, px."""
     return np.clip(mark, centers - half_size, centers + half_size)
 
 
-def _list_offsets(half_size: Array) -> Array:
+def _list_offsets(half_size: FloatArray) -> FloatArray:
     """Return the possible offsets of the center of a label from its mark, (k, 2) px."""
     offsets = []
     for row in _LABEL_ROWS:
@@ -110,12 +114,12 @@ def _list_offsets(half_size: Array) -> Array:
     return np.array(offsets)
 
 
-def _compute_overlaps(boxes: Array, others: Array) -> Array:
+def _compute_overlaps(boxes: FloatArray, others: FloatArray) -> FloatArray:
     """Return the area that each of n boxes shares with each of m boxes, (n, m) px².
 
     A box is a row with its left, bottom, right and top edge.
     """
     low = np.maximum(boxes[:, None, :2], others[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
-    areas: Array = np.clip(high - low, 0.0, None).prod(axis=2)
+    areas: FloatArray = np.clip(high - low, 0.0, None).prod(axis=2)
     return areas

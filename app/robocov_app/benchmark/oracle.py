@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.base import BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
@@ -25,6 +24,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _LATTICE = 8
 """Cells along a side of the planner's lattice, which is coarse because no costs are computed on it."""
@@ -39,11 +39,11 @@ class OracleMemory:
     """Memory of n robots: the routes to their goals, and their progress along the routes."""
 
     team: Team
-    routes: tuple[Array, ...]
+    routes: tuple[FloatArray, ...]
     """Waypoints of each robot, (w, 2) m."""
     legs: IntArray
     """Index of the next waypoint of each robot, (n,)."""
-    returns: Array | None = None
+    returns: FloatArray | None = None
     """Points that the last scan of each robot hit, (n, rays, 2) m."""
     stage: int = -1
     """Index of the placement in use."""
@@ -119,8 +119,8 @@ def _find_stage(stages: list[Any], time: float) -> int:
 
 
 def plan_routes(
-    planner: GeodesicPlanner, positions: Array, robots: list[int], placement: Array
-) -> tuple[Array, ...]:
+    planner: GeodesicPlanner, positions: FloatArray, robots: list[int], placement: FloatArray
+) -> tuple[FloatArray, ...]:
     """Assign the positions of a placement to robots, and plan the shortest paths to them.
 
     Goals are assigned again while the robots move, so that a robot that blocks another takes over its goal.
@@ -151,7 +151,7 @@ def plan_routes(
     )
 
 
-def assign_goals(planner: GeodesicPlanner, positions: Array, goals: Array) -> IntArray:
+def assign_goals(planner: GeodesicPlanner, positions: FloatArray, goals: FloatArray) -> IntArray:
     """Assign each robot a goal such that the sum of the squared geodesic distances is minimal.
 
     Parameters
@@ -171,7 +171,7 @@ def assign_goals(planner: GeodesicPlanner, positions: Array, goals: Array) -> In
     return np.asarray(linear_sum_assignment(lengths**2)[1])
 
 
-def find_waypoints(planner: GeodesicPlanner, position: Array, goal: Array) -> Array:
+def find_waypoints(planner: GeodesicPlanner, position: FloatArray, goal: FloatArray) -> FloatArray:
     """Return the waypoints of the shortest path, (w, 2) m; the position alone if there is no path."""
     path = planner.paths.find_path(position, goal)
     return path[1:] if len(path) > 1 else position[None]

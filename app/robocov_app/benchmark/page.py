@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from robocov import __version__
-from robocov.arrays import Array
 from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
+from robocov.typing import FloatArray
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import (
@@ -397,7 +397,7 @@ def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
         )
 
 
-def _draw_label_line(axes: Axes, point: ParetoPoint, offset: Array) -> None:
+def _draw_label_line(axes: Axes, point: ParetoPoint, offset: FloatArray) -> None:
     """Draw the line that connects a mark with the end of its label at the given offset, px."""
     axes.annotate(
         "",

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, PolygonObstacle, Ring, WallObstacle
+from robocov.typing import FloatArray
 
 INNER_WALL_M = 0.12
 """Thickness of inner walls."""
@@ -34,7 +34,7 @@ class FloorPlan(NamedTuple):
     entrance: Point | None = None
 
 
-def round_points(points: Array | list[tuple[float, float]]) -> Ring:
+def round_points(points: FloatArray | list[tuple[float, float]]) -> Ring:
     """Round coordinates to centimeters."""
     return tuple((round(float(x), 2), round(float(y), 2)) for x, y in points)
 
@@ -49,7 +49,7 @@ def build_block(x: float, y: float, width: float, height: float) -> Obstacle:
     return PolygonObstacle(build_box(x, y, x + width, y + height))
 
 
-def build_rotated_block(center: Array, width: float, height: float, angle: float) -> Obstacle:
+def build_rotated_block(center: FloatArray, width: float, height: float, angle: float) -> Obstacle:
     """Build a rectangle around a center, rotated counterclockwise by an angle, rad."""
     corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
     along = np.array([np.cos(angle), np.sin(angle)])

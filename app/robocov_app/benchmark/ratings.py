@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time
 
@@ -113,7 +113,7 @@ class Rating:
     rows: Sequence[Mapping[str, Any]]
     failed: int
 
-    def get_values(self, figure: str) -> Array:
+    def get_values(self, figure: str) -> FloatArray:
         """Return the values of a figure in the runs that have one, (m,)."""
         return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import (
     CircleObstacle,
     Environment,
@@ -18,6 +17,7 @@ from robocov.environment import (
     PolygonObstacle,
     WallObstacle,
 )
+from robocov.typing import FloatArray
 from robocov_app.benchmark.plan_search import search_map
 from robocov_app.benchmark.plan_shapes import (
     INNER_WALL_M,
@@ -109,7 +109,7 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
     )
 
 
-def _build_circle(center: Array, radius: float) -> Obstacle:
+def _build_circle(center: FloatArray, radius: float) -> Obstacle:
     return CircleObstacle(round_points(center[None])[0], round(radius, 2))
 
 
@@ -274,7 +274,7 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     return FloorPlan(boundary, _remove_near_shapes(clear, _YARD_GAP_M))
 
 
-def _draw_yard_point(rng: np.random.Generator) -> Array:
+def _draw_yard_point(rng: np.random.Generator) -> FloatArray:
     """Draw a point from the rectangle around the middle of a yard."""
     return np.array([rng.uniform(3.0, 17.0), rng.uniform(2.5, 13.5)])
 

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
+from robocov.typing import FloatArray
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures, save_distance_figure
@@ -136,7 +136,7 @@ def _describe_result(
     return lines
 
 
-def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
+def _build_speeds(values: tuple[float, ...], robots: int) -> FloatArray | None:
     """Return the speed of each robot, (n,) m/s, given one value for all or for each; None without values."""
     if not values:
         return None
@@ -151,7 +151,7 @@ def _build_speeds(values: tuple[float, ...], robots: int) -> Array | None:
     return np.array(values)
 
 
-def _read_positions(path: Path) -> Array:
+def _read_positions(path: Path) -> FloatArray:
     """Read positions, (n, 2) m, from a JSON file; raise InputError for the first invalid position."""
     try:
         content = json.loads(path.read_bytes())

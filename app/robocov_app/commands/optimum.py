@@ -12,7 +12,6 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from robocov.arrays import Array
 from robocov.defaults import DEFAULT_RADIUS_M, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, format_count, require_number
@@ -20,6 +19,7 @@ from robocov.files.writing import replace_file
 from robocov.lower_bound import MIN_PRECISION, LowerBound, compute_lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MAX_RESTARTS, MAX_ROBOTS, Optimum, find_optimum
+from robocov.typing import FloatArray
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import AREA_TOLERANCE_M2, MIN_FIGURE_LATTICE, build_cost, save_distance_figure
@@ -195,7 +195,7 @@ def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> l
     return gaps
 
 
-def _save_positions(path: Path, positions: Array) -> None:
+def _save_positions(path: Path, positions: FloatArray) -> None:
     """Write positions, (n, 2) m, as JSON with one robot per line."""
     rows = ",\n ".join(json.dumps(position) for position in positions.tolist())
     with replace_file(path) as temporary:

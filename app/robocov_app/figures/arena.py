@@ -14,9 +14,9 @@ from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.record import Record
+from robocov.typing import FloatArray, IntArray
 from robocov_app.figures.page import POINTS_PER_INCH, get_figure, to_plot_color
 from robocov_app.look import legend
 from robocov_app.look.axes import TICK_FACTORS
@@ -214,7 +214,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> N
 
 def _draw_cells(
     axes: Axes,
-    outlines: tuple[list[Array], IntArray],
+    outlines: tuple[list[FloatArray], IntArray],
     hues: IntArray,
     theme: Theme,
     colors: ColorScheme,
@@ -293,7 +293,7 @@ def _draw_final_positions(
 
 
 def _draw_headings(
-    axes: Axes, record: Record, steering: Array, radii: Mapping[int, float], theme: Theme
+    axes: Axes, record: Record, steering: FloatArray, radii: Mapping[int, float], theme: Theme
 ) -> None:
     """Draw a triangle next to the disc of each working unicycle, pointing along its heading.
 
@@ -322,7 +322,7 @@ def _draw_headings(
 
 
 def _draw_goals(
-    axes: Axes, record: Record, centroids: Array, radii: Mapping[int, float], theme: Theme
+    axes: Axes, record: Record, centroids: FloatArray, radii: Mapping[int, float], theme: Theme
 ) -> None:
     """Draw the goals of working robots, or the centroids of their cells if all goals are centroids."""
     working = np.flatnonzero(record.working[-1])
@@ -340,8 +340,8 @@ def _draw_goals(
 
 def draw_robots(
     axes: Axes,
-    positions: Array,
-    radius: Array,
+    positions: FloatArray,
+    radius: FloatArray,
     fills: Sequence[Color],
     theme: Theme,
     *,
@@ -404,7 +404,7 @@ def _compute_points_per_meter(axes: Axes) -> float:
     return abs(float(ends[1, 0] - ends[0, 0]))
 
 
-def _to_points(axes: Axes, positions: Array) -> Array:
+def _to_points(axes: Axes, positions: FloatArray) -> FloatArray:
     """Convert positions, (n, 2) m, to points of the page."""
     # The transformation is only valid once the aspect has been applied.
     axes.apply_aspect()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves, format_end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import FigurePage
@@ -36,8 +36,8 @@ class Band(NamedTuple):
 
     label: str
     style: CurveStyle
-    time: Array
-    values: Array
+    time: FloatArray
+    values: FloatArray
 
 
 @plain_style()
@@ -63,7 +63,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     if page.size[0] < _FULL_WEIGHT_WIDTH_PX:
         weight = _SMALL_WEIGHT
     curves = []
-    quartile_bands: list[tuple[Array, Array] | None] = []
+    quartile_bands: list[tuple[FloatArray, FloatArray] | None] = []
     for band in bands:
         low, middle, high = compute_quartiles(band.values)
         curves.append(_build_curve(page, band, middle, unit))
@@ -84,7 +84,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
     return page.figure
 
 
-def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> TimeCurve:
+def _build_curve(page: FigurePage, band: Band, median: FloatArray, unit: str) -> TimeCurve:
     """Return the median curve of a band, its name shortened so that the end label fits on the page."""
 
     def measure_end_label(name: str) -> float:
@@ -95,7 +95,7 @@ def _build_curve(page: FigurePage, band: Band, median: Array, unit: str) -> Time
     return TimeCurve(name, band.style.name, band.time, median)
 
 
-def compute_quartiles(values: Array) -> Array:
+def compute_quartiles(values: FloatArray) -> FloatArray:
     """Compute the quartiles and the median over runs at each time.
 
     Parameters

@@ -12,10 +12,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 from robocov_app.figures import arena
 from robocov_app.figures.curves import (
     DISTANCE,
@@ -540,8 +540,8 @@ def _draw_snapshot(
 
 def _paint_distances(
     field: DistanceField,
-    x: Array,
-    y: Array,
+    x: FloatArray,
+    y: FloatArray,
     limit: float,
     theme: Theme,
     *,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.page import (
     POINTS_PER_INCH,
     TEXT,
@@ -64,8 +64,8 @@ class TimeCurve(NamedTuple):
 
     label: str
     controller: str
-    times: Array
-    values: Array
+    times: FloatArray
+    values: FloatArray
 
 
 class CurveMargins(NamedTuple):
@@ -195,7 +195,7 @@ def draw_curves(
     theme: Theme,
     *,
     styles: Sequence[CurveStyle] | None = None,
-    bands: Sequence[tuple[Array, Array] | None] | None = None,
+    bands: Sequence[tuple[FloatArray, FloatArray] | None] | None = None,
     label: str = DISTANCE,
     unit: str = "m",
     weight: float = 1.0,
@@ -238,7 +238,9 @@ def draw_curves(
     _draw_end_labels(axes, ends)
 
 
-def _set_axes(axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[Array, Array] | None]) -> None:
+def _set_axes(
+    axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[FloatArray, FloatArray] | None]
+) -> None:
     """Set the limits and ticks of axes for curves and bands."""
     times = np.concatenate([curve.times for curve in curves])
     lines = [curve.values for curve in curves]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.page import (
     POINTS_PER_INCH,
     TEXT,
@@ -161,7 +161,7 @@ def draw_row_marks(axes: Axes, rows: Sequence[float], styles: Sequence[CurveStyl
         )
 
 
-def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, theme: Theme) -> None:
+def draw_row_points(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
     """Draw sorted values as points in a row, scattered vertically so that few points hide others."""
     if len(values) > MAX_POINTS:
         ranks = np.rint(np.linspace(0, len(values) - 1, MAX_POINTS)).astype(int)
@@ -187,7 +187,7 @@ def draw_row_points(axes: Axes, values: Array, row: float, style: CurveStyle, th
     )
 
 
-def _compute_scatter_offsets(count: int) -> Array:
+def _compute_scatter_offsets(count: int) -> FloatArray:
     """Return vertical offsets of points, (count,), from the van der Corput sequence.
 
     Neighbors in the sequence differ widely.

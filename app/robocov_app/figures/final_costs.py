@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.dot_rows import (
     HALF_BOX_HEIGHT,
     MIN_BOX_VALUES,
@@ -40,7 +40,7 @@ class Sample(NamedTuple):
 
     label: str
     style: CurveStyle
-    values: Array
+    values: FloatArray
 
 
 @plain_style()
@@ -108,7 +108,7 @@ def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], 
             )
 
 
-def draw_box(axes: Axes, values: Array, row: float, style: CurveStyle, theme: Theme) -> None:
+def draw_box(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points, median, and a box with whiskers if there are enough values."""
     draw_row_points(axes, values, row, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, Locator, LogLocator, MaxNLocator, NullLocator
 
-from robocov.arrays import Array
 from robocov.controllers.gains import Value, format_value
+from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
     SMALL,
@@ -57,8 +57,8 @@ class GainResults(NamedTuple):
 
     label: str
     style: CurveStyle
-    gains: Array
-    values: Array
+    gains: FloatArray
+    values: FloatArray
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class GainGrid:
     row_label: str
     columns: Sequence[Value]
     rows: Sequence[Value]
-    values: Array
+    values: FloatArray
 
 
 @plain_style()
@@ -193,7 +193,7 @@ def _shorten_name(name: str) -> str:
     return shorten_text(name, len, MAX_NAME_CHARS)
 
 
-def _set_number_axis(axes: Axes, gains: Array) -> float | None:
+def _set_number_axis(axes: Axes, gains: FloatArray) -> float | None:
     """Set the scale, limits and ticks of the horizontal axis for a gain that is a number.
 
     Parameters
@@ -261,7 +261,7 @@ def _set_linear_limits(axes: Axes, low: float, high: float, *, has_unlimited: bo
     return end
 
 
-def _draw_results(axes: Axes, results: GainResults, positions: Array, *, is_joined: bool) -> None:
+def _draw_results(axes: Axes, results: GainResults, positions: FloatArray, *, is_joined: bool) -> None:
     """Draw the runs of a controller as points, and the median at each position if there are few positions.
 
     Parameters

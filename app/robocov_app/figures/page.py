@@ -13,8 +13,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError
+from robocov.typing import FloatArray
 from robocov_app.figures.files import render_png
 from robocov_app.look.axes import MAX_VALUE_INTERVALS, TICK_FACTORS, VALUE_MARGIN, choose_value_limits
 from robocov_app.look.colors import Color
@@ -111,7 +111,9 @@ def set_even_ticks(axis: Axis, max_intervals: int) -> None:
     axis.set_major_formatter("{x:g}")
 
 
-def set_value_axis(axis: Any, values: Array, *, margin: float = VALUE_MARGIN, origin: float = 0.0) -> None:
+def set_value_axis(
+    axis: Any, values: FloatArray, *, margin: float = VALUE_MARGIN, origin: float = 0.0
+) -> None:
     """Set the limits and ticks of an axis for finite values, see `choose_value_limits`."""
     low = float(values.min())
     high = float(values.max())

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.dot_rows import (
     arrange_rows,
     create_row_axes,
@@ -49,7 +49,7 @@ class Pairs(NamedTuple):
 
     label: str
     style: CurveStyle
-    ratios: Array
+    ratios: FloatArray
     interval: Interval
 
 
@@ -99,7 +99,7 @@ def _draw_interval(axes: Axes, interval: Interval, row: float, theme: Theme) -> 
         )
 
 
-def _list_axis_values(pairs: Sequence[Pairs]) -> Array:
+def _list_axis_values(pairs: Sequence[Pairs]) -> FloatArray:
     """Return the values that an axis must show: all ratios, and the ends of intervals.
 
     An interval from two or three values may be extremely wide, so its ends are limited.
@@ -112,7 +112,7 @@ def _list_axis_values(pairs: Sequence[Pairs]) -> Array:
     return np.concatenate([ratios, np.clip(finite_ends, low, high)])
 
 
-def set_ratio_axis(axes: Axes, ratios: Array, theme: Theme) -> None:
+def set_ratio_axis(axes: Axes, ratios: FloatArray, theme: Theme) -> None:
     """Make the horizontal axis logarithmic, with limits and ticks for ratios, and draw a line at 1."""
     low = min(float(ratios.min()), 0.95)
     high = max(float(ratios.max()), 1.05)

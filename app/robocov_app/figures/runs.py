@@ -10,11 +10,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.run_metrics import RunMetrics
 from robocov.record import Record
+from robocov.typing import FloatArray
 from robocov_app.figures import arena
 from robocov_app.figures.curves import (
     CurveMargins,
@@ -621,10 +621,10 @@ class MetricPanel(NamedTuple):
 
     label: str
     unit: str
-    get_values: Callable[[RunMetrics], Array]
+    get_values: Callable[[RunMetrics], FloatArray]
 
 
-def to_free_area_percent(get_area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
+def to_free_area_percent(get_area: Callable[[RunMetrics], FloatArray]) -> Callable[[RunMetrics], FloatArray]:
     """Turn a function that returns areas into one that returns percentages of the free area."""
     return lambda metrics: np.asarray(100.0 * get_area(metrics) / metrics.free_area)
 

@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 
 CONFIDENCE_LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -47,7 +47,7 @@ class Interval:
     estimate: float
     low: float
     high: float
-    resampled_values: Array | None = field(default=None, compare=False, repr=False)
+    resampled_values: FloatArray | None = field(default=None, compare=False, repr=False)
     trials: int = field(default=0, compare=False, repr=False)
 
     def compute_p_value(self, low: float, high: float) -> float:
@@ -158,7 +158,7 @@ def _bootstrap(statistic: _BatchStatistic, clusters: Sequence[object], resamples
     return Interval(estimate, low, high, values)
 
 
-def _resample(statistic: _BatchStatistic, rows_by_cluster: Sequence[IntArray], resamples: int) -> Array:
+def _resample(statistic: _BatchStatistic, rows_by_cluster: Sequence[IntArray], resamples: int) -> FloatArray:
     """Return the values of a statistic for samples of whole clusters, (resamples,).
 
     Parameters
@@ -182,7 +182,7 @@ def _resample(statistic: _BatchStatistic, rows_by_cluster: Sequence[IntArray], r
     return np.concatenate([np.asarray(batch_values) for batch_values in values])
 
 
-def _compute_limits(values: Array) -> tuple[float, float]:
+def _compute_limits(values: FloatArray) -> tuple[float, float]:
     """Return the percentiles of values that are the limits of an interval; nan if there are no values."""
     if not len(values):
         return np.nan, np.nan
@@ -251,7 +251,9 @@ def adjust_p_values(p_values: Mapping[str, float]) -> dict[str, float]:
     return {name: min(p, 1.0) for name, p in zip(names, accumulate(products, max), strict=True)}
 
 
-def estimate_median_time(ended: Sequence[float] | Array, censored: Sequence[float] | Array) -> float:
+def estimate_median_time(
+    ended: Sequence[float] | FloatArray, censored: Sequence[float] | FloatArray
+) -> float:
     """Compute the median time to an event by the estimator of Kaplan and Meier (1958).
 
     Parameters

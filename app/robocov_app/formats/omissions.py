@@ -4,8 +4,8 @@ from collections import Counter
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import format_count
+from robocov.typing import FloatArray
 
 
 class Omissions:
@@ -19,9 +19,9 @@ class Omissions:
 
     def __init__(self) -> None:
         self.counts: Counter[tuple[str, str]] = Counter()
-        self._heights: list[Array] = []
+        self._heights: list[FloatArray] = []
 
-    def add_heights(self, heights: Array) -> None:
+    def add_heights(self, heights: FloatArray) -> None:
         """Count third coordinates, which are dropped because maps are plane; nan stands for a missing one."""
         self._heights.append(heights[~np.isnan(heights)])
 

@@ -4,9 +4,9 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, quote
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 Action: TypeAlias = Literal["force", "velocity"]
 """Kind of an action: a force in N, or a velocity in m/s."""
@@ -15,7 +15,7 @@ VELOCITY_TIME_CONSTANT_S = 0.1
 """Time constant with which a robot approaches a desired velocity."""
 
 
-def compute_action_limits(action: Action, team: Team) -> Array:
+def compute_action_limits(action: Action, team: Team) -> FloatArray:
     """Compute the largest useful value of each component of an action, for each robot.
 
     A force of m a + ν v suffices to move at the maximum speed v and to accelerate by the maximum acceleration
@@ -37,7 +37,9 @@ def compute_action_limits(action: Action, team: Team) -> Array:
     return np.asarray(team.mass * team.max_acceleration + team.viscosity * team.max_speed)
 
 
-def compute_driving_forces(action: Action, actions: Array, velocities: Array, team: Team) -> Array:
+def compute_driving_forces(
+    action: Action, actions: FloatArray, velocities: FloatArray, team: Team
+) -> FloatArray:
     """Compute the forces with which robots execute their actions.
 
     Parameters
@@ -65,7 +67,7 @@ def compute_driving_forces(action: Action, actions: Array, velocities: Array, te
     return np.asarray(viscosity * actions + stiffness * (actions - velocities))
 
 
-def compute_actions(action: Action, forces: Array, velocities: Array, team: Team) -> Array:
+def compute_actions(action: Action, forces: FloatArray, velocities: FloatArray, team: Team) -> FloatArray:
     """Compute the actions that result in given forces: the inverse of `compute_driving_forces`.
 
     Parameters
@@ -87,12 +89,12 @@ def compute_actions(action: Action, forces: Array, velocities: Array, team: Team
     return np.asarray((forces + stiffness * velocities) / (viscosity + stiffness))
 
 
-def _compute_velocity_gains(team: Team) -> tuple[Array, Array]:
+def _compute_velocity_gains(team: Team) -> tuple[FloatArray, FloatArray]:
     """Return the viscosity ν and the gain m / τ of each robot, both (n, 1)."""
     return team.viscosity[:, None], team.mass[:, None] / VELOCITY_TIME_CONSTANT_S
 
 
-def check_actions(actions: Any, count: int) -> Array:
+def check_actions(actions: Any, count: int) -> FloatArray:
     """Check the actions of a team, and convert them to an array.
 
     Parameters

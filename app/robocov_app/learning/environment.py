@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, StartError, describe_unknown_name, quote
 from robocov.scenario import Scenario
+from robocov.typing import FloatArray
 from robocov_app.learning.episode import Episode, SharedRun
 from robocov_app.learning.maps import SEED_LIMIT, MapSampler, build_map
 from robocov_app.learning.task import CoverageTask, change_task
@@ -138,7 +138,7 @@ class _RandomValues(NamedTuple):
         return cls(start, start_seed, conditions_seed)
 
 
-def _parse_positions(positions: Any) -> Array:
+def _parse_positions(positions: Any) -> FloatArray:
     try:
         return np.asarray(positions, dtype=float)
     except (TypeError, ValueError):

@@ -8,7 +8,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -18,6 +17,7 @@ from robocov.record import Record
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.learning.actions import check_actions
 from robocov_app.learning.motion import execute_actions
 from robocov_app.learning.observation_layout import Rows, normalize_positions
@@ -67,8 +67,8 @@ class ActionOutcome:
         Time in contact with a wall or another robot.
     """
 
-    rewards: Array
-    contact_time: Array
+    rewards: FloatArray
+    contact_time: FloatArray
 
 
 class SharedSimulation:
@@ -93,7 +93,7 @@ class SharedSimulation:
         self._observed: Observations | None = None
         self._rows: Rows = np.empty((0, 0, 0), dtype=np.float32)
 
-    def start_episode(self, run: int, positions: Array) -> SimulationBatch:
+    def start_episode(self, run: int, positions: FloatArray) -> SimulationBatch:
         """Start an episode, and return the simulation of all episodes.
 
         Parameters
@@ -115,7 +115,7 @@ class SharedSimulation:
         self._simulation.restart(run, positions)
         return self._simulation
 
-    def step(self, actions: Array, episodes: Mapping[int, Episode]) -> dict[int, ActionOutcome]:
+    def step(self, actions: FloatArray, episodes: Mapping[int, Episode]) -> dict[int, ActionOutcome]:
         """Advance all episodes by one action period.
 
         Parameters
@@ -239,7 +239,7 @@ class Episode:
         self._snapshots: list[Snapshot] = []
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """Centers of the robots, (n, 2) m."""
         return self.simulation.positions[self._index]
 
@@ -291,7 +291,7 @@ class Episode:
             "uncovered_area_m2": self.coverage.uncovered_area,
         }
 
-    def advance(self, actions: Array, *, is_last: bool = False) -> ActionOutcome:
+    def advance(self, actions: FloatArray, *, is_last: bool = False) -> ActionOutcome:
         """Execute one action of each robot, held for one action period.
 
         Parameters
@@ -313,7 +313,7 @@ class Episode:
         return actions >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 
     def finish_action(
-        self, contact_time: Array, *, is_rewarded: bool, coverage: CoverageResult | None = None
+        self, contact_time: FloatArray, *, is_rewarded: bool, coverage: CoverageResult | None = None
     ) -> ActionOutcome:
         """Record the positions after an action, and compute its rewards.
 
@@ -331,7 +331,7 @@ class Episode:
         penalties = self.task.contact_penalty * contact_time
         return ActionOutcome(np.asarray(shares - penalties), contact_time)
 
-    def _share_cost_change(self, is_rewarded: bool, coverage: CoverageResult | None) -> Array:
+    def _share_cost_change(self, is_rewarded: bool, coverage: CoverageResult | None) -> FloatArray:
         """Evaluate the cost, and split its change since the last reward among the robots, (n,) m.
 
         Robots must not be rewarded or punished because others join or fail. If that happens, the cost is
@@ -375,7 +375,7 @@ class Episode:
         after = self._evaluate_cost(self.time, self.cycle, robots)
         return before, after
 
-    def _share_change(self, before: CoverageResult, after: CoverageResult) -> Array:
+    def _share_change(self, before: CoverageResult, after: CoverageResult) -> FloatArray:
         """Share the change in the cost since the last reward among the robots of both costs, m."""
         elapsed_fraction = (self.cycle - self._rewarded_cycle) / self.task.cycles
         return share_reward(self.task.reward, before, after, elapsed_fraction)

@@ -12,9 +12,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from numpy.typing import NDArray
 
-from robocov.arrays import Array
+from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import check_actions, compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
 from robocov_app.learning.episode import ActionOutcome, SharedRun, SharedSimulation
@@ -26,7 +25,7 @@ ID = "robocov/Coverage-v0"
 """Name of the registered environment."""
 
 
-class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
     """Environment in which one learner with the knowledge of all robots drives the team: gymnasium's ``Env``.
 
     An observation has one row for each robot, (n, size) float32 from -1 to 1, in the task's
@@ -146,7 +145,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         rows[~episode.working] = 0.0
         return rows
 
-    def _build_info(self, contact_time: Array) -> dict[str, Any]:
+    def _build_info(self, contact_time: FloatArray) -> dict[str, Any]:
         episode = self._get_episode()
         return {
             **episode.summarize(),

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.metrics import MAX_CONTACT_GAP_M
 from robocov.observation import Decision, Snapshot
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.simulation import Simulation, SimulationBatch
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.learning.actions import compute_driving_forces
 from robocov_app.learning.task import CoverageTask
 
@@ -19,9 +19,9 @@ _REACH_MARGIN = 1.001
 def execute_actions(
     task: CoverageTask,
     simulation: Simulation | SimulationBatch,
-    actions: Array,
+    actions: FloatArray,
     snapshots: list[Snapshot] | None = None,
-) -> Array:
+) -> FloatArray:
     """Advance a simulation by one action period while its robots execute the same actions.
 
     Parameters
@@ -68,7 +68,7 @@ def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
     return has_contact.reshape(shape)
 
 
-def _separate_runs(positions: Array, robots: int, distance: float) -> Array:
+def _separate_runs(positions: FloatArray, robots: int, distance: float) -> FloatArray:
     """Shift each run by `distance` from the previous one, so that robots of different runs are not close."""
     runs = np.arange(len(positions)) // robots
     return np.asarray(positions + (distance * runs)[:, None])

@@ -6,17 +6,16 @@ from itertools import accumulate
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.known_cells import compute_known_cells
 from robocov.errors import ParameterError, require_number, require_type
 from robocov.observation import MAX_RAYS, Observations, Scans
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import Float32Array, FloatArray, IntArray
 
-Rows: TypeAlias = NDArray[np.float32]
+Rows: TypeAlias = Float32Array
 """(n, size): one row for each robot."""
 MAX_NEIGHBORS = 1000
 """Maximum number of neighbors in a row."""
@@ -169,7 +168,7 @@ class ObservationLayout:
         # With localization errors, believed positions may be outside the region.
         return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
 
-    def _find_neighbors(self, seen: Observations) -> Array:
+    def _find_neighbors(self, seen: Observations) -> FloatArray:
         """Return the offset of each of the nearest neighbors, and 1 if there is one, (n, neighbors, 3)."""
         n = len(seen.positions)
         unit = seen.region.diameter
@@ -188,7 +187,7 @@ class ObservationLayout:
         return scans
 
 
-def normalize_positions(positions: Array, region: Region) -> Array:
+def normalize_positions(positions: FloatArray, region: Region) -> FloatArray:
     """Return positions from the center of a region's bounding box, in units of its diagonal, (n, 2)."""
     min_x, min_y, max_x, max_y = region.bounds
     center = np.array([(min_x + max_x) / 2.0, (min_y + max_y) / 2.0])
@@ -197,7 +196,11 @@ def normalize_positions(positions: Array, region: Region) -> Array:
 
 @kernel
 def _insert_nearest(
-    robots: IntArray, offsets: Array, pair_distances: Array, distances: Array, nearest: Array
+    robots: IntArray,
+    offsets: FloatArray,
+    pair_distances: FloatArray,
+    distances: FloatArray,
+    nearest: FloatArray,
 ) -> None:
     """Insert pairs of robots into the lists of nearest neighbors, which stay sorted by distance.
 

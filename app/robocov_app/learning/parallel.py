@@ -10,8 +10,8 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, quote
+from robocov.typing import FloatArray
 from robocov_app.learning.actions import compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
 from robocov_app.learning.observation_layout import Rows
@@ -180,7 +180,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self._update_window()
         return observations, rewards, terminations, truncations, infos
 
-    def _check_actions(self, actions: Mapping[str, Any]) -> Array:
+    def _check_actions(self, actions: Mapping[str, Any]) -> FloatArray:
         """Check the actions, and return them as an array, (n, 2), with zeros for robots that do not work."""
         checked = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):

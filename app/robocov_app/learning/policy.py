@@ -5,9 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array
 from robocov.controllers import inform_controller
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import gain, validate_gains
@@ -15,12 +13,13 @@ from robocov.errors import ParameterError, require_type
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import ACTIONS, Action, compute_actions, compute_driving_forces
 from robocov_app.learning.episode import Episode
 from robocov_app.learning.observation_layout import ObservationLayout
 from robocov_app.learning.task import check_kind
 
-Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
+Policy: TypeAlias = Callable[[Float32Array], Any]
 """Function that takes the observation of a robot, (size,), and returns its action, (2,)."""
 _TIME_TOLERANCE_S = 5e-7
 """Tolerance for rounding errors in sums of control periods."""
@@ -40,7 +39,7 @@ class PolicyMemory:
     """
 
     team: Team
-    actions: Array | None = None
+    actions: FloatArray | None = None
     next_time: float = -np.inf
 
 
@@ -119,7 +118,7 @@ class PolicyController:
         """Scans that the observations need."""
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
-    def act(self, observation: NDArray[np.float32]) -> Any:
+    def act(self, observation: Float32Array) -> Any:
         """Return the action of one robot for its observation.
 
         Parameters
@@ -179,7 +178,7 @@ class PolicyController:
             return seen.scans is not None
         return seen.time >= memory.next_time - _TIME_TOLERANCE_S
 
-    def _compute_actions(self, seen: Observations, team: Team) -> Array:
+    def _compute_actions(self, seen: Observations, team: Team) -> FloatArray:
         rows = self.layout.build_rows(seen, team)
         actions = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
         for action in actions:
@@ -248,7 +247,7 @@ class ControllerPolicy:
         by_agent = dict(zip(bare.possible_agents, actions, strict=True))
         return {agent: by_agent[agent] for agent in bare.agents}
 
-    def _update_actions(self, episode: Episode) -> Array:
+    def _update_actions(self, episode: Episode) -> FloatArray:
         """Return the actions of the current decision; ask the controller if it has not decided yet."""
         if self._episode is not episode:
             self._start(episode)

@@ -4,8 +4,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.cost import CoverageResult
+from robocov.typing import FloatArray
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
 """Scheme by which a reward is shared among the robots; see `share_reward`."""
@@ -43,7 +43,7 @@ def compute_reference_distance(area: float, robots: int) -> float:
 
 def share_reward(
     reward: Reward, before: CoverageResult, after: CoverageResult, elapsed_fraction: float
-) -> Array:
+) -> FloatArray:
     """Compute the reward of each robot for a change in the mean distance.
 
     Parameters
@@ -84,6 +84,6 @@ def share_reward(
     return np.asarray(own_decreases + (decrease - own_decreases.sum()) / n)
 
 
-def _compute_mean_distance_gradient(result: CoverageResult) -> Array:
+def _compute_mean_distance_gradient(result: CoverageResult) -> FloatArray:
     """Convert the gradient of the cost value, which must not be 0, to that of the mean distance, (n, 2)."""
     return np.asarray(result.gradient * (result.mean_distance / result.value))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.lengths import round_down
 
 MAX_LOW_FRACTION = 0.4
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
     step: float
 
     @property
-    def ticks(self) -> Array:
+    def ticks(self) -> FloatArray:
         """Multiples of the step within the limits."""
         return list_ticks(self.start, self.end, self.step)
 
@@ -117,7 +117,7 @@ def choose_tick_step(span: float, max_intervals: float) -> float:
     return float(f"{step:.12g}")
 
 
-def list_ticks(start: float, end: float, step: float) -> Array:
+def list_ticks(start: float, end: float, step: float) -> FloatArray:
     """Return the multiples of a step from `start` to `end`, both included."""
     first = math.ceil(start / step - 1e-9)
     last = math.floor(end / step + 1e-9)

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import IntArray
+from robocov.typing import IntArray
 from robocov_app.look.colors import Color, compute_contrast, mix
 from robocov_app.look.theme import Theme
 

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 MIN_ZOOM_PX_PER_M = 1e-4
 """A hundredth of the zoom that shows the largest map."""
@@ -66,7 +66,7 @@ class Camera:
         left, top, width, height = self.view
         return left + width / 2, top + height / 2
 
-    def to_pixels(self, points: Array) -> Array:
+    def to_pixels(self, points: FloatArray) -> FloatArray:
         """Convert positions to pixels.
 
         Parameters
@@ -83,7 +83,7 @@ class Camera:
             pixels = (points - np.array(self.center)) * scale + np.array(self.middle)
         return np.asarray(pixels).clip(-MAX_PIXEL, MAX_PIXEL)
 
-    def to_world(self, pixels: Array) -> Array:
+    def to_world(self, pixels: FloatArray) -> FloatArray:
         """Convert pixels, (..., 2) px, to positions, (..., 2) m."""
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
         return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))

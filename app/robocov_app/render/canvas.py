@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import pygame
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
@@ -113,13 +113,17 @@ class Canvas:
         """Convert a text size, px at scale 1, to pixels of the surface, but not below a readable size."""
         return max(_MIN_TEXT_PX, round(pixels * self.scale))
 
-    def fill_polygon(self, corners: Array, fill: Color | tuple[int, int, int, int]) -> None:
+    def fill_polygon(self, corners: FloatArray, fill: Color | tuple[int, int, int, int]) -> None:
         """Fill a polygon, (k, 2) px."""
         for ring in clip_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
     def draw_polygons(
-        self, corners: Array, ends: Sequence[int], fills: Sequence[Color | None], edge: Color | None = None
+        self,
+        corners: FloatArray,
+        ends: Sequence[int],
+        fills: Sequence[Color | None],
+        edge: Color | None = None,
     ) -> None:
         """Draw many polygons.
 
@@ -151,7 +155,9 @@ class Canvas:
                     self.draw_outline(corners[start:end], edge, edge_width)
             start = end
 
-    def draw_outline(self, corners: Array, color: Color, width: int = 1, *, is_closed: bool = True) -> None:
+    def draw_outline(
+        self, corners: FloatArray, color: Color, width: int = 1, *, is_closed: bool = True
+    ) -> None:
         """Draw an antialiased line through (k, 2) px, by default back to the first point."""
         points = corners.tolist()
         path = [*points, *points[:1]] if is_closed else points
@@ -177,7 +183,7 @@ class Canvas:
         else:
             pygame.draw.aalines(self.surface, color, is_closed, points)
 
-    def draw_segments(self, ends: Array, color: Color, width: int = 1) -> None:
+    def draw_segments(self, ends: FloatArray, color: Color, width: int = 1) -> None:
         """Draw many antialiased lines, (k, 4) px: x and y of one end, then of the other."""
         is_near = is_within_limit(ends)
         for x1, y1, x2, y2 in ends.tolist():
@@ -281,7 +287,7 @@ class Canvas:
         self.draw_sprites([sprite], np.array([center], dtype=float))
 
     def draw_sprites(
-        self, choices: Sequence[Sprite], centers: Array, indices: IntArray | None = None
+        self, choices: Sequence[Sprite], centers: FloatArray, indices: IntArray | None = None
     ) -> None:
         """Draw a sprite at each of many pixels.
 
@@ -297,7 +303,7 @@ class Canvas:
         self.surface.fblits(placed, pygame.BLEND_PREMULTIPLIED)
 
     def place_sprites(
-        self, choices: Sequence[Sprite], centers: Array, indices: IntArray | None = None
+        self, choices: Sequence[Sprite], centers: FloatArray, indices: IntArray | None = None
     ) -> PlacedSprites:
         """Return the pictures that `draw_sprites` draws, with their upper left corners, px.
 
@@ -370,13 +376,13 @@ class Canvas:
         return measure_text(text, self.scale_text_size(size), bold)
 
 
-def _list_bar_ends(tip: Array, along: Array, half_bar: float) -> list[list[float]]:
+def _list_bar_ends(tip: FloatArray, along: FloatArray, half_bar: float) -> list[list[float]]:
     """Return the two ends of the bar across the tip of an arrow, px; `along` is its direction."""
     across = np.array([-along[1], along[0]])
     return [(tip - half_bar * across).tolist(), (tip + half_bar * across).tolist()]
 
 
-def _list_barbs(tip: Array, along: Array, head_length: float) -> list[list[float]]:
+def _list_barbs(tip: FloatArray, along: FloatArray, head_length: float) -> list[list[float]]:
     """Return the corners of the head of an arrow, px: one barb, the tip and the other barb."""
     across = np.array([-along[1], along[0]])
     base = tip - head_length * along

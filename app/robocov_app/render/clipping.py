@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.render.sprites import Pixel
 
 MAX_DRAWN_PX = 20000.0
 """Maximum absolute coordinate that is drawn: products of twice this still fit into 32 bits."""
 
 
-def limit_pixels(points: Array) -> Array:
+def limit_pixels(points: FloatArray) -> FloatArray:
     """Limit the coordinates of points to `MAX_DRAWN_PX`; only points far outside the surface move.
 
     Parameters
@@ -26,12 +26,12 @@ def limit_pixels(points: Array) -> Array:
     return np.clip(points, -MAX_DRAWN_PX, MAX_DRAWN_PX)
 
 
-def is_within_limit(points: Array) -> bool:
+def is_within_limit(points: FloatArray) -> bool:
     """Return whether all coordinates, (..., 2) px, are at most `MAX_DRAWN_PX`."""
     return points.size == 0 or bool(np.abs(points).max() <= MAX_DRAWN_PX)
 
 
-def clip_polygon(corners: Array) -> list[Array]:
+def clip_polygon(corners: FloatArray) -> list[FloatArray]:
     """Clip a polygon to coordinates whose magnitude is at most `MAX_DRAWN_PX`.
 
     Parameters

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.render.camera import Camera
 
 MAX_MARKED_ROBOTS = 100
@@ -18,7 +18,7 @@ _MAX_LINES_AT_FULL_WIDTH = 20
 _MIN_WIDTH_FACTOR = 0.5
 
 
-def compute_nearest_distances(points: Array, sample_step: int = 1) -> Array:
+def compute_nearest_distances(points: FloatArray, sample_step: int = 1) -> FloatArray:
     """Return the distance of each point to the nearest other one.
 
     Parameters
@@ -44,7 +44,7 @@ def compute_nearest_distances(points: Array, sample_step: int = 1) -> Array:
     return np.asarray(distances).ravel()
 
 
-def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Array:
+def fit_radii(centers: FloatArray, true_radii: FloatArray, low: float, high: float) -> FloatArray:
     """Choose the radii of discs so that they are well visible and do not overlap.
 
     Each disc reaches halfway to its nearest neighbor, within the limits.
@@ -65,7 +65,7 @@ def fit_radii(centers: Array, true_radii: Array, low: float, high: float) -> Arr
     return np.asarray(np.maximum(true_radii, np.clip(half_distances, low, high)))
 
 
-def fit_mark_size(points: Array, low: float, high: float) -> float:
+def fit_mark_size(points: FloatArray, low: float, high: float) -> float:
     """Choose one size for all marks, such that about half of them do not overlap.
 
     The size is the median distance to the nearest other mark, within limits.
@@ -87,7 +87,7 @@ def fit_mark_size(points: Array, low: float, high: float) -> float:
     return float(np.clip(np.median(distances), low, high))
 
 
-def is_crowd(positions: Array, camera: Camera) -> bool:
+def is_crowd(positions: FloatArray, camera: Camera) -> bool:
     """Return whether more robots are in view than can be marked one by one.
 
     Parameters

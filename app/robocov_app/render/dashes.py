@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 
-def cut_into_dashes(points: Array, lengths: Sequence[float]) -> Array:
+def cut_into_dashes(points: FloatArray, lengths: Sequence[float]) -> FloatArray:
     """Cut a curve into dashes and gaps along its length, and return the dashes.
 
     Parameters

@@ -6,9 +6,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array
 from robocov.density import Density, Gaussians
 from robocov.environment import Environment
+from robocov.typing import FloatArray
 from robocov_app.look.theme import Theme
 
 _RANGE_SAMPLES = 96
@@ -39,7 +39,7 @@ def shade_density(environment: Environment, n_samples: int, theme: Theme) -> NDA
     return color_density(fractions, theme)
 
 
-def list_sample_coordinates(environment: Environment, n_samples: int) -> tuple[Array, Array]:
+def list_sample_coordinates(environment: Environment, n_samples: int) -> tuple[FloatArray, FloatArray]:
     """Return the coordinates of equally spaced samples over the bounds of the region.
 
     Parameters
@@ -60,13 +60,13 @@ def list_sample_coordinates(environment: Environment, n_samples: int) -> tuple[A
     return _divide_evenly(low_x, high_x, step), _divide_evenly(low_y, high_y, step)
 
 
-def _divide_evenly(low: float, high: float, step: float) -> Array:
+def _divide_evenly(low: float, high: float, step: float) -> FloatArray:
     """Return the middles of equal intervals that are about one step long."""
     count = max(round((high - low) / step), 1)
     return low + (np.arange(count) + 0.5) * (high - low) / count
 
 
-def compute_density_fractions(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
+def compute_density_fractions(density: Density, bounds: Bounds, x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the density at a grid of points, scaled to its range.
 
     Parameters
@@ -89,7 +89,7 @@ def compute_density_fractions(density: Density, bounds: Bounds, x: Array, y: Arr
     return np.asarray(np.clip((values - low) / (high - low), 0.0, 1.0))
 
 
-def color_density(fractions: Array, theme: Theme) -> NDArray[np.uint8]:
+def color_density(fractions: FloatArray, theme: Theme) -> NDArray[np.uint8]:
     """Convert scaled densities to colors, all of one hue, from transparent to opaque.
 
     Parameters
@@ -134,6 +134,6 @@ def compute_density_range(density: Density, bounds: Bounds) -> tuple[float, floa
     return float(values.min()), float(values.max())
 
 
-def _build_grid(x: Array, y: Array) -> Array:
+def _build_grid(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return all pairs of coordinates, (h * w, 2) m, row by row."""
     return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])

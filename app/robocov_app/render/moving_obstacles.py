@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 import shapely.affinity
 
-from robocov.arrays import Array
 from robocov.environment import Environment
+from robocov.typing import FloatArray
 
 _HEADING_STEP = 1e-3
 """Time over which a heading is measured: a fraction of the path's period, at most this many seconds."""
@@ -20,11 +20,11 @@ class MovingObstacle(NamedTuple):
     """A moving obstacle at one time."""
 
     polygon: shapely.Polygon
-    middle: Array
+    middle: FloatArray
     """(2,) m"""
-    path: Array
+    path: FloatArray
     """(k, 2) m, the path of its middle."""
-    heading: Array
+    heading: FloatArray
     """(2,) Unit vector."""
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.render.camera import Camera
 
 
@@ -47,7 +47,9 @@ def build_palette_surface(indices: NDArray[np.uint8], palette: NDArray[np.uint8]
     return surface
 
 
-def convert_axes_to_world(camera: Camera, columns: Array, rows: Array) -> tuple[Array, Array]:
+def convert_axes_to_world(
+    camera: Camera, columns: FloatArray, rows: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Convert columns and rows of a surface, px, to x and y, m."""
     column_pixels = np.column_stack([columns, np.zeros(len(columns))])
     row_pixels = np.column_stack([np.zeros(len(rows)), rows])

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import IntArray
 from robocov.observation import Snapshot
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record
+from robocov.typing import IntArray
 from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.moving_obstacles import list_moving_obstacles
 from robocov_app.render.scene import Scene

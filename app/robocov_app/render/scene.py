@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 from robocov_app.render.distance_map.pixel_distances import DistanceField
 from robocov_app.render.moving_obstacles import MovingObstacle, list_moving_obstacles
@@ -22,7 +22,7 @@ CENTROID_TOLERANCE_M = 0.05
 """Distance within which a goal counts as the centroid: in records, goals are a step older than cells."""
 
 
-def are_centroids(goals: Array, centroids: Array) -> bool:
+def are_centroids(goals: FloatArray, centroids: FloatArray) -> bool:
     """Return whether all goals are at the centroids of the robots' cells, within a tolerance.
 
     Parameters
@@ -99,12 +99,12 @@ class Scene:
     environment: Environment
     team: Team
     snapshot: Snapshot | None = None
-    starts: Array | None = None
-    trail: Array | None = None
-    trail_time: Array | None = None
+    starts: FloatArray | None = None
+    trail: FloatArray | None = None
+    trail_time: FloatArray | None = None
     trail_fade: float | None = None
-    cells: Sequence[Array] | None = None
-    centroids: Array | None = None
+    cells: Sequence[FloatArray] | None = None
+    centroids: FloatArray | None = None
     adjacency: IntArray | None = None
     label: str = ""
     cost: str = ""
@@ -113,9 +113,9 @@ class Scene:
     numbers: Sequence[int] | None = None
     failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)
     selected: int | None = None
-    scans: Sequence[tuple[Array, Array]] = ()
+    scans: Sequence[tuple[FloatArray, FloatArray]] = ()
     sensed: SensedPoints | None = None
-    path: Array | None = None
+    path: FloatArray | None = None
     cell_owners: IntArray | None = None
     moving: Sequence[MovingObstacle] = ()
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)

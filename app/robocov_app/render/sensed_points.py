@@ -7,7 +7,7 @@ from copy import copy
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 CELL_SIZE_M = 0.05
 """Of the points that a robot senses within the same square of this size, only the first is stored."""
@@ -28,7 +28,7 @@ class SensedPoints:
     def __len__(self) -> int:
         return len(self._times)
 
-    def add(self, time: float, numbers: Sequence[int], points: Array) -> None:
+    def add(self, time: float, numbers: Sequence[int], points: FloatArray) -> None:
         """Add the points that robots sense at a time.
 
         Parameters
@@ -53,7 +53,7 @@ class SensedPoints:
         self._robots = np.append(self._robots, np.asarray(numbers, dtype=np.intp)[new_rows])
         self._points = np.concatenate([self._points, points[new_rows]])
 
-    def get_until(self, time: float) -> tuple[Array, IntArray]:
+    def get_until(self, time: float) -> tuple[FloatArray, IntArray]:
         """Return the points that had been sensed by a time, s.
 
         Returns

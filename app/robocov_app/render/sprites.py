@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, choose_text_color
 from robocov_app.render.fonts import render_text
 from robocov_app.render.surface_cache import cache_surfaces
@@ -45,7 +45,7 @@ Pixel: TypeAlias = Sequence[float]
 """Position on a surface, px: x to the right and y down."""
 
 
-def find_visible_box(points: Array, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
+def find_visible_box(points: FloatArray, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
     """Return the box around points with a margin, clipped to the visible part of a surface.
 
     Parameters

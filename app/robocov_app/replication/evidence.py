@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers import get_gain_values, get_information, load_controller_class, make_controller
 from robocov.controllers.gains import format_value
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time, group_by
 from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.claims.explanations import compute_positive_fraction
@@ -174,7 +174,7 @@ def summarize_contenders(
     return summaries
 
 
-def _compute_mean(values: Array) -> float:
+def _compute_mean(values: FloatArray) -> float:
     """Return the mean of the finite values, (m,); nan if there are none."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if len(finite) else float("nan")

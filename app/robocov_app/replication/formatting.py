@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import Interval
 
 NO_VALUE = "–"
@@ -52,7 +52,7 @@ def format_interval(interval: Interval, unit: str = "") -> str:
     return f"{estimate} ({format_amount(interval.low, unit)} to {format_amount(interval.high, unit)})"
 
 
-def format_median(values: Array, unit: str = "") -> str:
+def format_median(values: FloatArray, unit: str = "") -> str:
     """Format the median of values, (m,), with its unit; a dash without values."""
     if not len(values):
         return NO_VALUE

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.record import Record
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov.voronoi import partition, partition_by_travel_time
 from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 
@@ -16,7 +16,7 @@ MAX_CELLS = 400
 """Maximum number of robots for which a replay draws cells. More would take too long in each frame."""
 
 
-def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str, Any]:
+def embed_hues(record: Record, positions: FloatArray, working: BoolArray) -> dict[str, Any]:
     """Build the hues of the cells of a run as JSON content.
 
     Parameters
@@ -54,7 +54,7 @@ def embed_hues(record: Record, positions: Array, working: BoolArray) -> dict[str
     return {"first": first_hues, "changes": changes}
 
 
-def _find_adjacency(record: Record, positions: Array, working: BoolArray) -> IntArray:
+def _find_adjacency(record: Record, positions: FloatArray, working: BoolArray) -> IntArray:
     """Return the pairs of robots whose cells share an edge, as an (m, 2) array with the lower index first."""
     robots = np.flatnonzero(working & np.isfinite(positions).all(axis=1))
     if len(robots) < 2:

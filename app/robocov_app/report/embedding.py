@@ -15,11 +15,11 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.text import escape_controls
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.look import axes
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle
 from robocov_app.report.descriptions import list_lifetimes
@@ -180,7 +180,7 @@ def _round_points(points: ArrayLike, unit: float) -> list[int]:
     return [int(value) for value in np.rint(np.asarray(points) / unit).ravel()]
 
 
-def _round_rings(rings: Iterable[Array], unit: float) -> list[list[int]]:
+def _round_rings(rings: Iterable[FloatArray], unit: float) -> list[list[int]]:
     """Convert each ring, m, to a flat list of integer multiples of a unit, m."""
     return [_round_points(ring, unit) for ring in rings]
 
@@ -263,7 +263,7 @@ def _embed_team(record: Record) -> dict[str, Any]:
     return content
 
 
-def _find_working(record: Record, times: Array) -> BoolArray:
+def _find_working(record: Record, times: FloatArray) -> BoolArray:
     """Return a mask, (T, n), of the robots that work at given times, s since the start."""
     working = np.ones((len(times), len(record.team)), dtype=bool)
     if record.conditions is None:
@@ -275,7 +275,7 @@ def _find_working(record: Record, times: Array) -> BoolArray:
     return working
 
 
-def _embed_headings(record: Record, steering: Array, times: Array) -> str:
+def _embed_headings(record: Record, steering: FloatArray, times: FloatArray) -> str:
     """Return the headings of unicycles at given times as quantized unit vectors.
 
     Unit vectors are used because angles cannot be interpolated across a full turn.
@@ -286,7 +286,7 @@ def _embed_headings(record: Record, steering: Array, times: Array) -> str:
 
 
 def _embed_cost(
-    history: CostHistory | None, start: float, times: Array, step: float
+    history: CostHistory | None, start: float, times: FloatArray, step: float
 ) -> dict[str, Any] | None:
     """Build the mean distances at given times, s since the start, as JSON content; None if unknown."""
     if history is None:
@@ -308,7 +308,7 @@ def _embed_cost(
     }
 
 
-def list_even_times(end: float, rate: float) -> Array:
+def list_even_times(end: float, rate: float) -> FloatArray:
     """Return the multiples of ``1 / rate`` seconds from 0 to `end`, and `end` itself, s."""
     times = np.arange(math.floor(end * rate + _FRACTION_TOLERANCE) + 1) / rate
     if end - times[-1] > _TIME_TOLERANCE_S:
@@ -316,7 +316,7 @@ def list_even_times(end: float, rate: float) -> Array:
     return times
 
 
-def quantize(values: Array, low: float, high: float) -> str:
+def quantize(values: FloatArray, low: float, high: float) -> str:
     """Encode numbers as text, with 16 bits each.
 
     Parameters
@@ -338,19 +338,19 @@ def quantize(values: Array, low: float, high: float) -> str:
     return base64.b64encode(words.tobytes()).decode("ascii")
 
 
-def _quantize_points(record: Record, points: Array) -> str:
+def _quantize_points(record: Record, points: FloatArray) -> str:
     """Quantize points, (T, n, 2) m, relative to the bounding box of the region."""
     low, high = np.array(record.environment.region.bounds).reshape(2, 2)
     return quantize((points - low) / (high - low), 0.0, 1.0)
 
 
-def _interpolate_points(record: Record, points: Array, times: Array) -> Array:
+def _interpolate_points(record: Record, points: FloatArray, times: FloatArray) -> FloatArray:
     """Interpolate points of a record, (k, n, 2) m, at other times, s; the result is (T, n, 2) m."""
     rows = _interpolate_rows(record.time, points.reshape(len(record), -1), times)
     return rows.reshape(len(times), -1, 2)
 
 
-def _interpolate_rows(time: Array, rows: Array, times: Array) -> Array:
+def _interpolate_rows(time: FloatArray, rows: FloatArray, times: FloatArray) -> FloatArray:
     """Interpolate (k, m) rows linearly at other times; the (T, m) result is nan if a neighboring row is."""
     if len(time) == 1:
         return np.asarray(np.repeat(rows, len(times), axis=0))

@@ -15,10 +15,10 @@ import numpy as np
 import shapely
 from PIL import Image
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.typing import FloatArray
 from robocov_app.look.colors import mix
 from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.look.theme import DARK, LIGHT
@@ -87,7 +87,7 @@ class PictureFrame:
         self.width = round(self.zoom * (high_x - low_x) + 2 * _MARGIN_PX, 1)
         self.height = round(self.zoom * (high_y - low_y) + 2 * _MARGIN_PX, 1)
 
-    def to_pixels(self, points: Array) -> Array:
+    def to_pixels(self, points: FloatArray) -> FloatArray:
         """Convert points, (..., 2) m, to pixels from the upper left corner."""
         return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN_PX)
 
@@ -117,7 +117,7 @@ def build_density_image(environment: Environment) -> str:
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
-def extract_rings(area: shapely.Geometry) -> list[Array]:
+def extract_rings(area: shapely.Geometry) -> list[FloatArray]:
     """Return the rings of polygons, (k, 2) m each, without the repeated first vertex.
 
     The outer ring of each polygon comes first.
@@ -318,7 +318,7 @@ def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, fr
     )
 
 
-def _format_path(lines: Iterable[Array], *, is_closed: bool = False) -> str:
+def _format_path(lines: Iterable[FloatArray], *, is_closed: bool = False) -> str:
     """Format lines, (k, 2) px each, as SVG path data with relative steps, which are short.
 
     Positions are rounded to tenths of a pixel before steps are computed, so rounding errors do not add up.

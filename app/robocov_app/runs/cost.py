@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
@@ -10,6 +9,7 @@ from robocov.errors import format_count
 from robocov.geodesic import Geodesics
 from robocov.mapfile.check import MANY_VERTICES, count_vertices
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov_app.terminal.progress import show_late_progress
 
 AREA_TOLERANCE_M2 = 1e-6
@@ -80,12 +80,12 @@ def refine_cost_for_figures(
 def save_distance_figure(
     path: Path,
     cost: CoverageCost,
-    positions: Array,
+    positions: FloatArray,
     mean: str,
     *,
     title: str,
     theme: str,
-    speeds: Array | None = None,
+    speeds: FloatArray | None = None,
     radius: float = DEFAULT_RADIUS_M,
 ) -> None:
     """Draw a map of the distances to the nearest robot, and save it.

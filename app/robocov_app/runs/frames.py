@@ -7,9 +7,9 @@ from itertools import groupby
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.typing import FloatArray, IntArray
 from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.distance_map.pixel_distances import DistanceFields
 from robocov_app.render.layer_catalog import build_standard_layers
@@ -25,7 +25,7 @@ _FRAME_COUNT_TOLERANCE = 1e-9
 """Maximum rounding error of a number of frames."""
 
 
-def select_frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
+def select_frame_rows(time: FloatArray, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
     """Select the recorded step that each frame of a video shows.
 
     Parameters

@@ -16,10 +16,10 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
+from robocov.typing import FloatArray
 from robocov_app.speed_benchmarks.measure import Call, Case, Row, measure_interleaved
 
 VERTICES = (20, 200, 1000)
@@ -153,7 +153,7 @@ class MovingRobots:
         self._start = cost.points[self._rng.choice(len(cost.points), robots, replace=False)]
         self._max_step = cost.spacing / 4.0
         self._geodesics = cost.geodesics
-        self.positions: Array = self._start
+        self.positions: FloatArray = self._start
         blocked = np.ones(cost.lattice**2, dtype=bool)
         blocked[cost.cells] = False
         self.blocked = blocked.reshape(cost.lattice, cost.lattice)

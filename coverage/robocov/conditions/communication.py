@@ -28,11 +28,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.conditions.random_streams import LOSS_STREAM, MESSAGE_LOSS_STREAM, create_generator
 from robocov.observation import Message, Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 NEVER = -1
 """Placeholder for the step of a message that has not been sent or has not arrived."""
@@ -59,7 +59,7 @@ class Broadcast(NamedTuple):
 
     sent_step: int
     arrival_step: int
-    positions: Array
+    positions: FloatArray
     is_received: BoolArray
 
 
@@ -96,7 +96,7 @@ class Outbox:
     """
 
     queues: tuple[tuple[Message, ...], ...]
-    credits: Array
+    credits: FloatArray
     sent_position: BoolArray
 
     @classmethod
@@ -162,7 +162,7 @@ class Inbox:
 
     sent_steps: IntArray
     arrival_steps: IntArray
-    positions: Array
+    positions: FloatArray
     in_flight: tuple[Broadcast, ...]
     transmissions: tuple[Transmission, ...]
     outbox: Outbox
@@ -252,7 +252,7 @@ class Radio:
         Control period.
     """
 
-    def __init__(self, conditions: Conditions, ranges: Array, dt: float) -> None:
+    def __init__(self, conditions: Conditions, ranges: FloatArray, dt: float) -> None:
         self._conditions = conditions
         self._ranges = ranges
         self._dt = dt
@@ -263,7 +263,12 @@ class Radio:
             self._period_bytes = conditions.bandwidth * period
 
     def exchange_positions(
-        self, inbox: Inbox, step: int, reported_positions: Array, true_positions: Array, working: BoolArray
+        self,
+        inbox: Inbox,
+        step: int,
+        reported_positions: FloatArray,
+        true_positions: FloatArray,
+        working: BoolArray,
     ) -> Inbox:
         """Send the positions of the robots, and deliver the positions that arrive in this step.
 
@@ -361,7 +366,7 @@ class Radio:
         messages = tuple(map(tuple, received)) if due else ()
         return inbox, replace(observations, messages=messages, send_limits=send_limits)
 
-    def _compute_send_limits(self, inbox: Inbox | None, step: int, robot_count: int) -> Array | None:
+    def _compute_send_limits(self, inbox: Inbox | None, step: int, robot_count: int) -> FloatArray | None:
         """Compute the total size of the messages that each robot can send in a step, (n,) bytes.
 
         None means unlimited.
@@ -379,7 +384,7 @@ class Radio:
         inbox: Inbox | None,
         step: int,
         messages: Sequence[Sequence[Message]],
-        true_positions: Array,
+        true_positions: FloatArray,
         working: BoolArray,
     ) -> tuple[Inbox | None, int]:
         """Send controller messages at the end of a step, within the limits of the conditions.
@@ -491,7 +496,9 @@ class Radio:
             for message, receivers in zip(messages, is_received, strict=True)
         ]
 
-    def read_reports(self, inbox: Inbox, step: int, working: BoolArray) -> tuple[Neighbors, Array, Array]:
+    def read_reports(
+        self, inbox: Inbox, step: int, working: BoolArray
+    ) -> tuple[Neighbors, FloatArray, FloatArray]:
         """Return the newest positions that working robots have received and have not forgotten.
 
         Parameters
@@ -529,7 +536,7 @@ class Radio:
         previous_periods = math.floor((step - 1) * periods_per_step + TIME_TOLERANCE_S)
         return periods > previous_periods
 
-    def _find_receivers(self, step: int, positions: Array, working: BoolArray) -> BoolArray:
+    def _find_receivers(self, step: int, positions: FloatArray, working: BoolArray) -> BoolArray:
         """Find the receivers of each robot's position, as an (n, n) mask of receivers by senders."""
         links = Neighbors.from_ranges(positions, self._ranges).restrict_to_working(working)
         receiver, sender = links.list_pairs()

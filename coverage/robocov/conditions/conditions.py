@@ -10,10 +10,10 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.conditions.events import MAX_TIME_S, Failure, Join, build_events
 from robocov.conditions.random_streams import FAILURE_STREAM, create_generator
 from robocov.errors import ParameterError, is_number, quote, require_number
+from robocov.typing import BoolArray, FloatArray
 
 TIME_TOLERANCE_S = 1e-9
 """Maximum difference between two times that count as equal: sums of steps have rounding errors."""
@@ -228,7 +228,7 @@ class Conditions:
                 "conditions.joins: expected at least one robot from the start, got all robots joining later"
             )
 
-    def compute_working_periods(self, robot_count: int) -> tuple[Array, Array]:
+    def compute_working_periods(self, robot_count: int) -> tuple[FloatArray, FloatArray]:
         """Compute the times at which each robot starts and stops working.
 
         Parameters
@@ -253,7 +253,7 @@ class Conditions:
             stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
         return starts, stops
 
-    def find_working(self, time: float | Array, robot_count: int) -> BoolArray:
+    def find_working(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that are present and have not failed.
 
         Parameters
@@ -270,7 +270,7 @@ class Conditions:
         """
         return self.find_present(time, robot_count) & ~self.find_failed(time, robot_count)
 
-    def find_failed(self, time: float | Array, robot_count: int) -> BoolArray:
+    def find_failed(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that have failed.
 
         Parameters
@@ -289,7 +289,7 @@ class Conditions:
         # The last axis is that of the robots.
         return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
-    def find_present(self, time: float | Array, robot_count: int) -> BoolArray:
+    def find_present(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that have joined the team, including those that have failed since.
 
         Parameters

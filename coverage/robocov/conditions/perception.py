@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.conditions import Conditions
 from robocov.conditions.random_streams import (
@@ -17,6 +17,7 @@ from robocov.conditions.random_streams import (
 )
 from robocov.observation import Decision, DensitySensor, Observations, Scans
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 
 MIN_MEASURED_DISTANCE_M = 1e-3
 """Minimum distance that a noisy range sensor measures."""
@@ -106,7 +107,7 @@ class Perception:
         )
         return observations, inbox
 
-    def _add_position_noise(self, step: int, positions: Array) -> Array:
+    def _add_position_noise(self, step: int, positions: FloatArray) -> FloatArray:
         """Return the robots' own estimates of their positions, (n, 2) m."""
         sigma = self._conditions.position_noise
         if not sigma:
@@ -116,7 +117,7 @@ class Perception:
         noisy.setflags(write=False)
         return np.asarray(noisy)
 
-    def _add_sensing_noise(self, step: int, ideal: Observations, positions: Array) -> Array:
+    def _add_sensing_noise(self, step: int, ideal: Observations, positions: FloatArray) -> FloatArray:
         """Return the measured obstacle points, (n, 2) m.
 
         A robot measures the distance and direction of the point, and adds them to the estimate of its own

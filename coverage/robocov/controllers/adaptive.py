@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, is_plan_due
 from robocov.controllers.density_exchange import (
@@ -22,6 +21,7 @@ from robocov.controllers.gains import choice, gain, response_time_gain
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _SAMPLES_PER_SIDE = 40
@@ -39,13 +39,13 @@ class AdaptiveMemory(MeasurementMemory):
     """Memory of the robots, with the density as each robot estimates it."""
 
     lattice: Lattice
-    estimates: Array
+    estimates: FloatArray
     """(n, k) Estimates of φ at the samples of the lattice."""
-    parameters: Array
+    parameters: FloatArray
     """(n, m) a, weights of the basis functions."""
-    information_matrices: Array
+    information_matrices: FloatArray
     """(n, m, m) s, Λ, integrals of K K^T along the paths of the robots."""
-    information_vectors: Array
+    information_vectors: FloatArray
     """(n, m) s, λ, integrals of K φ along the paths of the robots."""
     has_new_measurements: BoolArray
     """(n,) Whether measurements of others have arrived since the last estimate of each robot."""
@@ -261,7 +261,7 @@ class Adaptive(BaseController):
             measurement_exchange=memory.measurement_exchange.start_period(measurements),
         )
 
-    def _estimate_by_gaussian_process(self, lattice: Lattice, measurements: Array) -> Array:
+    def _estimate_by_gaussian_process(self, lattice: Lattice, measurements: FloatArray) -> FloatArray:
         """Return one robot's estimate at the samples, (k,), given its measurements in the squares, (s,).
 
         It is the mean of the Gaussian process, plus `explore` standard deviations. All variances and
@@ -287,7 +287,7 @@ class Adaptive(BaseController):
 
 
 @kernel
-def _multiply(first: Array, second: Array) -> Array:
+def _multiply(first: FloatArray, second: FloatArray) -> FloatArray:
     """Multiply two matrices. The result has the same bits on all processors, unlike that of BLAS."""
     result = np.zeros((len(first), second.shape[1]))
     for i in range(len(first)):
@@ -298,7 +298,7 @@ def _multiply(first: Array, second: Array) -> Array:
 
 
 @kernel
-def _solve(matrices: Array, right_sides: Array) -> Array:
+def _solve(matrices: FloatArray, right_sides: FloatArray) -> FloatArray:
     """Solve n systems of m linear equations by Gaussian elimination, and return the solutions, (n, m).
 
     The results have the same bits on all processors, unlike those of LAPACK. The matrices, (n, m, m), must be
@@ -324,7 +324,7 @@ def _solve(matrices: Array, right_sides: Array) -> Array:
     return solutions
 
 
-def _measure(seen: Observations) -> Array:
+def _measure(seen: Observations) -> FloatArray:
     """Return φ at the positions of the robots, (n,). A robot may use no other values of φ."""
     return seen.measure_density(np.arange(len(seen.positions)), seen.positions)
 
@@ -333,21 +333,21 @@ def _measure(seen: Observations) -> Array:
 class Lattice:
     """Sample points of a region, basis functions, and squares with one measurement each."""
 
-    samples: Array
+    samples: FloatArray
     """(k, 2) m"""
     sample_area: float
     """Area that each sample represents, m²."""
-    centers: Array
+    centers: FloatArray
     """(m, 2) m, centers of the basis functions."""
     width: float
     """Standard deviation of the basis functions, m."""
-    functions: Array
+    functions: FloatArray
     """(k, m) K at the samples."""
-    squares: Array
+    squares: FloatArray
     """(s, 2) m, centers of the squares with one measurement each."""
-    sample_covariance: Array
+    sample_covariance: FloatArray
     """(k, s) Covariances of φ at the samples and at the centers of the squares."""
-    square_covariance: Array
+    square_covariance: FloatArray
     """(s, s) Covariances of φ at the centers of the squares."""
 
     @classmethod
@@ -382,12 +382,12 @@ class Lattice:
             square_covariance=np.exp(-_compute_exponents(squares, squares, length)),
         )
 
-    def evaluate_basis(self, points: Array) -> Array:
+    def evaluate_basis(self, points: FloatArray) -> FloatArray:
         """Return the basis functions K at (n, 2) points, (n, m)."""
         return _evaluate_basis(points, self.centers, self.width)
 
 
-def _build_grid(region: Region, count: int) -> Array:
+def _build_grid(region: Region, count: int) -> FloatArray:
     """Return the centers of `count` by `count` equal rectangles over the bounding box, (count², 2) m."""
     low_x, low_y, high_x, high_y = region.bounds
     fractions = (np.arange(count) + 0.5) / count
@@ -395,7 +395,7 @@ def _build_grid(region: Region, count: int) -> Array:
     return np.column_stack([x.ravel(), y.ravel()])
 
 
-def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
+def _evaluate_basis(points: FloatArray, centers: FloatArray, width: float) -> FloatArray:
     """Return Gaussians at points, (k, m), divided by their sum at each point."""
     exponents = _compute_exponents(points, centers, width)
     # Scaled so that the nearest Gaussian is 1: far from all centers, the sum would underflow.
@@ -403,7 +403,7 @@ def _evaluate_basis(points: Array, centers: Array, width: float) -> Array:
     return np.asarray(values / values.sum(axis=1, keepdims=True))
 
 
-def _compute_exponents(points: Array, others: Array, length: float) -> Array:
+def _compute_exponents(points: FloatArray, others: FloatArray, length: float) -> FloatArray:
     """Return d² / (2 length²) for the distances d of (k, 2) points from (m, 2) others, (k, m)."""
     squared_distances = ((points[:, None] - others) ** 2).sum(axis=2)
     return np.asarray(squared_distances / (2.0 * length * length))

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     arrange_in_rows,
@@ -20,6 +19,7 @@ from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.observation import Decision, NearNeighbors, Observations, Scanning
 from robocov.potential import compute_separations
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _ROUNDING_M = 1e-3
 """Length over which the square root in h, which is vertical at the safe distance, is rounded."""
@@ -38,16 +38,16 @@ class NeighborReports(NamedTuple):
     """s"""
     pairs: IntArray
     """(m,) One number for each pair of a robot and a neighbor: robot * n + neighbor, ascending."""
-    positions: Array
+    positions: FloatArray
     """(m, 2) m, reported position of the neighbor in each pair."""
 
 
 class HalfPlanes(NamedTuple):
     """Half planes that contain the allowed accelerations a of each robot: normals · a <= limits."""
 
-    normals: Array
+    normals: FloatArray
     """(n, k, 2) Unit normals; nan for no constraint."""
-    limits: Array
+    limits: FloatArray
     """(n, k) m/s²"""
 
 
@@ -123,8 +123,8 @@ class Barrier(BaseController):
         )
 
     def certify(
-        self, seen: Observations, memory: BarrierMemory, desired: Array
-    ) -> tuple[Array, BarrierMemory]:
+        self, seen: Observations, memory: BarrierMemory, desired: FloatArray
+    ) -> tuple[FloatArray, BarrierMemory]:
         """Return the certified accelerations that are nearest to the desired ones.
 
         Parameters
@@ -168,12 +168,12 @@ class Barrier(BaseController):
         # At twice that distance, gamma h³ is so large that the constraint has no effect.
         return seen.find_near_neighbors(min_distance + 2.0 * stopping_distance)
 
-    def _compute_braking_limits(self, team: Team) -> Array:
+    def _compute_braking_limits(self, team: Team) -> FloatArray:
         """Return alpha, the deceleration that each robot is assumed to be capable of, (n,) m/s²."""
         return np.asarray(self.braking * team.max_acceleration)
 
     def _build_robot_planes(
-        self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: Array
+        self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: FloatArray
     ) -> HalfPlanes:
         """Return the half planes that keep robots apart.
 
@@ -205,7 +205,7 @@ class Barrier(BaseController):
             limits=arrange_in_rows(robot, n, limit, np.inf),
         )
 
-    def _build_obstacle_planes(self, seen: Observations, team: Team, points: Array) -> HalfPlanes:
+    def _build_obstacle_planes(self, seen: Observations, team: Team, points: FloatArray) -> HalfPlanes:
         """Return the half planes that keep robots away from obstacle points, (n, k, 2) m; nan for none."""
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
@@ -216,7 +216,9 @@ class Barrier(BaseController):
         limit = self._compute_approach_limit(np.nan_to_num(gap), np.nan_to_num(speed_away), alpha)
         return HalfPlanes(normals=-normal, limits=np.where(np.isnan(speed_away), np.inf, limit))
 
-    def _compute_approach_limit(self, gap: Array, speed_away: Array, alpha: Array) -> Array:
+    def _compute_approach_limit(
+        self, gap: FloatArray, speed_away: FloatArray, alpha: FloatArray
+    ) -> FloatArray:
         """Return the maximum acceleration of two robots, or of a robot and an obstacle, toward each other.
 
         The barrier function is h = sqrt(2 α (d - D_s)) + v, for the distance d, the safe distance D_s and the
@@ -249,7 +251,9 @@ def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports
     return NeighborReports(seen.time, pairs, seen.positions[near.robots] - near.offsets)
 
 
-def _derive_velocities(reports: NeighborReports, previous: NeighborReports | None, max_speed: Array) -> Array:
+def _derive_velocities(
+    reports: NeighborReports, previous: NeighborReports | None, max_speed: FloatArray
+) -> FloatArray:
     """Derive the velocities of neighbors from two reported positions; unknown velocities are zero.
 
     Parameters

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self, TypeAlias, get_args, runtime_checkable
 
-from robocov.arrays import Array
 from robocov.controllers.gains import validate_gains
 from robocov.controllers.user_modules import format_location
 from robocov.environment import Environment
@@ -11,6 +10,7 @@ from robocov.errors import ParameterError, describe_unknown_name, quote
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov.voronoi.delaunay import Mesh
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
@@ -206,7 +206,7 @@ class Memory:
 
     team: Team
     """A robot knows its own body and limits."""
-    returns: Array | None = None
+    returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     triangulation: Mesh | None = None
     """Triangulation from which the next cells are computed."""

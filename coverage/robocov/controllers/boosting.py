@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, freeze
+from robocov.arrays import freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -34,6 +34,7 @@ from robocov.observation.scanned_view import (
     is_behind_wall,
     is_path_clear,
 )
+from robocov.typing import FloatArray
 
 _SAMPLES_PER_RAY = 10
 """Number of samples for integrals along a ray."""
@@ -74,7 +75,7 @@ class BoostLimits(NamedTuple):
 class Ascent:
     """Ascent of one robot along its gradient, from one optimum to the next. Immutable."""
 
-    rest_position: Array
+    rest_position: FloatArray
     """(2,) m, position near which the robot has been since `rest_start`."""
     rest_start: float
     """Time since which it has been near that position, s."""
@@ -83,12 +84,12 @@ class Ascent:
     """Number of boosts so far."""
     best_value: float = -math.inf
     """Contribution of the robot at the optimum before the boost, m²."""
-    trail: tuple[Array, ...] = ()
+    trail: tuple[FloatArray, ...] = ()
     """Points from that optimum to the robot, (2,) m each."""
     boost_start: float = 0.0
     """Time at which the last boost began, s."""
 
-    def update(self, position: Array, time: float, value: float, limits: BoostLimits) -> Ascent:
+    def update(self, position: FloatArray, time: float, value: float, limits: BoostLimits) -> Ascent:
         """Update the state of the ascent, including its mode, after a scan.
 
         In mode `GRADIENT`, a robot that has come to rest is at a local optimum, and leaves it. In mode
@@ -123,14 +124,14 @@ class Ascent:
             return ascent._leave_optimum(position, time, value, limits.max_boosts)
         return ascent
 
-    def _follow_trail(self, position: Array) -> Ascent:
+    def _follow_trail(self, position: FloatArray) -> Ascent:
         """Remove the last point of the trail when it is reached; follow the gradient when none remains."""
         trail = self.trail
         if math.dist(position, trail[-1]) < _TRAIL_SPACING_M:
             trail = trail[:-1]
         return replace(self, trail=trail, mode=Mode.RETURN if trail else Mode.GRADIENT)
 
-    def _leave_optimum(self, position: Array, time: float, value: float, max_boosts: int) -> Ascent:
+    def _leave_optimum(self, position: FloatArray, time: float, value: float, max_boosts: int) -> Ascent:
         """Leave a local optimum with a boost, or return to the previous optimum if that was better.
 
         A robot that has had its maximum number of boosts stays.
@@ -156,9 +157,9 @@ class BoostingMemory(Memory):
     """Memory of the robots: the last view, gradient and ascent of each."""
 
     view: View | None = None
-    gradient: Array | None = None
+    gradient: FloatArray | None = None
     """(n, 2) m, gradient that each robot follows."""
-    speed_fraction: Array | None = None
+    speed_fraction: FloatArray | None = None
     """(n,) Fraction of full speed at which each robot follows the gradient."""
     ascents: tuple[Ascent, ...] = ()
 
@@ -166,26 +167,26 @@ class BoostingMemory(Memory):
 class Contributions(NamedTuple):
     """Contribution of each robot to the objective, and its gradient with respect to the robot's position."""
 
-    value: Array
+    value: FloatArray
     """(n,) m²"""
-    gradient: Array
+    gradient: FloatArray
     """(n, 2) m"""
-    boosted_gradient: Array
+    boosted_gradient: FloatArray
     """(n, 2) m, gradient of the boosted objective, which leads out of local optima."""
 
 
 class _ViewSamples(NamedTuple):
     """Samples of the views, (n, rays, k) each."""
 
-    depths: Array
+    depths: FloatArray
     """Distance from the robot, m."""
-    areas: Array
+    areas: FloatArray
     """Area that each sample represents, m²."""
-    undetected: Array
+    undetected: FloatArray
     """Φ, probability that no other robot detects the sample."""
-    detection: Array
+    detection: FloatArray
     """p, probability that the robot itself detects it."""
-    weight: Array
+    weight: FloatArray
     """w = φ Φ."""
 
 
@@ -305,7 +306,7 @@ class Boosting(BaseController):
         )
 
     def _update_ascents(
-        self, ascents: tuple[Ascent, ...], seen: Observations, values: Array
+        self, ascents: tuple[Ascent, ...], seen: Observations, values: FloatArray
     ) -> tuple[Ascent, ...]:
         """Return the ascents after a scan."""
         if not ascents:
@@ -316,7 +317,9 @@ class Boosting(BaseController):
             for ascent, position, value in zip(ascents, seen.positions, values.tolist(), strict=True)
         )
 
-    def compute_contributions(self, seen: Observations, view: View, max_distances: Array) -> Contributions:
+    def compute_contributions(
+        self, seen: Observations, view: View, max_distances: FloatArray
+    ) -> Contributions:
         """Compute the contribution of each robot to H, with its gradient and its boosted gradient.
 
         Parameters
@@ -348,7 +351,12 @@ class Boosting(BaseController):
         )
 
     def _sample_views(
-        self, seen: Observations, view: View, pairs: NearNeighbors, directions: Array, max_distances: Array
+        self,
+        seen: Observations,
+        view: View,
+        pairs: NearNeighbors,
+        directions: FloatArray,
+        max_distances: FloatArray,
     ) -> _ViewSamples:
         """Sample the views of all robots for numerical integration.
 
@@ -374,7 +382,7 @@ class Boosting(BaseController):
             weight=evaluate_density(seen.density, points) * undetected,
         )
 
-    def _compute_boosted_weight(self, samples: _ViewSamples) -> Array:
+    def _compute_boosted_weight(self, samples: _ViewSamples) -> FloatArray:
         """Return the boosted weight of the samples, (n, rays, k)."""
         if self.boost == "phi":
             return np.asarray(self.kappa * samples.undetected**self.gamma * samples.weight)
@@ -385,8 +393,13 @@ class Boosting(BaseController):
         return samples.weight
 
     def _compute_gradient(
-        self, weight: Array, samples: _ViewSamples, view: View, windows: Windows, max_distances: Array
-    ) -> Array:
+        self,
+        weight: FloatArray,
+        samples: _ViewSamples,
+        view: View,
+        windows: Windows,
+        max_distances: FloatArray,
+    ) -> FloatArray:
         """Return the gradient of the integral of a weight times p over the views, (n, 2) m.
 
         Its three terms are those in the notes of `Boosting`.
@@ -405,13 +418,13 @@ class Boosting(BaseController):
 
 @kernel
 def compute_undetected(
-    depths: Array,
-    wall_distances: Array,
-    directions: Array,
+    depths: FloatArray,
+    wall_distances: FloatArray,
+    directions: FloatArray,
     pairs: NearNeighbors,
-    max_distances: Array,
+    max_distances: FloatArray,
     decay: float,
-) -> Array:
+) -> FloatArray:
     """Compute the probability that no neighbor detects a point, for sampled points in each robot's view.
 
     Parameters

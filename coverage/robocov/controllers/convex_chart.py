@@ -9,11 +9,11 @@ import shapely
 from scipy.sparse import csr_array, diags_array
 from scipy.spatial import Delaunay
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.known_map import build_configuration_space
 from robocov.environment import Environment, find_nearest_inside
 from robocov.observation.region import Region
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _MAX_REFINEMENTS = 12
 """Maximum number of times that wall segments are halved until they are edges of the mesh."""
@@ -86,7 +86,7 @@ class ConvexChart:
         if environment.density is not None:
             self.mass *= environment.density.evaluate(centers[has_mass])
 
-    def map_to_chart(self, positions: Array) -> tuple[Array, Array]:
+    def map_to_chart(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute F at the nearest points of the configuration space.
 
         Parameters
@@ -100,7 +100,7 @@ class ConvexChart:
         """
         return self._to_chart.evaluate(find_nearest_inside(self.configuration_space, positions))
 
-    def map_to_region(self, images: Array) -> Array:
+    def map_to_region(self, images: FloatArray) -> FloatArray:
         """Compute the points of the region that F maps to the given images.
 
         Parameters
@@ -115,7 +115,7 @@ class ConvexChart:
         return points
 
 
-def _compute_areas(triangles: Array) -> Array:
+def _compute_areas(triangles: FloatArray) -> FloatArray:
     """Return the areas of counter-clockwise triangles, (t, 3, 2)."""
     x, y = (triangles[:, 1] - triangles[:, 0]).T
     u, v = (triangles[:, 2] - triangles[:, 0]).T
@@ -125,17 +125,17 @@ def _compute_areas(triangles: Array) -> Array:
 class _PiecewiseAffineMap(NamedTuple):
     """Map that is affine on each of t triangles."""
 
-    origins: Array
+    origins: FloatArray
     """(t, 2) Third corners of the triangles."""
-    inverses: Array
+    inverses: FloatArray
     """(t, 2, 2) Matrices from the offset from the origin to the first two barycentric coordinates."""
-    images: Array
+    images: FloatArray
     """(t, 3, 2) Images of the corners."""
-    jacobians: Array
+    jacobians: FloatArray
     """(t, 2, 2)"""
 
     @classmethod
-    def build(cls, corners: Array, images: Array) -> _PiecewiseAffineMap:
+    def build(cls, corners: FloatArray, images: FloatArray) -> _PiecewiseAffineMap:
         """Build the map from triangles, (t, 3, 2), to their images, (t, 3, 2)."""
         first = corners[:, 0] - corners[:, 2]
         second = corners[:, 1] - corners[:, 2]
@@ -148,7 +148,7 @@ class _PiecewiseAffineMap(NamedTuple):
         jacobians = (image_sides[..., None] * inverses[:, :, None]).sum(axis=1)
         return cls(origins=corners[:, 2], inverses=inverses, images=images, jacobians=jacobians)
 
-    def evaluate(self, points: Array) -> tuple[Array, Array]:
+    def evaluate(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the images of (n, 2) points, (n, 2), and the Jacobians there, (n, 2, 2)."""
         triangle = _find_triangles(points, self.inverses, self.origins)
         offsets = points - self.origins[triangle]
@@ -159,7 +159,7 @@ class _PiecewiseAffineMap(NamedTuple):
 
 
 @kernel
-def _find_triangles(points: Array, inverses: Array, origins: Array) -> IntArray:
+def _find_triangles(points: FloatArray, inverses: FloatArray, origins: FloatArray) -> IntArray:
     """Return the index of the triangle that contains each of (n, 2) points, (n,).
 
     A point inside a triangle has no negative barycentric coordinate. For a point outside all triangles, it is
@@ -185,7 +185,7 @@ def _find_triangles(points: Array, inverses: Array, origins: Array) -> IntArray:
 class _Mesh(NamedTuple):
     """Triangulation of a region with the walls as edges."""
 
-    points: Array
+    points: FloatArray
     """(v, 2) m, sorted vertices."""
     triangles: IntArray
     """(t, 3) Counter-clockwise."""
@@ -224,7 +224,7 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
     return _Mesh(points=points, triangles=triangles[~is_flat], is_fixed=is_fixed)
 
 
-def _build_inner_points(region: Region, walls: shapely.Geometry, spacing: float) -> Array:
+def _build_inner_points(region: Region, walls: shapely.Geometry, spacing: float) -> FloatArray:
     """Return the points of a lattice, (k, 2) m, in the region and not close to walls."""
     low_x, low_y, high_x, high_y = region.bounds
     x, y = np.meshgrid(np.arange(low_x, high_x, spacing), np.arange(low_y, high_y, spacing))
@@ -233,7 +233,7 @@ def _build_inner_points(region: Region, walls: shapely.Geometry, spacing: float)
     return np.asarray(points[shapely.distance(walls, shapely.points(points)) > 0.5 * spacing])
 
 
-def _find_edges(points: Array, triangles: IntArray, starts: Array, ends: Array) -> BoolArray:
+def _find_edges(points: FloatArray, triangles: IntArray, starts: FloatArray, ends: FloatArray) -> BoolArray:
     """Return whether segments, from (k, 2) to (k, 2) m, are edges of triangles, (k,)."""
     first = _find_indices(points, starts)
     second = _find_indices(points, ends)
@@ -243,7 +243,7 @@ def _find_edges(points: Array, triangles: IntArray, starts: Array, ends: Array) 
     return np.isin(np.minimum(first, second) * len(points) + np.maximum(first, second), numbers)
 
 
-def _find_indices(points: Array, selected: Array) -> IntArray:
+def _find_indices(points: FloatArray, selected: FloatArray) -> IntArray:
     """Return the indices of selected points, (m, 2) m, among (k, 2) m sorted ones."""
     # After rounding, each selected point equals one of `points`. The unique rows of both together are
     # therefore `points` again, and the inverse indices of the selected points are their indices in `points`.
@@ -252,7 +252,7 @@ def _find_indices(points: Array, selected: Array) -> IntArray:
     return np.asarray(indices.ravel()[len(points) :])
 
 
-def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
+def _compute_harmonic_images(mesh: _Mesh, stiffness: FloatArray) -> FloatArray:
     """Return the images of the vertices, (v, 2) m, given the stiffness of each triangle, (t,).
 
     Each vertex that is not fixed is the weighted mean of its neighbors. The weight of an edge is, by
@@ -277,7 +277,7 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: Array) -> Array:
     return images
 
 
-def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
+def _build_weights(mesh: _Mesh, stiffness: FloatArray) -> csr_array:
     """Build the (v, v) matrix of mean value weights; entry (i, j) is the weight of vertex j in the mean at i.
 
     At each of its corners, a triangle with the angle α there adds its stiffness times tan(α/2) / length to
@@ -311,7 +311,7 @@ def _build_weights(mesh: _Mesh, stiffness: Array) -> csr_array:
 
 
 @kernel
-def _solve_banded_system(band: Array, right_side: Array) -> Array:
+def _solve_banded_system(band: FloatArray, right_side: FloatArray) -> FloatArray:
     """Solve a banded linear system in place by Gaussian elimination, and return the solution.
 
     The matrix is diagonally dominant, so that no pivoting is needed.

@@ -19,10 +19,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation import Message, Observations
 from robocov.observation.neighbors import Neighbors
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 HEADER_BYTES = 4
 """Size of the index of the sender, at the start of a message."""
@@ -49,7 +49,7 @@ class ParameterExchange:
         Whether each robot still has to send its own parameters in this learning period.
     """
 
-    received: tuple[Mapping[int, Array], ...]
+    received: tuple[Mapping[int, FloatArray], ...]
     is_unsent: BoolArray
 
     @classmethod
@@ -79,7 +79,7 @@ class ParameterExchange:
             received.append(known if senders.issuperset(known) else _select_senders(known, senders))
         return replace(self, received=tuple(received))
 
-    def compute_means(self, parameters: Array) -> Array:
+    def compute_means(self, parameters: FloatArray) -> FloatArray:
         """Compute the mean of the parameters that each robot has received.
 
         Parameters
@@ -98,7 +98,7 @@ class ParameterExchange:
                 means[robot] = np.mean([known[sender] for sender in sorted(known)], axis=0)
         return means
 
-    def send(self, seen: Observations, parameters: Array) -> tuple[ParameterExchange, MessageLists]:
+    def send(self, seen: Observations, parameters: FloatArray) -> tuple[ParameterExchange, MessageLists]:
         """Send the parameters of all robots that have not sent theirs yet, and can send messages now.
 
         Parameters
@@ -128,7 +128,7 @@ class Measurements(NamedTuple):
 
     squares: IntArray
     """(k,) Indices of the squares."""
-    values: Array
+    values: FloatArray
     """(k,) φ in these squares."""
 
 
@@ -144,7 +144,7 @@ class MeasurementExchange:
         Number of measurements that each robot may still send in this learning period.
     """
 
-    sent_times: Array
+    sent_times: FloatArray
     allowances: IntArray
 
     @classmethod
@@ -155,7 +155,7 @@ class MeasurementExchange:
             allowances=np.zeros(robot_count, dtype=np.intp),
         )
 
-    def start_period(self, measurements: Array) -> MeasurementExchange:
+    def start_period(self, measurements: FloatArray) -> MeasurementExchange:
         """Return the exchange at the start of a learning period.
 
         Parameters
@@ -166,7 +166,7 @@ class MeasurementExchange:
         known_counts = (~np.isnan(measurements)).sum(axis=1)
         return replace(self, allowances=np.minimum(known_counts, MAX_SENT_MEASUREMENTS))
 
-    def send(self, seen: Observations, measurements: Array) -> tuple[MeasurementExchange, MessageLists]:
+    def send(self, seen: Observations, measurements: FloatArray) -> tuple[MeasurementExchange, MessageLists]:
         """Send measurements, as many as the allowances and the communication permit.
 
         Parameters
@@ -212,16 +212,16 @@ class MeasurementMemory:
     """Memory of robots that exchange measurements, and move to goals that depend on them."""
 
     team: Team
-    measurements: Array
+    measurements: FloatArray
     """(n, s) Measurements of φ in the squares that each robot knows, also those of others; nan if unknown."""
     measurement_exchange: MeasurementExchange
-    goals: Array | None = None
+    goals: FloatArray | None = None
     """(n, 2) m, goals in the last plan; None before the first one."""
     plan_time: float = -np.inf
     """Time of the last plan, s."""
 
 
-def add_received_measurements(seen: Observations, measurements: Array) -> Array:
+def add_received_measurements(seen: Observations, measurements: FloatArray) -> FloatArray:
     """Add the measurements that arrive in a step to those that the robots know.
 
     In a square in which a robot already knows a measurement, it keeps this one. Messages with other contents
@@ -257,6 +257,6 @@ def find_possible_senders(seen: Observations) -> BoolArray:
     return np.asarray(seen.send_limits > 0)
 
 
-def _select_senders(received: Mapping[int, Array], senders: set[int]) -> dict[int, Array]:
+def _select_senders(received: Mapping[int, FloatArray], senders: set[int]) -> dict[int, FloatArray]:
     """Return the parameters that a robot has received from the given senders."""
     return {sender: parameters for sender, parameters in received.items() if sender in senders}

@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers.base import is_plan_due
 from robocov.controllers.convex_chart import ConvexChart
 from robocov.controllers.driving import (
@@ -21,6 +20,7 @@ from robocov.controllers.known_map import WholeMapController
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _MIN_DETERMINANT = 1e-300
@@ -35,9 +35,9 @@ class DiffeomorphismMemory:
     """Memory of the last plan."""
 
     team: Team
-    chart_centroids: Array | None = None
+    chart_centroids: FloatArray | None = None
     """(n, 2) m, centroids of the cells in the chart; None before the first plan."""
-    goals: Array | None = None
+    goals: FloatArray | None = None
     """(n, 2) m, the same points in the map; None before the first plan."""
     plan_time: float = -np.inf
     """Time of the last plan, s."""
@@ -122,7 +122,9 @@ class Diffeomorphism(WholeMapController):
         return _build_cached_chart(self.get_environment(), clearance, int(self.lattice), self.shrink)
 
 
-def _compute_chart_centroids(seen: Observations, chart: ConvexChart, chart_positions: Array) -> Array:
+def _compute_chart_centroids(
+    seen: Observations, chart: ConvexChart, chart_positions: FloatArray
+) -> FloatArray:
     """Return the centroids of the robots' cells in the chart, (n, 2) m.
 
     `chart_positions`, (n, 2) m, are the positions F(p_i) of the robots in the chart.
@@ -139,7 +141,7 @@ def _compute_chart_centroids(seen: Observations, chart: ConvexChart, chart_posit
     return compute_sample_centroids(is_own, chart.samples, chart.mass, chart_positions)
 
 
-def _apply_inverses(jacobians: Array, vectors: Array) -> Array:
+def _apply_inverses(jacobians: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return the products of the inverses of Jacobians, (n, 2, 2), with (n, 2) vectors."""
     a, b, c, d = jacobians.reshape(-1, 4).T
     x, y = vectors.T

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation import Observations
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _DEFAULT_APPROACH_RATE = 4.0
 """Rate in 1/s at which the remaining distance may decrease."""
@@ -33,9 +33,9 @@ _MIN_SLOPE = 1e-12
 class Margins(NamedTuple):
     """Minimum distances that `avoid_collisions` keeps, and the limits of the speed of approach."""
 
-    clearance: Array
+    clearance: FloatArray
     """(n,) m, minimum distance from the center of each robot to obstacle points."""
-    separation: Array
+    separation: FloatArray
     """(n,) m, minimum distance from the center of each robot to those of others."""
     rate: float
     """1/s, maximum rate of the exponential decrease of the remaining distance."""
@@ -57,7 +57,7 @@ class Margins(NamedTuple):
         )
 
 
-def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -> Array:
+def compute_approach_velocities(offsets: FloatArray, gain: float, max_speed: FloatArray) -> FloatArray:
     """Compute velocities toward goals.
 
     Parameters
@@ -83,7 +83,7 @@ def compute_approach_velocities(offsets: Array, gain: float, max_speed: Array) -
     return np.asarray(offsets * factor[:, None])
 
 
-def clip_lengths(vectors: Array, max_length: Array) -> Array:
+def clip_lengths(vectors: FloatArray, max_length: FloatArray) -> FloatArray:
     """Shorten vectors that are too long.
 
     Parameters
@@ -104,7 +104,9 @@ def clip_lengths(vectors: Array, max_length: Array) -> Array:
     return compute_approach_velocities(vectors, 1.0, max_length)
 
 
-def compute_drive_forces(velocities: Array, seen: Observations, team: Team, response_time: float) -> Array:
+def compute_drive_forces(
+    velocities: FloatArray, seen: Observations, team: Team, response_time: float
+) -> FloatArray:
     """Compute the forces that track desired velocities.
 
     Parameters
@@ -123,7 +125,7 @@ def compute_drive_forces(velocities: Array, seen: Observations, team: Team, resp
     return np.asarray(change + seen.velocities * team.viscosity[:, None])
 
 
-def update_returns(seen: Observations, previous: Array | None) -> Array | None:
+def update_returns(seen: Observations, previous: FloatArray | None) -> FloatArray | None:
     """Return the obstacle points in the last scan of each robot.
 
     Parameters
@@ -144,7 +146,7 @@ def update_returns(seen: Observations, previous: Array | None) -> Array | None:
     return np.asarray(seen.positions[:, None] + distances[:, :, None] * scans.directions)
 
 
-def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
+def collect_obstacle_points(seen: Observations, returns: FloatArray | None) -> FloatArray:
     """Collect the closest obstacle point of each robot, and the obstacle points in its last scan.
 
     Parameters
@@ -165,8 +167,8 @@ def collect_obstacle_points(seen: Observations, returns: Array | None) -> Array:
 
 
 def avoid_collisions(
-    velocities: Array, seen: Observations, team: Team, obstacle_points: Array, margins: Margins
-) -> Array:
+    velocities: FloatArray, seen: Observations, team: Team, obstacle_points: FloatArray, margins: Margins
+) -> FloatArray:
     """Compute the velocities nearest to the desired ones that avoid obstacles and other robots.
 
     Parameters
@@ -206,8 +208,13 @@ def avoid_collisions(
 
 
 def limit_approach_speed(
-    velocities: Array, offsets: Array, clearance: Array, rate: float, braking: Array, max_speed: Array
-) -> Array:
+    velocities: FloatArray,
+    offsets: FloatArray,
+    clearance: FloatArray,
+    rate: float,
+    braking: FloatArray,
+    max_speed: FloatArray,
+) -> FloatArray:
     """Change velocities as little as possible so that robots can stop before they reach objects.
 
     Parameters
@@ -253,8 +260,8 @@ def limit_approach_speed(
 
 @kernel
 def find_nearest_allowed(
-    points: Array, normals: Array, offsets: Array, radius: Array
-) -> tuple[Array, BoolArray]:
+    points: FloatArray, normals: FloatArray, offsets: FloatArray, radius: FloatArray
+) -> tuple[FloatArray, BoolArray]:
     """Find the points nearest to desired ones in the intersections of discs and half planes.
 
     Parameters
@@ -315,7 +322,7 @@ def find_nearest_allowed(
 
 @kernel
 def _find_allowed_interval(
-    normals: Array, offsets: Array, k: int, radius: float, slack: float
+    normals: FloatArray, offsets: FloatArray, k: int, radius: float, slack: float
 ) -> tuple[float, float]:
     """Return the interval of t in which the edge of half plane k lies in the disc and half planes 0 to k - 1.
 
@@ -344,7 +351,7 @@ def _find_allowed_interval(
     return low, high
 
 
-def list_neighbor_offsets(seen: Observations, max_distance: float) -> Array:
+def list_neighbor_offsets(seen: Observations, max_distance: float) -> FloatArray:
     """List the offsets from the near neighbors of each robot to the robot itself.
 
     Parameters
@@ -362,7 +369,7 @@ def list_neighbor_offsets(seen: Observations, max_distance: float) -> Array:
     return arrange_in_rows(pairs.robots, len(seen.positions), pairs.offsets, np.nan)
 
 
-def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Array:
+def arrange_in_rows(robot: IntArray, n: int, values: FloatArray, fill: float) -> FloatArray:
     """Arrange values of pairs in one row for each robot.
 
     Parameters
@@ -395,7 +402,7 @@ def arrange_in_rows(robot: IntArray, n: int, values: Array, fill: float) -> Arra
     return rows
 
 
-def sum_by_robot(robot: IntArray, vectors: Array, n: int) -> Array:
+def sum_by_robot(robot: IntArray, vectors: FloatArray, n: int) -> FloatArray:
     """Sum the vectors that belong to each robot.
 
     Parameters

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.square_grid import SquareGrid
 from robocov.observation.region import Region
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 NOISE_VARIANCE = 1e-2
 """Variance of a measurement, relative to that of the prior. It includes changes of φ within a square."""
@@ -21,15 +21,15 @@ SAMPLES_PER_SQUARE = 2
 class ProcessGrid:
     """Squares in which robots measure a density, and finer samples of the Voronoi cells."""
 
-    squares: Array
+    squares: FloatArray
     """(s, 2) m, centers of the squares, row by row from the lowest."""
-    prior_correlations: Array
+    prior_correlations: FloatArray
     """(s, s) Correlations of φ at the centers of the squares, before any measurement."""
-    samples: Array
+    samples: FloatArray
     """(k, 2) m, samples of the region."""
     corners: IntArray
     """(k, 4) Indices of the four squares around each sample."""
-    corner_weights: Array
+    corner_weights: FloatArray
     """(k, 4) Weights of these squares in the bilinear interpolation."""
 
     @classmethod
@@ -63,11 +63,11 @@ class ProcessGrid:
             corner_weights=corner_weights,
         )
 
-    def find_square(self, position: Array) -> int:
+    def find_square(self, position: FloatArray) -> int:
         """Return the index of the square whose center is nearest to a position, (2,) m."""
         return int(((self.squares - position) ** 2).sum(axis=1).argmin())
 
-    def interpolate(self, values: Array) -> Array:
+    def interpolate(self, values: FloatArray) -> FloatArray:
         """Interpolate values of the squares, (s,), to the samples, (k,)."""
         return np.asarray((values[self.corners] * self.corner_weights).sum(axis=1))
 
@@ -98,7 +98,7 @@ class Posterior:
     (array([2.98, 1.  ]), array([0.1, 1. ]))
     """
 
-    correlations: Array
+    correlations: FloatArray
     is_measured: BoolArray
 
     @classmethod
@@ -125,7 +125,7 @@ class Posterior:
         correlations = _add_squares(self.correlations, new_squares, NOISE_VARIANCE)
         return Posterior(correlations, is_measured.copy())
 
-    def compute_mean(self, measurements: Array, prior_mean: float) -> Array:
+    def compute_mean(self, measurements: FloatArray, prior_mean: float) -> FloatArray:
         """Compute the posterior mean of φ in each square.
 
         Parameters
@@ -143,18 +143,18 @@ class Posterior:
         residuals = (measurements[known] - prior_mean) / NOISE_VARIANCE
         return prior_mean + _multiply_columns(self.correlations, known, residuals)
 
-    def compute_deviations(self) -> Array:
+    def compute_deviations(self) -> FloatArray:
         """Compute the standard deviation of φ in each square, (s,), relative to that of the prior."""
         return np.sqrt(np.maximum(np.diagonal(self.correlations), 0.0))
 
 
-def _list_cells(rows: int, columns: int) -> Array:
+def _list_cells(rows: int, columns: int) -> FloatArray:
     """Return the column and the row of each cell of a grid, (rows * columns, 2)."""
     row_numbers, column_numbers = np.indices((rows, columns))
     return np.column_stack([column_numbers.ravel(), row_numbers.ravel()])
 
 
-def _find_corners(coordinates: Array, rows: int, columns: int) -> tuple[IntArray, Array]:
+def _find_corners(coordinates: FloatArray, rows: int, columns: int) -> tuple[IntArray, FloatArray]:
     """Return the four squares around each point, and their weights in the bilinear interpolation.
 
     The coordinates, (k, 2), are in squares, from the lower left corner of the grid. Points that are not
@@ -185,7 +185,7 @@ def _find_corners(coordinates: Array, rows: int, columns: int) -> tuple[IntArray
 
 
 @kernel
-def _add_squares(correlations: Array, new_squares: IntArray, noise_variance: float) -> Array:
+def _add_squares(correlations: FloatArray, new_squares: IntArray, noise_variance: float) -> FloatArray:
     """Return the correlations after the new squares have been measured, one after another.
 
     The results have the same bits on all processors, unlike those of a factorization by LAPACK.
@@ -205,7 +205,7 @@ def _add_squares(correlations: Array, new_squares: IntArray, noise_variance: flo
 
 
 @kernel
-def _multiply_columns(matrix: Array, columns: IntArray, factors: Array) -> Array:
+def _multiply_columns(matrix: FloatArray, columns: IntArray, factors: FloatArray) -> FloatArray:
     """Return the sum of some columns of a symmetric matrix, each multiplied by a factor."""
     result = np.zeros(len(matrix))
     for k in range(len(columns)):

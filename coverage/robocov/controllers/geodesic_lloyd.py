@@ -14,7 +14,6 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array
 from robocov.controllers.base import is_plan_due
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
@@ -25,6 +24,7 @@ from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 _MIN_FIRST_LENGTH_FRACTION = 0.25
 """Minimum distance to a first waypoint, as a fraction of the spacing of sites: a site at the position of a
@@ -34,11 +34,11 @@ robot would have an infinite weight."""
 class GeodesicPlan(NamedTuple):
     """Goals of n robots, and the shortest paths to them."""
 
-    goals: Array
+    goals: FloatArray
     """(n, 2) m"""
-    waypoints: Array
+    waypoints: FloatArray
     """(n, 2) m, the first waypoint of each path."""
-    remaining_lengths: Array
+    remaining_lengths: FloatArray
     """(n,) m, length of each path from its first waypoint to the goal."""
 
 
@@ -190,7 +190,7 @@ class GeodesicPlanner:
             remaining_lengths[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
         return GeodesicPlan(goals=goals, waypoints=waypoints, remaining_lengths=remaining_lengths)
 
-    def _compute_goals(self, positions: Array, exponent: float) -> Array:
+    def _compute_goals(self, positions: FloatArray, exponent: float) -> FloatArray:
         """Return the goals, (k, 2) m, of robots at (k, 2) positions, from their geodesic cells.
 
         They are weighted means of first waypoints; see the notes of `GeodesicLloyd`.

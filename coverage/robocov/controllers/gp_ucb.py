@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers.base import BaseController, Information, is_plan_due
 from robocov.controllers.density_exchange import (
     MeasurementExchange,
@@ -20,6 +19,7 @@ from robocov.controllers.gaussian_process import Posterior, ProcessGrid
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _MIN_RELATIVE_DENSITY = 1e-3
@@ -187,7 +187,7 @@ class GpUcb(BaseController):
         return replace(memory, goals=goals, plan_time=seen.time)
 
 
-def compute_bound(posterior: Posterior, measurements: Array, beta: float) -> Array:
+def compute_bound(posterior: Posterior, measurements: FloatArray, beta: float) -> FloatArray:
     """Compute the upper confidence bound of the density in each square.
 
     Parameters

@@ -9,13 +9,13 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers.base import Controller, Information
 from robocov.controllers.user_modules import format_location
 from robocov.errors import ParameterError, quote
 from robocov.observation import Decision, Message, Observations, ReceivedMessage, to_numbers
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh
 
@@ -65,10 +65,10 @@ class OwnView:
     """
 
     number: int
-    position: Array
-    velocity: Array
-    neighbors: Array
-    obstacle_point: Array | None
+    position: FloatArray
+    velocity: FloatArray
+    neighbors: FloatArray
+    obstacle_point: FloatArray | None
     region: Region
     time: float
     _cells: VoronoiPartition
@@ -90,12 +90,12 @@ class OwnView:
         self.sent_messages.append(Message(payload, size))
 
     @property
-    def centroid(self) -> Array:
+    def centroid(self) -> FloatArray:
         """Centroid of the robot's Voronoi cell, (2,) m."""
         return np.asarray(self._cells.centroids[self.number])
 
     @property
-    def cell(self) -> Array:
+    def cell(self) -> FloatArray:
         """The robot's Voronoi cell, (k, 2) m, counter-clockwise."""
         return self._cells.polygons[self.number]
 
@@ -131,7 +131,7 @@ class IndividualController(Protocol):
     <Record Slowing on Square, 2 robots, 0.5 s>
     """
 
-    def force(self, own: OwnView) -> Sequence[float] | Array:
+    def force(self, own: OwnView) -> Sequence[float] | FloatArray:
         """Return the force on the robot, two numbers in newtons.
 
         Parameters
@@ -270,7 +270,7 @@ class IndividualControllerAdapter:
             messages=messages if any(messages) else (),
         )
 
-    def _call_controller(self, own: OwnView) -> Array:
+    def _call_controller(self, own: OwnView) -> FloatArray:
         """Return the force on one robot."""
         try:
             result = self.controller.force(own)

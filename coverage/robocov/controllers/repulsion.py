@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
     Margins,
@@ -34,6 +33,7 @@ from robocov.potential import (
     compute_separations,
 )
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov.voronoi.delaunay import Mesh
 
 _MIN_DISTANCE_M = 1e-9
@@ -57,7 +57,7 @@ _BRAKING_FRACTION = 0.5
 
 
 def _compute_potential_forces(
-    seen: Observations, goals: Array, gains: PotentialGains, *, includes_robots: bool = True
+    seen: Observations, goals: FloatArray, gains: PotentialGains, *, includes_robots: bool = True
 ) -> PotentialForces:
     """Return the forces of the potentials on all robots, if desired without those of other robots."""
     if includes_robots:
@@ -312,7 +312,7 @@ class Howard(BaseController):
         )
 
 
-def _compute_inverse_squares(offsets: Array) -> Array:
+def _compute_inverse_squares(offsets: FloatArray) -> FloatArray:
     """Return vectors of length 1 / r² along offsets of length r, (..., 2); zero for an offset of zero."""
     distance = np.sqrt(offsets[..., 0] ** 2 + offsets[..., 1] ** 2)
     cube = np.maximum(distance, _MIN_CHARGE_DISTANCE_M) ** 2 * np.maximum(distance, _MIN_LENGTH)
@@ -388,7 +388,7 @@ class Poduri(BaseController):
         }
         return Decision(forces=repulsion + attraction + potential.obstacle, terms=terms, memory=memory)
 
-    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbors, Array]:
+    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbors, FloatArray]:
         """Return the links of all robots, and the range R_c of each, (m,) m."""
         max_ranges = np.minimum(team.communication_range, self.link_range)
         pairs = _find_separated_neighbors(seen, float(max_ranges.max()))
@@ -402,7 +402,9 @@ class Poduri(BaseController):
         )
         return links, link_ranges[is_linked]
 
-    def _find_critical_links(self, seen: Observations, links: NearNeighbors, link_ranges: Array) -> BoolArray:
+    def _find_critical_links(
+        self, seen: Observations, links: NearNeighbors, link_ranges: FloatArray
+    ) -> BoolArray:
         """Return a mask of the links that are critical for the robot or, as far as it knows, the neighbor."""
         n = len(seen.positions)
         is_near = np.zeros((n, n), dtype=bool)
@@ -445,7 +447,7 @@ class Poduri(BaseController):
         return is_critical
 
     def _is_critical_by_reports(
-        self, seen: Observations, links: NearNeighbors, link_ranges: Array, selected: IntArray
+        self, seen: Observations, links: NearNeighbors, link_ranges: FloatArray, selected: IntArray
     ) -> BoolArray:
         """Return whether links are critical for the neighbor, according to the received positions.
 
@@ -476,7 +478,7 @@ def _find_known_robots(seen: Observations) -> BoolArray:
     return knows
 
 
-def _rank_by_distance(robot: IntArray, distance: Array) -> IntArray:
+def _rank_by_distance(robot: IntArray, distance: FloatArray) -> IntArray:
     """Return the rank of each link, (m,), among those of its robot: 0 is the shortest.
 
     Links are sorted by robot; of links of equal length the first one has the lower rank.
@@ -541,7 +543,7 @@ class Dispersion(BaseController):
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
         return Decision(forces=forces, terms={"attraction": forces}, memory=replace(memory, returns=returns))
 
-    def _compute_velocities(self, seen: Observations, team: Team) -> Array:
+    def _compute_velocities(self, seen: Observations, team: Team) -> FloatArray:
         """Return the velocities of the behaviors disperse and explore, (n, 2) m/s."""
         n = len(seen.positions)
         pairs = _find_separated_neighbors(seen, self.reach)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from robocov.arrays import Array, BoolArray
 from robocov.observation.region import Region
+from robocov.typing import BoolArray, FloatArray
 
 _ROUNDING_TOLERANCE = 1e-9
 """Fraction of a square by which the region may exceed the grid because of rounding."""
@@ -18,7 +18,7 @@ _ROUNDING_TOLERANCE = 1e-9
 class SquareGrid:
     """Squares that cover a region, in which robots measure the density."""
 
-    centers: Array
+    centers: FloatArray
     """(s, 2) m, row by row from the lowest."""
     is_inside: BoolArray
     """(s,) Whether the center of each square lies in the region."""
@@ -41,7 +41,7 @@ class SquareGrid:
         centers = np.column_stack([x.ravel(), y.ravel()])
         return cls(centers=centers, is_inside=region.contains(centers), shape=(rows, columns), side=side)
 
-    def count_nearby(self, is_counted: BoolArray, half_width: float) -> Array:
+    def count_nearby(self, is_counted: BoolArray, half_width: float) -> FloatArray:
         """Count the marked squares in a box around each square.
 
         Parameters

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, freeze
+from robocov.arrays import freeze
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -24,6 +24,7 @@ from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 _SQUARE_SIDE_M = 0.1
 """Side of the squares that store the obstacle points a robot has detected."""
@@ -68,11 +69,11 @@ class Mode(Enum):
 class FixedGoal:
     """The goal of a robot that passes an obstacle: it stays where the centroid was. Immutable."""
 
-    position: Array
+    position: FloatArray
     """(2,) m"""
-    best_point: Array | None = None
+    best_point: FloatArray | None = None
     """(2,) m, the point nearest to the goal of all boundaries that the robot followed or left."""
-    resting_centroid: Array | None = None
+    resting_centroid: FloatArray | None = None
     """(2,) m, the robot's centroid when it came to rest at `best_point`."""
 
 
@@ -80,16 +81,16 @@ class FixedGoal:
 class FollowedBoundary:
     """The path of a robot along the boundary that it follows. Immutable."""
 
-    entry_point: Array
+    entry_point: FloatArray
     """(2,) m, point at which it started."""
-    last_position: Array
+    last_position: FloatArray
     """(2,) m, position of the robot at the last scan."""
     length: float
     """Length of the path, m."""
     max_length: float
     """Length, m, after which the robot gives up."""
 
-    def extend(self, position: Array) -> FollowedBoundary:
+    def extend(self, position: FloatArray) -> FollowedBoundary:
         """Return the path after the robot has moved straight to a position, (2,) m."""
         length = self.length + math.dist(position, self.last_position)
         return replace(self, length=length, last_position=position)
@@ -108,7 +109,7 @@ class NavigationState:
     mode: Mode
     turn: int
     """`COUNTERCLOCKWISE` or `CLOCKWISE`: it passes obstacles on its right, or on its left."""
-    waypoint: Array
+    waypoint: FloatArray
     """(2,) m, point that it heads for."""
     passes_waypoint: bool = False
     """Whether it moves on past the waypoint, and does not slow down there."""
@@ -119,11 +120,11 @@ class NavigationState:
     boundary: FollowedBoundary | None = None
     """None unless it follows a boundary, or returns along it."""
 
-    def get_goal(self, centroid: Array) -> Array:
+    def get_goal(self, centroid: FloatArray) -> FloatArray:
         """Return the fixed goal, or else the centroid, (2,) m."""
         return centroid if self.fixed_goal is None else self.fixed_goal.position
 
-    def release_goal(self, position: Array, centroid: Array, min_move: float) -> NavigationState:
+    def release_goal(self, position: FloatArray, centroid: FloatArray, min_move: float) -> NavigationState:
         """Return the state without its fixed goal if the robot has reached it, or should try a new one.
 
         Parameters
@@ -247,8 +248,8 @@ class TangentBug(BaseController):
         seen: Observations,
         team: Team,
         states: tuple[NavigationState, ...],
-        centroids: Array,
-        obstacle_points: Array,
+        centroids: FloatArray,
+        obstacle_points: FloatArray,
         obstacle_squares: tuple[Squares, ...],
     ) -> tuple[NavigationState, ...]:
         """Return the navigation states of all robots after a scan."""
@@ -278,8 +279,8 @@ class TangentBug(BaseController):
         return tuple(updated_states)
 
     def _compute_velocities(
-        self, seen: Observations, team: Team, states: tuple[NavigationState, ...], centroids: Array
-    ) -> Array:
+        self, seen: Observations, team: Team, states: tuple[NavigationState, ...], centroids: FloatArray
+    ) -> FloatArray:
         """Return the desired velocities toward the waypoints, (n, 2) m/s."""
         waypoints = np.array([state.waypoint for state in states])
         passes_waypoint = np.array([state.passes_waypoint for state in states])
@@ -296,7 +297,7 @@ class TangentBug(BaseController):
         return compute_approach_velocities(offsets, math.inf, speed)
 
 
-def _add_squares(squares: Squares, points: Array) -> Squares:
+def _add_squares(squares: Squares, points: FloatArray) -> Squares:
     """Return the squares together with those that contain obstacle points, (k, 2) m; nan for none."""
     detected = points[~np.isnan(points[:, 0])]
     indices = np.floor(detected / _SQUARE_SIDE_M).astype(np.intp)
@@ -308,7 +309,7 @@ class ContourEnd(NamedTuple):
 
     ray: int
     """The first ray past it."""
-    point: Array
+    point: FloatArray
     """(2,) m, a point just past it."""
 
 
@@ -316,35 +317,35 @@ class ContourEnd(NamedTuple):
 class ObstacleView:
     """The obstacles that one robot sees. Points and distances are relative to the robot, in m."""
 
-    points: Array
+    points: FloatArray
     """(m, 2) Obstacle points; nan for rays that hit nothing."""
-    directions: Array
+    directions: FloatArray
     """(k, 2) Unit vectors of the rays."""
-    free_distances: Array
+    free_distances: FloatArray
     """(k,) Distance that the robot can move straight along each ray."""
     clearance: float
     """Distance that its center keeps from obstacles."""
     sensing_range: float
     """Range of its sensor."""
 
-    def contains(self, point: Array) -> bool:
+    def contains(self, point: FloatArray) -> bool:
         """Return whether the robot can move straight to a point."""
         distance = math.hypot(*point)
         return distance < _ARRIVAL_RADIUS_M or self.compute_free_distance(point) >= distance - _ROUNDING_M
 
-    def compute_free_distance(self, point: Array) -> float:
+    def compute_free_distance(self, point: FloatArray) -> float:
         """Return the distance that the robot can move straight toward a point, which it may pass."""
         direction = point / max(math.hypot(*point), _MIN_LENGTH)
         return float(
             compute_free_distances(self.points, direction[None], self.clearance, self.sensing_range)[0]
         )
 
-    def find_nearest_point(self) -> Array | None:
+    def find_nearest_point(self) -> FloatArray | None:
         """Return the nearest obstacle point, (2,), or None if the robot sees no obstacle."""
         distances = np.hypot(*self.points.T)
         return None if np.isnan(distances).all() else self.points[int(np.nanargmin(distances))]
 
-    def find_contour_ends(self, direction: Array, jump: float) -> dict[int, ContourEnd]:
+    def find_contour_ends(self, direction: FloatArray, jump: float) -> dict[int, ContourEnd]:
         """Return the ends of the contour that blocks the view in a direction.
 
         Parameters
@@ -385,9 +386,9 @@ class Navigator:
 
     controller: TangentBug
     view: ObstacleView
-    position: Array
+    position: FloatArray
     """(2,) m, position of the robot in the region."""
-    goal_offset: Array
+    goal_offset: FloatArray
     """(2,) m, its goal relative to its position."""
     obstacle_squares: Squares
     """Squares in which it has detected obstacle points."""
@@ -428,7 +429,7 @@ class Navigator:
         return replace(state, mode=Mode.GOAL, fixed_goal=goal)
 
     def _head_for(
-        self, state: NavigationState, mode: Mode, waypoint: Array, *, passes_waypoint: bool = False
+        self, state: NavigationState, mode: Mode, waypoint: FloatArray, *, passes_waypoint: bool = False
     ) -> NavigationState:
         """Return the state of a robot that moves straight to a waypoint through free space."""
         return replace(
@@ -524,7 +525,7 @@ class Navigator:
             return self._move_to_best_point(replace(state, mode=Mode.RETURN, turn=turn), best_point)
         return state
 
-    def _find_leaving_point(self, best_point: Array) -> Array | None:
+    def _find_leaving_point(self, best_point: FloatArray) -> FloatArray | None:
         """Return the point in view nearest to the goal, (2,) m, if it is nearer than the best point."""
         directions = self.view.directions
         # On each ray, the point nearest to the goal.
@@ -535,7 +536,7 @@ class Navigator:
             return None
         return np.asarray(self.position + depths[ray] * directions[ray])
 
-    def _find_best_point(self, state: NavigationState, ends: dict[int, ContourEnd]) -> Array:
+    def _find_best_point(self, state: NavigationState, ends: dict[int, ContourEnd]) -> FloatArray:
         """Return the boundary point, followed so far or now in view, that is nearest to the goal, (2,) m."""
         assert state.fixed_goal is not None
         rays = np.arange(len(self.view.free_distances))
@@ -552,7 +553,7 @@ class Navigator:
         nearest = np.hypot(*(self.goal_offset - points).T).argmin()
         return freeze(self.position + points[nearest])
 
-    def _move_to_best_point(self, state: NavigationState, best_point: Array) -> NavigationState:
+    def _move_to_best_point(self, state: NavigationState, best_point: FloatArray) -> NavigationState:
         """Return the state of a robot that heads for its best point if that is in view, or returns to it."""
         assert state.fixed_goal is not None
         goal = replace(state.fixed_goal, best_point=best_point, resting_centroid=None)
@@ -574,7 +575,9 @@ class Navigator:
 
 
 @kernel
-def compute_free_distances(points: Array, directions: Array, clearance: float, max_distance: float) -> Array:
+def compute_free_distances(
+    points: FloatArray, directions: FloatArray, clearance: float, max_distance: float
+) -> FloatArray:
     """Compute the distance that a disc can move straight in each direction.
 
     Parameters

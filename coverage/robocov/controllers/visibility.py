@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -29,6 +28,7 @@ from robocov.observation.scanned_view import (
     is_behind_wall,
     is_path_clear,
 )
+from robocov.typing import BoolArray, FloatArray
 
 _SAMPLES_PER_RAY = 12
 """Number of samples for integrals along a ray."""
@@ -41,9 +41,9 @@ class VisibilityMemory(Memory):
     """Memory of the robots: the last view and gradient of each."""
 
     view: View | None = None
-    gradient: Array | None = None
+    gradient: FloatArray | None = None
     """(n, 2) m, gradient of the area in view."""
-    speed_fraction: Array | None = None
+    speed_fraction: FloatArray | None = None
     """(n,) Fraction of full speed at which each robot follows the gradient."""
 
 
@@ -117,7 +117,7 @@ class Visibility(BaseController):
             ),
         )
 
-    def compute_gradient(self, seen: Observations, view: View, max_distances: Array) -> Array:
+    def compute_gradient(self, seen: Observations, view: View, max_distances: FloatArray) -> FloatArray:
         """Compute the gradient of the area of each robot's cell.
 
         Parameters
@@ -151,7 +151,11 @@ class Visibility(BaseController):
 
 @kernel
 def find_cells_in_view(
-    depths: Array, wall_distances: Array, directions: Array, pairs: NearNeighbors, max_distances: Array
+    depths: FloatArray,
+    wall_distances: FloatArray,
+    directions: FloatArray,
+    pairs: NearNeighbors,
+    max_distances: FloatArray,
 ) -> BoolArray:
     """Find the points of each robot's view that belong to its cell.
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.cost.lattice import NO_SITE, SLOTS, Tiles
 from robocov.geodesic.angular_index import (
@@ -28,6 +27,7 @@ from robocov.geodesic.box_tree import (
     skip_subtree,
 )
 from robocov.geodesic.walls import Walls, can_bend_at_corner
+from robocov.typing import FloatArray, IntArray
 
 
 class CornerViews(NamedTuple):
@@ -42,9 +42,9 @@ class CornerViews(NamedTuple):
     """(r,) The corner of each row."""
     visible_slots: IntArray
     """(r,) The slots of the tile that contain these sites, as a bit mask: bit s is set for slot s."""
-    min_distances: Array
+    min_distances: FloatArray
     """(r,) Distance from the corner to the nearest of these sites, grid steps."""
-    max_distances: Array
+    max_distances: FloatArray
     """(r,) Distance from the corner to the farthest of these sites, grid steps."""
 
 
@@ -65,7 +65,7 @@ LENGTH_COLUMNS = 2
 """Number of columns of these lengths."""
 
 
-def build_corner_views(tile_count: int, indices: IntArray, lengths: Array) -> CornerViews:
+def build_corner_views(tile_count: int, indices: IntArray, lengths: FloatArray) -> CornerViews:
     """Sort the rows that `find_corner_views` has written by tile.
 
     Parameters
@@ -101,7 +101,7 @@ def find_corner_views(
     end: int,
     wall_index: AngularWallIndex,
     indices: IntArray,
-    lengths: Array,
+    lengths: FloatArray,
 ) -> int:
     """Find the sites that each corner of a range sees; see `CornerViews`.
 
@@ -142,7 +142,7 @@ def _add_views(
     wall_index: AngularWallIndex,
     corner: int,
     indices: IntArray,
-    lengths: Array,
+    lengths: FloatArray,
     row_count: int,
 ) -> int:
     """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`.
@@ -178,7 +178,7 @@ def _add_views(
 
 @kernel
 def _find_visible_sites(
-    walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: Array
+    walls: Walls, wall_index: AngularWallIndex, tiles: Tiles, corner: int, tile: int, lengths: FloatArray
 ) -> int:
     """Find the sites of a tile to which a shortest path can lead straight from a corner at which it bends.
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray, compute_weighted_mean, freeze
+from robocov.arrays import compute_weighted_mean, freeze
 from robocov.cost.corner_views import (
     INDEX_COLUMNS,
     LENGTH_COLUMNS,
@@ -32,6 +30,7 @@ from robocov.geodesic import Geodesics
 from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.corner_graph import NO_CORNER
 from robocov.geodesic.geodesics import SOURCE_BINS
+from robocov.typing import AnyArray, BoolArray, FloatArray
 
 
 class CoverageCost:
@@ -178,12 +177,12 @@ class CoverageCost:
         self.closed_environment = closed_environment
         self._component_masses = closed_environment.free_masses
         self._mass = float(self._component_masses.sum())
-        self.weights: Array | None = None
+        self.weights: FloatArray | None = None
         density = environment.density
         if density is not None and not density.is_uniform:
             self.weights = freeze(compute_square_means(density, self.points, self.spacing))
 
-    def __call__(self, positions: Array, speeds: Array | None = None) -> CoverageResult:
+    def __call__(self, positions: FloatArray, speeds: FloatArray | None = None) -> CoverageResult:
         """Compute the coverage cost of a team.
 
         Parameters
@@ -217,7 +216,7 @@ class CoverageCost:
         paths = self._find_first_arrivals(grid_positions, is_inside, checked_speeds)
         return self._build_result(positions, is_covered, paths, team=0, speeds=checked_speeds)
 
-    def evaluate_teams(self, positions: Array) -> list[CoverageResult]:
+    def evaluate_teams(self, positions: FloatArray) -> list[CoverageResult]:
         """Compute the coverage cost of each of several teams of the same size.
 
         The results are the same as if the cost were called for one team after the other, but it takes less
@@ -257,7 +256,7 @@ class CoverageCost:
         paths = self._find_paths(grid_positions.reshape(teams.shape), is_covered)
         return [self._build_result(teams[team], is_covered[team], paths, team) for team in range(team_count)]
 
-    def _find_paths(self, grid_positions: Array, is_covered: BoolArray) -> SitePaths:
+    def _find_paths(self, grid_positions: FloatArray, is_covered: BoolArray) -> SitePaths:
         """Find the paths to all sites from the robots of each team, given their positions in grid steps.
 
         The positions are an (r, n, 2) array. `is_covered`, (r, c), says which components of the free space
@@ -282,7 +281,9 @@ class CoverageCost:
                 return paths
             self._index_entries_per_robot *= 2
 
-    def _find_first_arrivals(self, grid_positions: Array, is_inside: BoolArray, speeds: Array) -> SitePaths:
+    def _find_first_arrivals(
+        self, grid_positions: FloatArray, is_inside: BoolArray, speeds: FloatArray
+    ) -> SitePaths:
         """Find the path to each site from the robot that arrives first.
 
         `grid_positions` are (n, 2) grid steps, and `is_inside`, (n, c), says in which components of the free
@@ -314,11 +315,11 @@ class CoverageCost:
 
     def _build_result(
         self,
-        positions: Array,
+        positions: FloatArray,
         is_covered: BoolArray,
         paths: SitePaths,
         team: int,
-        speeds: Array | None = None,
+        speeds: FloatArray | None = None,
     ) -> CoverageResult:
         """Build the result of one team from the paths of several teams.
 
@@ -367,7 +368,7 @@ class CoverageCost:
             radius=self.radius,
         )
 
-    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
+    def to_grid(self, values: AnyArray) -> AnyArray:
         """Arrange values of the sites as an image of the lattice.
 
         Parameters
@@ -382,7 +383,7 @@ class CoverageCost:
         """
         return self.sites.to_grid(values)
 
-    def find_path(self, positions: Array, point: Array) -> Array:
+    def find_path(self, positions: FloatArray, point: FloatArray) -> FloatArray:
         """Find the shortest path from a point to the nearest robot.
 
         Parameters
@@ -409,7 +410,7 @@ class CoverageCost:
         return self.geodesics.find_path(point, positions[int(distances.argmin())])
 
 
-def _require_speeds(speeds: object, robot_count: int) -> Array:
+def _require_speeds(speeds: object, robot_count: int) -> FloatArray:
     """Return the speeds as an array, (n,) m/s; raise InputError unless there is one above 0 per robot."""
     try:
         values = np.array(speeds, dtype=float)

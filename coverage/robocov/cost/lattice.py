@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray, find_run_starts, freeze
+from robocov.arrays import find_run_starts, freeze
 from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.geodesic.box_tree import build_box_tree, compute_z_order
+from robocov.typing import AnyArray, FloatArray, IntArray
 
 MAX_LATTICE = 4096
 """Maximum number of cells along a side of the lattice."""
@@ -50,10 +50,10 @@ class Sites:
 
     lattice: int
     spacing: float
-    points: Array
+    points: FloatArray
     cells: IntArray
 
-    def to_grid(self, values: NDArray[Any]) -> NDArray[Any]:
+    def to_grid(self, values: AnyArray) -> AnyArray:
         """Arrange values of the sites as an image of the whole lattice.
 
         Parameters
@@ -81,19 +81,19 @@ class Tiles(NamedTuple):
     `NO_SITE`. Nearby tiles have nearby indices.
     """
 
-    x: Array
+    x: FloatArray
     """(t, SLOTS) x coordinate of the site in each slot."""
-    y: Array
+    y: FloatArray
     """(t, SLOTS) y coordinate of the site in each slot."""
     sites: IntArray
     """(t, SLOTS) Index of the site in each slot, as in `Sites`, or `NO_SITE` if the slot is empty."""
     components: IntArray
     """(t, SLOTS) The component of the free space that contains the site in each slot."""
-    boxes: Array
+    boxes: FloatArray
     """(t, 4) The bounding box of the sites of each tile; for the columns, see `robocov.geodesic.box_tree`."""
-    group_boxes: Array
+    group_boxes: FloatArray
     """(g, 4) The bounding box of each group of `TILES_PER_GROUP` consecutive tiles."""
-    tree: Array
+    tree: FloatArray
     """The box tree of the tiles."""
 
 
@@ -143,14 +143,14 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     return sites, _build_tiles(sites, geodesics.grid.snap(points), np.concatenate(all_components))
 
 
-def _compute_centers(cells: IntArray, side: int, spacing: float, origin: Array) -> Array:
+def _compute_centers(cells: IntArray, side: int, spacing: float, origin: FloatArray) -> FloatArray:
     """Return the centers of cells with the indices (m,), in meters, (m, 2)."""
     columns = cells % side
     rows = cells // side
     return (np.column_stack([columns, rows]) + 0.5) * spacing + origin
 
 
-def _build_tiles(sites: Sites, grid_positions: Array, components: IntArray) -> Tiles:
+def _build_tiles(sites: Sites, grid_positions: FloatArray, components: IntArray) -> Tiles:
     """Arrange the sites in square tiles.
 
     Each tile has one slot per cell, so that kernels can use arrays of fixed size. The m sites lie at the

@@ -11,12 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.cost.lattice import Sites
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import format_count
+from robocov.typing import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,17 +85,17 @@ class CoverageResult(Drawable):
     mean_distance: float
     value: float
     uncovered_area: float
-    distances: Array
+    distances: FloatArray
     owners: IntArray
     first_corners: IntArray
     last_corners: IntArray
-    positions: Array
-    points: Array
-    corners: Array
+    positions: FloatArray
+    points: FloatArray
+    corners: FloatArray
     environment: Environment | None = None
     sites: Sites | None = None
-    weights: Array | None = None
-    speeds: Array | None = None
+    weights: FloatArray | None = None
+    speeds: FloatArray | None = None
     mean_time: float | None = None
     radius: float = DEFAULT_RADIUS_M
 
@@ -108,7 +109,7 @@ class CoverageResult(Drawable):
         return f"<CoverageResult {text}>"
 
     @cached_property
-    def times(self) -> Array:
+    def times(self) -> FloatArray:
         """Time until the first robot arrives at each site, (m,) s; inf if none does.
 
         Without `speeds`, robots move at 1 m/s.
@@ -120,7 +121,7 @@ class CoverageResult(Drawable):
         return np.asarray(self.distances / self.speeds[self.owners])
 
     @cached_property
-    def first_waypoints(self) -> Array:
+    def first_waypoints(self) -> FloatArray:
         """First waypoint on the path from the owner to each site, (m, 2) m: a corner, or the site itself."""
         waypoints = self.points.copy()
         is_bent = self.first_corners >= 0
@@ -128,7 +129,7 @@ class CoverageResult(Drawable):
         return waypoints
 
     @cached_property
-    def gradient(self) -> Array:
+    def gradient(self) -> FloatArray:
         """Derivative of `value` with respect to the positions, (n, 2) m²; with `speeds` in m s.
 
         If a robot moves toward the first waypoint of a site, the path to the site gets shorter by the same

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.cost.corner_views import CornerViews
 from robocov.cost.lattice import NO_SITE, SLOTS, TILES_PER_GROUP, Tiles
@@ -40,6 +39,7 @@ from robocov.geodesic.box_tree import (
 )
 from robocov.geodesic.corner_graph import NO_CORNER, CornerGraph, CornerPaths, CornerQueue, relax_paths
 from robocov.geodesic.walls import Walls, can_bend_at_corner
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _MAX_SMALL_TEAM = 12
 """Number of robots up to which the walls at any distance from each robot are indexed. In such a small team,
@@ -70,7 +70,7 @@ class Search(NamedTuple):
 
     wall_index: AngularWallIndex
     """The walls around each robot."""
-    max_site_distances: Array
+    max_site_distances: FloatArray
     """(n,) Distance from each robot to the farthest of the sites to which it is nearest in a straight
     line."""
     all_robots: IntArray
@@ -87,7 +87,7 @@ class Search(NamedTuple):
     """(t,) Bit mask of the hidden sites of each tile: bit s is set if the site in slot s is hidden."""
     nearest_robots: IntArray
     """(t, SLOTS) The robot that is nearest to each site in a straight line."""
-    site_lengths: Array
+    site_lengths: FloatArray
     """(t, SLOTS) Length of the shortest path to each site; inf if there is none."""
     site_robots: IntArray
     """(t, SLOTS) The robot where that path starts, or `NO_ROBOT`."""
@@ -130,7 +130,7 @@ class Search(NamedTuple):
 class SitePaths(NamedTuple):
     """The shortest paths to m sites from the robots of r teams."""
 
-    distances: Array
+    distances: FloatArray
     """(r, m) Length of each path in meters; inf if no robot can reach the site."""
     owners: IntArray
     """(r, m) The robot at which each path starts, or `NO_ROBOT`."""
@@ -164,7 +164,7 @@ class SitePaths(NamedTuple):
 def find_site_paths(
     cost_map: CostMap,
     search: Search,
-    teams: Array,
+    teams: FloatArray,
     is_covered: BoolArray,
     grid_spacing: float,
     paths: SitePaths,
@@ -219,7 +219,7 @@ def _write_tile_paths(
 
 
 @kernel
-def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covered: BoolArray) -> bool:
+def _find_team_paths(cost_map: CostMap, search: Search, robots: FloatArray, is_covered: BoolArray) -> bool:
     """Find the shortest path to each site from the robots of a team, which are at (n, 2) grid positions.
 
     At first, each site belongs to the robot that is nearest in a straight line. Sites that this robot does
@@ -253,7 +253,7 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: Array, is_covere
 
 
 @kernel
-def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
+def _find_nearest_robots(tiles: Tiles, search: Search, robots: FloatArray) -> None:
     """Find the robot that is nearest to each site in a straight line.
 
     Robots that are too far away to be nearest to any site of a group of neighboring tiles are first excluded
@@ -275,7 +275,12 @@ def _find_nearest_robots(tiles: Tiles, search: Search, robots: Array) -> None:
 
 @kernel
 def _list_nearest_candidates(
-    boxes: Array, box: int, robots: Array, candidates: IntArray, candidate_count: int, result: IntArray
+    boxes: FloatArray,
+    box: int,
+    robots: FloatArray,
+    candidates: IntArray,
+    candidate_count: int,
+    result: IntArray,
 ) -> int:
     """Write the candidates that may be nearest to some point of a box to `result`; return their number.
 
@@ -296,9 +301,9 @@ def _list_nearest_candidates(
 
 @kernel
 def _list_robots_within(
-    boxes: Array,
+    boxes: FloatArray,
     box: int,
-    robots: Array,
+    robots: FloatArray,
     max_squared_distance: float,
     candidates: IntArray,
     candidate_count: int,
@@ -320,7 +325,7 @@ def _list_robots_within(
 
 @kernel
 def _find_nearest_robots_in_tile(
-    tiles: Tiles, search: Search, robots: Array, tile: int, candidate_count: int
+    tiles: Tiles, search: Search, robots: FloatArray, tile: int, candidate_count: int
 ) -> None:
     """Find the robot that is nearest to each site of a tile in a straight line.
 
@@ -381,7 +386,7 @@ def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered:
 
 
 @kernel
-def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
+def _find_corner_paths(cost_map: CostMap, search: Search, robots: FloatArray) -> None:
     """Find the shortest path to each corner from the robots.
 
     A path starts with a straight segment from a robot to a corner that it sees, and continues along the graph
@@ -396,7 +401,7 @@ def _find_corner_paths(cost_map: CostMap, search: Search, robots: Array) -> None
 
 
 @kernel
-def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
+def _try_nearest_robots(walls: Walls, search: Search, robots: FloatArray) -> int:
     """Try the straight path to each corner from the robot that is nearest to it in a straight line.
 
     The robots that may be nearest to a corner are listed once for each leaf of the box tree, which contains
@@ -432,7 +437,7 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: Array) -> int:
 
 
 @kernel
-def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
+def _try_closer_robots(walls: Walls, search: Search, robots: FloatArray) -> int:
     """Try the straight path to each corner from every robot that is near enough to shorten the path so far.
 
     The robots that are near enough are listed once for each leaf of the box tree, which contains `LEAF_SIZE`
@@ -460,7 +465,7 @@ def _try_closer_robots(walls: Walls, search: Search, robots: Array) -> int:
 
 @kernel
 def _find_nearest_candidate(
-    robots: Array, candidates: IntArray, candidate_count: int, x: float, y: float
+    robots: FloatArray, candidates: IntArray, candidate_count: int, x: float, y: float
 ) -> int:
     """Return the candidate at the smallest Euclidean distance from (x, y). There is at least one."""
     min_squared_distance = np.inf
@@ -508,7 +513,7 @@ def _try_straight_path_to_corner(
 
 
 @kernel
-def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) -> None:
+def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: FloatArray) -> None:
     """Find the paths to the hidden sites, which the robot that is nearest in a straight line does not see.
 
     First, the shortest paths via corners are found. A straight path from another robot can be shorter only if
@@ -531,7 +536,7 @@ def _find_hidden_site_paths(cost_map: CostMap, search: Search, robots: Array) ->
 
 @kernel
 def _try_other_robots(
-    cost_map: CostMap, search: Search, robots: Array, group: int, max_length: float
+    cost_map: CostMap, search: Search, robots: FloatArray, group: int, max_length: float
 ) -> None:
     """Try the straight paths from other robots to the hidden sites of a group of tiles.
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray
 from robocov.cost.coverage_cost import CoverageCost
 from robocov.cost.result import CoverageResult
 from robocov.cost.site_paths import NO_ROBOT
+from robocov.typing import BoolArray, FloatArray
 
 _MAX_CACHED_MAPS = 64
 """Maximum number of maps whose costs are cached, because maps recur if obstacles move periodically."""
@@ -104,7 +104,7 @@ class TimeVaryingCost:
         return self._cost_by_map[key]
 
     def find_available_robots(
-        self, time: float, positions: Array, is_working: BoolArray | None = None
+        self, time: float, positions: FloatArray, is_working: BoolArray | None = None
     ) -> BoolArray:
         """Find the available robots, which work and are not covered by a moving obstacle.
 
@@ -129,7 +129,11 @@ class TimeVaryingCost:
         return is_available
 
     def __call__(
-        self, time: float, positions: Array, is_working: BoolArray | None = None, speeds: Array | None = None
+        self,
+        time: float,
+        positions: FloatArray,
+        is_working: BoolArray | None = None,
+        speeds: FloatArray | None = None,
     ) -> CoverageResult | None:
         """Compute the coverage cost of the available robots at a given time.
 
@@ -156,7 +160,7 @@ class TimeVaryingCost:
         return self.get_cost(time)(positions[is_available], available_speeds)
 
     def evaluate_all_robots(
-        self, time: float, positions: Array, is_working: BoolArray | None = None
+        self, time: float, positions: FloatArray, is_working: BoolArray | None = None
     ) -> CoverageResult | None:
         """Compute the coverage cost of the available robots, with a result that contains all robots.
 
@@ -183,7 +187,7 @@ class TimeVaryingCost:
         return replace(result, positions=np.array(positions), owners=owners)
 
     def compute_summary(
-        self, time: float, positions: Array, is_working: BoolArray | None = None
+        self, time: float, positions: FloatArray, is_working: BoolArray | None = None
     ) -> CostSummary:
         """Compute the mean distance, the coverage cost (22) and the uncovered area at a given time.
 

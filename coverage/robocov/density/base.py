@@ -10,9 +10,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, CellEdges
 from robocov.errors import ParameterError, quote
+from robocov.typing import FloatArray
 
 MAX_WEIGHT = 1e6
 """Maximum value of a weight."""
@@ -65,7 +65,7 @@ class Density(ABC):
         """An upper bound on the density."""
 
     @abstractmethod
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the density at points.
 
         Parameters
@@ -80,7 +80,7 @@ class Density(ABC):
         """
 
     @abstractmethod
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute mass, first moments and polar moment of each cell about its origin.
 
         Parameters
@@ -104,8 +104,8 @@ class Density(ABC):
         return self.min_value == self.max_value
 
     def compute_masses_and_centroids(
-        self, edges: CellEdges, origins: Array, areas: Array, area_centroids: Array
-    ) -> tuple[Array, Array]:
+        self, edges: CellEdges, origins: FloatArray, areas: FloatArray, area_centroids: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Compute the masses and centroids of cells, M and C of equation (2).
 
         Parameters
@@ -209,7 +209,7 @@ class Uniform(Density):
         """The weight."""
         return self.weight
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the density, which is the weight at every point.
 
         Parameters
@@ -224,7 +224,7 @@ class Uniform(Density):
         """
         return np.full(len(points), float(self.weight))
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute mass, first moments and polar moment of each cell: those for density 1 times the weight.
 
         Parameters

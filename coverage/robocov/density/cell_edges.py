@@ -5,8 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.compiled import kernel
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 REGION = -1
 """Used in place of the cell on the other side of an edge if the edge lies on the boundary of the region."""
@@ -40,12 +41,12 @@ class CellEdges:
         Index of the cell on the other side of each edge, or `REGION`.
     """
 
-    starts: Array
-    ends: Array
+    starts: FloatArray
+    ends: FloatArray
     cells: IntArray
     other_cells: IntArray
 
-    def build_polygons(self, generators: Array) -> list[Array]:
+    def build_polygons(self, generators: FloatArray) -> list[FloatArray]:
         """Build the polygon of each cell.
 
         Parameters
@@ -65,7 +66,7 @@ class CellEdges:
         stops = np.cumsum(np.bincount(cells, minlength=len(generators))).tolist()
         return [vertices[start:stop] for start, stop in pairwise([0, *stops])]
 
-    def compute_moments(self, cell_count: int) -> Array:
+    def compute_moments(self, cell_count: int) -> FloatArray:
         """Compute the moments of cells about their generators, for density 1.
 
         Parameters
@@ -107,7 +108,7 @@ class CellEdges:
 
 
 @kernel
-def _sum_moments(starts: Array, ends: Array, cells: IntArray, cell_count: int) -> Array:
+def _sum_moments(starts: FloatArray, ends: FloatArray, cells: IntArray, cell_count: int) -> FloatArray:
     """Return the moments of cells, (n, 4): area, first moments in x and y, and polar moment.
 
     They are sums over the edges of a cell. The contribution of an edge is the moment of the triangle that it

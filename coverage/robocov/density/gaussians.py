@@ -22,10 +22,11 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, Point, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
+from robocov.typing import FloatArray, Point
 
 Matrix: TypeAlias = tuple[Point, Point]
 """A 2 x 2 matrix, row by row."""
@@ -50,17 +51,17 @@ class _StandardMoments(NamedTuple):
     the entries of the mass times the identity matrix minus the second moments.
     """
 
-    mass: Array
+    mass: FloatArray
     """Integral of the Gaussian g."""
-    x: Array
+    x: FloatArray
     """Integral of x g."""
-    y: Array
+    y: FloatArray
     """Integral of y g."""
-    deficit_xx: Array
+    deficit_xx: FloatArray
     """Mass minus the integral of x² g."""
-    deficit_xy: Array
+    deficit_xy: FloatArray
     """Minus the integral of x y g."""
-    deficit_yy: Array
+    deficit_yy: FloatArray
     """Mass minus the integral of y² g."""
 
 
@@ -123,7 +124,7 @@ class Gaussian:
         assert self.sigma is not None
         return (self.sigma**2, 0.0), (0.0, self.sigma**2)
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the Gaussian at points.
 
         Parameters
@@ -141,7 +142,7 @@ class Gaussian:
         y = standard[:, 1]
         return np.asarray(self.weight * np.exp(-0.5 * (x * x + y * y)))
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute mass, first moments and polar moment of each cell.
 
         Parameters
@@ -162,7 +163,7 @@ class Gaussian:
         starts = self._standardize(edges.starts + edge_offsets)
         ends = self._standardize(edges.ends + edge_offsets)
         scale = self.weight * factor.xx * factor.yy
-        sums: list[Array] = [
+        sums: list[FloatArray] = [
             np.asarray(np.bincount(edges.cells, contributions, minlength=len(origins)) * scale)
             for contributions in _integrate_along_edges(starts, ends)
         ]
@@ -191,7 +192,7 @@ class Gaussian:
         factor_yy = math.sqrt(yy - factor_yx * factor_yx)
         return _CholeskyFactor(xx=factor_xx, yy=factor_yy, yx=factor_yx)
 
-    def _standardize(self, offsets: Array) -> Array:
+    def _standardize(self, offsets: FloatArray) -> FloatArray:
         """Convert offsets from the center, (k, 2) m, to coordinates in which this is the standard Gaussian.
 
         An offset in meters is the Cholesky factor L times the offset in these coordinates.
@@ -254,7 +255,7 @@ class Gaussians(Density):
         """The sum of the constant and all weights, an upper bound that is reached if all centers coincide."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the density at points.
 
         Parameters
@@ -273,7 +274,7 @@ class Gaussians(Density):
             total += peak.evaluate(points)
         return total
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute mass, first moments and polar moment of each cell in closed form.
 
         Parameters
@@ -292,7 +293,7 @@ class Gaussians(Density):
         return total
 
 
-def _integrate_along_edges(starts: Array, ends: Array) -> _StandardMoments:
+def _integrate_along_edges(starts: FloatArray, ends: FloatArray) -> _StandardMoments:
     """Return the contributions of edges to the moments of the standard Gaussian g = exp(-|q|²/2) over cells.
 
     The edges lead from `starts` to `ends`, (e, 2) each, relative to the center. Let d be the signed distance

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, IntArray
 from robocov.density.base import Density
 from robocov.density.cell_edges import MASS, REGION, CellEdges
+from robocov.typing import FloatArray, IntArray
 
 _SQUARES_PER_BATCH = 1 << 16
 """Number of squares that are integrated at the same time, to limit memory."""
 
 
-def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> Array:
+def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]) -> FloatArray:
     """Integrate a density over polygons.
 
     Parameters
@@ -48,7 +48,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
     return np.maximum(density.compute_moments(edges, origins)[:, MASS], 0.0)
 
 
-def compute_square_means(density: Density, centers: Array, side: float) -> Array:
+def compute_square_means(density: Density, centers: FloatArray, side: float) -> FloatArray:
     """Compute the mean density in each of several axis-parallel squares of the same size.
 
     Parameters
@@ -78,7 +78,7 @@ def compute_square_means(density: Density, centers: Array, side: float) -> Array
     return np.clip(masses / (side * side), density.min_value, density.max_value)
 
 
-def _build_edges(starts: Array, ends: Array, polygons: IntArray) -> CellEdges:
+def _build_edges(starts: FloatArray, ends: FloatArray, polygons: IntArray) -> CellEdges:
     """Return the edges of polygons as those of cells that do not border on each other."""
     other_cells = np.full(len(polygons), REGION)
     return CellEdges(starts, ends, polygons.astype(np.intp, copy=False), other_cells)

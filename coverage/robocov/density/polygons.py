@@ -20,11 +20,11 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, IntArray, Ring
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
 from robocov.errors import ParameterError
+from robocov.typing import FloatArray, IntArray, Ring
 
 _LOW_X = 0
 """Column of a jump, a line across which the density changes: x of its lower end, m."""
@@ -145,7 +145,7 @@ class WeightedPolygons(Density):
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
-    def _jumps(self) -> Array:
+    def _jumps(self) -> FloatArray:
         """The lines across which the density changes, (j, 5): the edges of the visible parts of the areas.
 
         For the columns, see `_LOW_X` and the following constants. Horizontal edges are left out, because
@@ -166,7 +166,7 @@ class WeightedPolygons(Density):
         has_step = all_jumps[:, _STEP] != 0.0
         return np.asarray(all_jumps[~is_horizontal & has_step])
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the density at points.
 
         Parameters
@@ -185,7 +185,7 @@ class WeightedPolygons(Density):
             values[shapely.contains_xy(area.polygon, x, y)] = area.weight
         return values
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute mass, first moments and polar moment of each cell exactly.
 
         Parameters
@@ -203,7 +203,7 @@ class WeightedPolygons(Density):
         return moments
 
 
-def _build_jumps(points: Array, step: float) -> Array:
+def _build_jumps(points: FloatArray, step: float) -> FloatArray:
     """Return the jumps across the edges of a closed, counter-clockwise ring, (k, 5).
 
     The density inside the ring exceeds that outside by `step`. A jump runs from the lower to the upper end of
@@ -252,7 +252,12 @@ class _Strip(NamedTuple):
 
 @kernel
 def _add_jumps(
-    moments: Array, jumps: Array, starts: Array, ends: Array, cells: IntArray, origins: Array
+    moments: FloatArray,
+    jumps: FloatArray,
+    starts: FloatArray,
+    ends: FloatArray,
+    cells: IntArray,
+    origins: FloatArray,
 ) -> None:
     """Add the contribution of the jumps of a density to the moments of cells, (n, 4).
 
@@ -302,7 +307,7 @@ def _add_jumps(
 
 
 @inlined_kernel
-def _add_strip(moments: Array, cell: int, strip: _Strip, weight: float) -> None:
+def _add_strip(moments: FloatArray, cell: int, strip: _Strip, weight: float) -> None:
     """Add the integrals of a weight over a strip to the moments of a cell.
 
     At each height, the strip extends from the jump, at x = left, to the edge, at x = right. Heights at which

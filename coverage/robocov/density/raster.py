@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, freeze
+from robocov.arrays import freeze
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import MAX_WEIGHT, Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import ParameterError, quote
+from robocov.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -100,7 +101,7 @@ class Raster(Density):
 
     kind: ClassVar[str] = "raster"
 
-    values: Array = field(repr=False)
+    values: FloatArray = field(repr=False)
     extent: tuple[float, float, float, float]
     interpolation: Interpolation = "bilinear"
 
@@ -156,7 +157,7 @@ class Raster(Density):
         """The largest value of a pixel."""
         return float(self.values.max())
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         """Evaluate the density at points. Points outside have the value of the nearest border pixel.
 
         Parameters
@@ -182,7 +183,7 @@ class Raster(Density):
         eta = v - rows
         return np.asarray(constants + slopes_x * xi + (slopes_y + twists * xi) * eta)
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute the exact mass, first moments and polar moment of each cell.
 
         Parameters
@@ -273,11 +274,11 @@ class _Grid(NamedTuple):
         Change of these integrals from η = 0 to η = 1. In between, they are linear in η.
     """
 
-    origin: Array
-    step: Array
-    coefficients: Array
-    left: Array
-    left_change: Array
+    origin: FloatArray
+    step: FloatArray
+    coefficients: FloatArray
+    left: FloatArray
+    left_change: FloatArray
 
 
 class _Edge(NamedTuple):
@@ -327,7 +328,7 @@ def _build_grid(raster: Raster) -> _Grid:
     )
 
 
-def _integrate_rows(start: Array, slope: Array) -> Array:
+def _integrate_rows(start: FloatArray, slope: FloatArray) -> FloatArray:
     """Return the integrals of f, u f and u² f along rows, from the left side of the grid to each square.
 
     In the square of column i, f is start + slope ξ, with u = i + ξ. The result has the shape (3, rows,
@@ -345,7 +346,9 @@ def _integrate_rows(start: Array, slope: Array) -> Array:
 
 
 @kernel
-def _integrate_cells(grid: _Grid, starts: Array, ends: Array, cells: IntArray, cell_count: int) -> Array:
+def _integrate_cells(
+    grid: _Grid, starts: FloatArray, ends: FloatArray, cells: IntArray, cell_count: int
+) -> FloatArray:
     """Return the integrals of φ times 1, u, v, u² and v² over cells, (n, 5), from their edges in grid steps.
 
     Let P(u, v) be the integral of φ along the row at height v, from the left side of the image to u. By
@@ -380,7 +383,7 @@ def _integrate_cells(grid: _Grid, starts: Array, ends: Array, cells: IntArray, c
 
 
 @inlined_kernel
-def _add_section(sums: Array, cell: int, grid: _Grid, edge: _Edge, start: float, end: float) -> None:
+def _add_section(sums: FloatArray, cell: int, grid: _Grid, edge: _Edge, start: float, end: float) -> None:
     """Add the contribution of a section of an edge, within one square of the grid, to the sums of a cell.
 
     The section runs from t = start to t = end, where t goes from 0 to 1 along the edge. By Green's theorem,

@@ -8,7 +8,6 @@
 - `polygons`: robust operations on polygons
 """
 
-from robocov.arrays import Point, Ring
 from robocov.environment.closed_gaps import compute_center_areas
 from robocov.environment.environment import Environment, require_environment
 from robocov.environment.obstacle_paths import (
@@ -38,6 +37,7 @@ from robocov.environment.starts import (
     compute_start_clearance,
     compute_start_spacing,
 )
+from robocov.typing import Point, Ring
 
 __all__ = [
     "GRID_M",

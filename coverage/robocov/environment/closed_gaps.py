@@ -9,9 +9,10 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array, BoolArray, IntArray, Point, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.environment.passages import FacingPoints, PassageSearch
 from robocov.environment.polygons import GRID_M, extract_polygons
+from robocov.typing import BoolArray, FloatArray, IntArray, Point
 
 _WIDTH_TOLERANCE_M = 2 * GRID_M
 """Largest difference by which a gap may be narrower than the disc and still stay open. Vertices are rounded,
@@ -46,11 +47,11 @@ class _Segments(NamedTuple):
         Length of each segment.
     """
 
-    starts: Array
-    ends: Array
+    starts: FloatArray
+    ends: FloatArray
     edges: IntArray
     ends_at_vertex: BoolArray
-    widths: Array
+    widths: FloatArray
 
     def select(self, rows: IntArray | BoolArray) -> _Segments:
         """Return the segments in the given rows."""
@@ -204,7 +205,7 @@ def _remove_crossings(segments: _Segments) -> _Segments:
     return segments.select(is_kept)
 
 
-def _build_lines(starts: Array, ends: Array) -> np.ndarray:
+def _build_lines(starts: FloatArray, ends: FloatArray) -> np.ndarray:
     """Return lines between pairs of points, (n,) geometries."""
     lines: np.ndarray = shapely.linestrings(np.stack([starts, ends], axis=1))
     return lines
@@ -226,7 +227,7 @@ def _split_into_faces(search: PassageSearch, segments: _Segments) -> np.ndarray:
     return faces
 
 
-def _split_edge(search: PassageSearch, edge: int, points: Array) -> Array:
+def _split_edge(search: PassageSearch, edge: int, points: FloatArray) -> FloatArray:
     """Split an edge at given points; return its points from start to end, (k, 2) m."""
     start = search.edge_starts[edge]
     end = search.edge_ends[edge]

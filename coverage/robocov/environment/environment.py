@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array, Ring, freeze
+from robocov.arrays import freeze
 from robocov.density import Density
 from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
@@ -21,6 +21,7 @@ from robocov.environment.polygons import GRID_M, extract_polygons, unite_shapes
 from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, describe_unknown_name, format_count, require_number, require_type
 from robocov.observation.region import Region
+from robocov.typing import FloatArray, Ring
 
 _DISPLACEMENT_DECIMALS = 9
 """Displacements are rounded to the nanometer, so that an obstacle returns to exactly the same position."""
@@ -169,7 +170,7 @@ class Environment(Drawable):
         return float(self.free.area)
 
     @cached_property
-    def free_masses(self) -> Array:
+    def free_masses(self) -> FloatArray:
         """Integral of φ over each component of the free space, m²: the area if there is no density."""
         components = self.free.geoms
         if self.density is None:

@@ -12,7 +12,8 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, Ring, compute_lengths
+from robocov.arrays import compute_lengths
+from robocov.typing import FloatArray, Ring
 
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 """Motion of an obstacle at the end of a path: straight to the first point, or back along the path."""
@@ -59,7 +60,7 @@ class ObstaclePath:
     repeat: Repeat = "loop"
 
     @cached_property
-    def _round_trip(self) -> tuple[Array, Array]:
+    def _round_trip(self) -> tuple[FloatArray, FloatArray]:
         """Points of one round trip, (k, 2) m, and the path length up to each point, (k,) m."""
         outward_points = np.array(self.points, dtype=float)
         if self.repeat == "loop":
@@ -77,7 +78,7 @@ class ObstaclePath:
         _, path_lengths = self._round_trip
         return float(path_lengths[-1]) / self.speed
 
-    def compute_displacement(self, time: float) -> Array:
+    def compute_displacement(self, time: float) -> FloatArray:
         """Compute the displacement of the obstacle since time zero.
 
         Parameters
@@ -121,7 +122,7 @@ def compute_swept_area(polygon: Polygon, path: ObstaclePath) -> BaseGeometry:
     return shapely.union_all([polygon, *swept_areas])
 
 
-def _sweep(polygon: Polygon, start: Array, end: Array) -> BaseGeometry:
+def _sweep(polygon: Polygon, start: FloatArray, end: FloatArray) -> BaseGeometry:
     """Return the area that a polygon sweeps while its displacement changes from `start` to `end`.
 
     The area is the union of the polygon at both displacements and the parallelograms that its edges sweep.

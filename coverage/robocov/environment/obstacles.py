@@ -11,8 +11,8 @@ import numpy as np
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, Point, Ring
 from robocov.environment.obstacle_paths import ObstaclePath
+from robocov.typing import FloatArray, Point, Ring
 
 MAX_SAGITTA_M = 1e-3
 """Largest distance between a circle and the polygon that represents the circle."""
@@ -155,7 +155,7 @@ Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 """Any kind of obstacle."""
 
 
-def shift_obstacle(obstacle: Obstacle, displacement: Array) -> Obstacle:
+def shift_obstacle(obstacle: Obstacle, displacement: FloatArray) -> Obstacle:
     """Move an obstacle to another position, where it stays.
 
     Parameters

@@ -9,7 +9,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 _ROW_DISTANCE = math.sqrt(3) / 2
 """Distance between the rows of the hexagonal lattice of spacing 1, the densest packing of the plane."""
@@ -75,7 +75,7 @@ def estimate_point_count(area: BaseGeometry, spacing: float) -> int:
     return max(1, int(area.area / (spacing**2 * _AREA_PER_POINT)))
 
 
-def pack_densely(area: BaseGeometry, spacing: float) -> Array:
+def pack_densely(area: BaseGeometry, spacing: float) -> FloatArray:
     """Pack points into an area as densely as possible: choose the best of several random packings.
 
     Equal areas and spacings always give the same points.
@@ -106,7 +106,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> Array:
     return best_points
 
 
-def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
+def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> FloatArray:
     """Pack random points into an area, one after another, until almost no more fit.
 
     Candidates are uniformly distributed in the area. A candidate that is too close to an earlier point is
@@ -149,7 +149,7 @@ def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, 
     return points[:max_count]
 
 
-def _drop_close_points(points: Array, spacing: float) -> Array:
+def _drop_close_points(points: FloatArray, spacing: float) -> FloatArray:
     """Drop each point that is within the spacing of an earlier point that was not dropped."""
     if len(points) == 0:
         return points
@@ -162,7 +162,7 @@ def _drop_close_points(points: Array, spacing: float) -> Array:
     return points[is_kept]
 
 
-def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> Array:
+def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, spacing: float) -> FloatArray:
     """Pack points of a hexagonal lattice with a random position and orientation into an area.
 
     Several positions and orientations are tried, until one puts `max_count` points in the area. If none does,
@@ -207,7 +207,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, s
     return best_points
 
 
-def _build_lattice(steps: int) -> Array:
+def _build_lattice(steps: int) -> FloatArray:
     """Build the hexagonal lattice of spacing 1 with `steps` rows and columns on each side of the origin."""
     indices = np.arange(-steps, steps + 1)
     columns, rows = np.meshgrid(indices, indices)
@@ -217,7 +217,7 @@ def _build_lattice(steps: int) -> Array:
     return np.column_stack([x, y])
 
 
-def choose_points(rng: np.random.Generator, points: Array, count: int) -> Array:
+def choose_points(rng: np.random.Generator, points: FloatArray, count: int) -> FloatArray:
     """Choose some of the given points at random, in their original order.
 
     Parameters

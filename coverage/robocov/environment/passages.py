@@ -10,10 +10,11 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.arrays import Array, BoolArray, IntArray, Point, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.obstacles import MAX_SAGITTA_M
 from robocov.environment.polygons import GRID_M
+from robocov.typing import BoolArray, FloatArray, IntArray, Point
 
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
 """Smallest area of a part of the free space to which a passage may lead; no robot enters a smaller one."""
@@ -139,9 +140,9 @@ class FacingPoints(NamedTuple):
 
     corners: IntArray
     edges: IntArray
-    p: Array
-    q: Array
-    widths: Array
+    p: FloatArray
+    q: FloatArray
+    widths: FloatArray
 
     def select(self, rows: IntArray | BoolArray) -> FacingPoints:
         """Return some of the pairs.
@@ -309,7 +310,7 @@ class PassageSearch:
         is_empty[is_empty] = shapely.contains_properly(self.free, middles[is_empty])
         return is_empty
 
-    def _is_passage(self, corner: int, edge: int, q: Array, width: float) -> bool:
+    def _is_passage(self, corner: int, edge: int, q: FloatArray, width: float) -> bool:
         """Return whether the gap from a corner to the point q of an edge leads to more than a pocket.
 
         A cut along the gap separates part of the free space only if it joins two points of the same ring.
@@ -343,18 +344,18 @@ def _close_cracks(free: MultiPolygon) -> MultiPolygon:
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in shapely.get_parts(free)])
 
 
-def _dot(a: Array, b: Array) -> Array:
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the dot products of two lists of vectors, (k,)."""
-    products: Array = np.einsum("kd,kd->k", a, b)
+    products: FloatArray = np.einsum("kd,kd->k", a, b)
     return products
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the cross products of two lists of vectors, (k,)."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def _compute_ring_area(ring: Array) -> float:
+def _compute_ring_area(ring: FloatArray) -> float:
     """Return the area of a ring, m², which is negative if the ring is clockwise."""
     # The shoelace formula. Coordinates relative to a point of the ring keep rounding errors small.
     points = ring - ring[0]

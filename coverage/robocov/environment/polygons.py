@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 GRID_M = 1e-6
 """Grid size to which coordinates of derived geometry are rounded. The grid makes unions and differences
@@ -97,7 +97,7 @@ def extract_polygons(geometry: BaseGeometry) -> MultiPolygon:
     return MultiPolygon([shapely.orient_polygons(polygon) for polygon in polygons])
 
 
-def find_nearest_inside(area: Any, positions: Array) -> Array:
+def find_nearest_inside(area: Any, positions: FloatArray) -> FloatArray:
     """Find the points of an area that are nearest to given positions.
 
     Parameters

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, Point, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment.packing import (
     bound_point_count,
@@ -23,6 +23,7 @@ from robocov.environment.packing import (
     pack_randomly,
 )
 from robocov.errors import StartError, format_count, is_number, quote
+from robocov.typing import FloatArray, Point
 
 MIN_START_GAP_RADII = 0.02
 """Half of the minimum gap between two robots at the start, and the minimum gap between robots and walls, as a
@@ -139,7 +140,7 @@ class Start:
     spec: StartSpec
     free: BaseGeometry
 
-    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS_M) -> Array:
+    def sample(self, n: int, seed: int = 0, radius: float = DEFAULT_RADIUS_M) -> FloatArray:
         """Sample positions at which the robots touch neither walls nor each other.
 
         Parameters
@@ -246,7 +247,7 @@ class Start:
             f"Try {', '.join(suggestions)} or another map."
         )
 
-    def _take_given_positions(self, n: int, radius: float, positions: Sequence[Point]) -> Array:
+    def _take_given_positions(self, n: int, radius: float, positions: Sequence[Point]) -> FloatArray:
         if n > len(positions):
             raise self._build_error(
                 f"expected at most {format_count(len(positions), 'robot')}, one for each of its positions, "
@@ -257,7 +258,7 @@ class Start:
         self._require_apart(points, radius)
         return points
 
-    def _require_free(self, points: Array, radius: float) -> None:
+    def _require_free(self, points: FloatArray, radius: float) -> None:
         distances = shapely.distance(shapely.points(points), self.free.boundary)
         is_inside = shapely.contains_properly(self.free, shapely.points(points))
         for k in np.flatnonzero(~is_inside | (distances < radius)).tolist():
@@ -269,7 +270,7 @@ class Start:
                 f"expected at least the radius of the robot, {radius:g} m"
             )
 
-    def _require_apart(self, points: Array, radius: float) -> None:
+    def _require_apart(self, points: FloatArray, radius: float) -> None:
         offsets = points[:, None] - points[None]
         distances = compute_lengths(offsets)
         np.fill_diagonal(distances, np.inf)
@@ -316,7 +317,7 @@ def compute_start_spacing(radius: float) -> float:
     return 2.0 * radius * (1.0 + MIN_START_GAP_RADII)
 
 
-def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> Array:
+def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing: float) -> FloatArray:
     """Return n random points that are at least `spacing` apart, or fewer if no more are found.
 
     Three methods are tried in turn: a random packing, a random lattice, and the dense packing that

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robocov.errors import InputError, OutputError
 from robocov.files.cache_folders import find_cache_root, is_private
 from robocov.files.writing import replace_file
+from robocov.typing import AnyArray
 
 MAX_BYTES = 2_000_000_000
 """Default limit for the total size of the arrays of one file: about the largest run that the application
@@ -54,7 +54,7 @@ _ABANDONED_S = 24 * 3600.0
 """Age from which a partly written file counts as abandoned."""
 
 
-def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) -> dict[str, NDArray[Any]]:
+def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) -> dict[str, AnyArray]:
     """Read the arrays of an .npz file.
 
     Parameters
@@ -201,7 +201,7 @@ class ArrayCache:
             digest.update(b"%s %d\n" % (type(part).__name__.encode(), len(data)) + data)
         return digest.hexdigest()
 
-    def load(self, key: str) -> dict[str, NDArray[Any]] | None:
+    def load(self, key: str) -> dict[str, AnyArray] | None:
         """Load the arrays of a key.
 
         Parameters
@@ -233,7 +233,7 @@ class ArrayCache:
             return arrays
         return None
 
-    def save(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def save(self, key: str, arrays: Mapping[str, AnyArray]) -> None:
         """Save arrays under a key, if possible.
 
         Parameters

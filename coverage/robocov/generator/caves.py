@@ -16,9 +16,10 @@ from scipy.cluster.hierarchy import DisjointSet
 from shapely import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.environment import DiscStart, Gap, Obstacle, PolygonObstacle, Ring, find_narrow_gaps
 from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE, MapRequest
+from robocov.typing import FloatArray
 
 # Lengths in spacings are multiples of `MapRequest.mean_spacing`, the side of a square of which each chamber
 # has one. Lengths in sides are multiples of the shorter side of the map.
@@ -116,14 +117,14 @@ def build_cave(
     return None
 
 
-def _compute_border_rise(request: MapRequest, points: Array) -> Array:
+def _compute_border_rise(request: MapRequest, points: FloatArray) -> FloatArray:
     """Return the height by which the field is raised at each point, depending on its boundary distance."""
     upper_right = points[-1, -1]
     distances = np.minimum(points, upper_right - points).min(axis=-1)
     return np.asarray(_BORDER_RISE * np.exp(-((distances / (_BORDER_SPACINGS * request.mean_spacing)) ** 2)))
 
 
-def _compute_start_depth(request: MapRequest, corner_disc: DiscStart, points: Array) -> Array:
+def _compute_start_depth(request: MapRequest, corner_disc: DiscStart, points: FloatArray) -> FloatArray:
     """Return the depth by which the field is lowered at each point, depending on its start distance."""
     distances = compute_lengths(points - np.array(corner_disc.center))
     return np.asarray(_START_DEPTH * np.exp(-((distances / (_START_SPACINGS * request.mean_spacing)) ** 2)))
@@ -150,7 +151,7 @@ class _CaveBuilder:
     min_radius: float
     start_area: BaseGeometry
 
-    def build_core(self, points: Array, values: Array, seed: int) -> BaseGeometry:
+    def build_core(self, points: FloatArray, values: FloatArray, seed: int) -> BaseGeometry:
         """Build the core of a cave: the connected area where the center of a robot may be.
 
         The core consists of chambers, an area around the start, and tunnels that connect them. The chambers
@@ -215,7 +216,7 @@ def _build_inner_rectangle(request: MapRequest, distance: float) -> Polygon:
     return shapely.box(offset, offset, width - offset, height - offset)
 
 
-def _choose_core(builder: _CaveBuilder, points: Array, values: Array, seed: int) -> BaseGeometry:
+def _choose_core(builder: _CaveBuilder, points: FloatArray, values: FloatArray, seed: int) -> BaseGeometry:
     """Choose the level of the field at which about the requested fraction is blocked; return the core.
 
     The chambers of the core are the areas where the field is below the level. A higher level enlarges the
@@ -268,7 +269,7 @@ def _build_obstacles(request: MapRequest, outline: Ring, pillars: list[Ring]) ->
     return [rock, *(PolygonObstacle(ring, name="pillar") for ring in pillars)]
 
 
-def draw_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[Array, Array]:
+def draw_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Draw a smooth random field of mean 0 and variance 1.
 
     Parameters
@@ -308,7 +309,7 @@ def draw_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[Ar
     return points, values * math.sqrt(2.0 / _WAVE_COUNT)
 
 
-def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
+def extract_area_below_zero(points: FloatArray, values: FloatArray) -> BaseGeometry:
     """Extract the area in which a scalar field, given at the points of a mesh, is negative.
 
     Parameters
@@ -333,7 +334,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     raised_values[1:-1, 1:-1] = values[1:-1, 1:-1]
     values = raised_values
 
-    def find_crossings(start: tuple[slice, slice], end: tuple[slice, slice]) -> Array:
+    def find_crossings(start: tuple[slice, slice], end: tuple[slice, slice]) -> FloatArray:
         """Return the points at which edges of the mesh cross 0, (..., 2) m; nan if they do not."""
         start_values = values[start]
         end_values = values[end]
@@ -354,7 +355,7 @@ def extract_area_below_zero(points: Array, values: Array) -> BaseGeometry:
     return shapely.build_area(shapely.multilinestrings(shapely.linestrings(segments)))
 
 
-def build_tunnels(components: Array, rng: np.random.Generator) -> list[LineString]:
+def build_tunnels(components: FloatArray, rng: np.random.Generator) -> list[LineString]:
     """Build tunnels that connect all components, along the edges of a minimum spanning tree.
 
     Parameters

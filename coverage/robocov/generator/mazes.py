@@ -19,9 +19,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import shapely
 
-from robocov.arrays import BoolArray, IntArray
 from robocov.environment import DiscStart, Obstacle, WallObstacle
 from robocov.generator.request import BLOCKED_FRACTION_TOLERANCE, MapRequest
+from robocov.typing import BoolArray, IntArray
 
 Post: TypeAlias = tuple[int, int]
 """Indices of the vertical and of the horizontal line that cross at a post."""

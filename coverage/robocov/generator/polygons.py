@@ -6,9 +6,9 @@ from collections import deque
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import DiscStart, Obstacle, PolygonObstacle
 from robocov.generator.request import MapRequest
+from robocov.typing import FloatArray
 
 SHAPE_PROBABILITIES = {"convex": 0.6, "L": 0.2, "U": 0.2}
 """Probabilities of the shapes of obstacles. A U whose opening would be narrower than the gap becomes an L."""
@@ -99,7 +99,7 @@ def scatter_polygons(
     return [PolygonObstacle(tuple(outline.exterior.coords[:-1])) for outline in outlines]
 
 
-def _are_too_large(areas: Array, request: MapRequest) -> bool:
+def _are_too_large(areas: FloatArray, request: MapRequest) -> bool:
     """Return whether obstacles fill too much of the map even as discs, which need the least space."""
     radii = np.sqrt(areas / np.pi) + request.gap / 2.0
     filled_area = float((np.pi * radii**2).sum())
@@ -111,7 +111,7 @@ def _place_shape(
     request: MapRequest,
     shape: str,
     area: float,
-    placed_outlines: Array,
+    placed_outlines: FloatArray,
     start_disc: shapely.Polygon,
     rng: np.random.Generator,
 ) -> shapely.Polygon | None:
@@ -150,7 +150,7 @@ def _place_shape(
     return None
 
 
-def _draw_shape(request: MapRequest, shape: str, area: float, rng: np.random.Generator) -> Array:
+def _draw_shape(request: MapRequest, shape: str, area: float, rng: np.random.Generator) -> FloatArray:
     """Draw a random outline of a shape, (k, 2) m.
 
     The outline is an L if the opening of a U would be narrower than the gap.
@@ -164,7 +164,7 @@ def _draw_shape(request: MapRequest, shape: str, area: float, rng: np.random.Gen
     return draw_l_shape(rng, area)
 
 
-def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
+def draw_convex_polygon(rng: np.random.Generator, area: float) -> FloatArray:
     """Draw a random convex polygon that is usually not thin; its 3 to 7 vertices lie on an ellipse.
 
     Parameters
@@ -193,7 +193,7 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> Array:
     return _scale_and_rotate(outline, area, rng)
 
 
-def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
+def draw_l_shape(rng: np.random.Generator, area: float) -> FloatArray:
     """Draw a random outline of an L of the given area, in a random direction.
 
     Parameters
@@ -225,7 +225,7 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> Array:
     return _scale_and_rotate(outline, area, rng)
 
 
-def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> Array | None:
+def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> FloatArray | None:
     """Draw a random outline of a U of the given area, in a random direction. The arms may differ in length.
 
     Parameters
@@ -268,7 +268,7 @@ def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> A
     return None
 
 
-def _scale_and_rotate(outline: Array, area: float, rng: np.random.Generator) -> Array:
+def _scale_and_rotate(outline: FloatArray, area: float, rng: np.random.Generator) -> FloatArray:
     """Scale an outline to an area, rotate it at random, and center its bounding box at the origin."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MIN_START_GAP_RADII, Ring
 from robocov.errors import require_number
+from robocov.typing import FloatArray
 
 MIN_GAP_M = 0.21
 """Smallest gap that may be requested: robots of the default size fit through it."""
@@ -69,7 +69,7 @@ class MapRequest:
         require_number("gap", self.gap, MIN_GAP_M, min(self.width, self.height) / _MIN_GAPS_PER_SIDE)
 
     @property
-    def size(self) -> Array:
+    def size(self) -> FloatArray:
         """Width and height, (2,) m."""
         return np.array([self.width, self.height])
 
@@ -98,7 +98,7 @@ class MapRequest:
         """Width of gaps between unrounded corners, m. After rounding, they are at least `gap` wide."""
         return self.gap + _ROUNDING_ALLOWANCE_STEPS * self.rounding_step
 
-    def round_points(self, points: Array) -> Array:
+    def round_points(self, points: FloatArray) -> FloatArray:
         """Round coordinates to the decimal places of the map.
 
         Parameters
@@ -113,7 +113,7 @@ class MapRequest:
         # Adding 0.0 turns -0.0 into 0.0.
         return np.round(points, self.decimals) + 0.0
 
-    def build_ring(self, points: Array) -> Ring:
+    def build_ring(self, points: FloatArray) -> Ring:
         """Build the outline of an obstacle from points, which are rounded first.
 
         Parameters

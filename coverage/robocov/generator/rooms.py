@@ -13,9 +13,9 @@ import shapely
 from scipy.cluster.hierarchy import DisjointSet
 from shapely import Polygon
 
-from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.generator.request import MapRequest
+from robocov.typing import FloatArray
 
 # Lengths in spacings are multiples of `MapRequest.mean_spacing`, the side of a square room of mean area.
 # Lengths in gaps are multiples of `MapRequest.gap`.
@@ -565,7 +565,7 @@ class _FurniturePiece(NamedTuple):
     """
 
     kind: str
-    size: Array
+    size: FloatArray
 
     @property
     def is_round(self) -> bool:
@@ -589,7 +589,7 @@ def _draw_piece(request: MapRequest, area: float, rng: np.random.Generator) -> _
 
 def _draw_piece_corners(
     request: MapRequest, piece: _FurniturePiece, room: Box, rng: np.random.Generator
-) -> Array | None:
+) -> FloatArray | None:
     """Draw positions of a piece in a room at which the piece touches each wall or keeps the gap from it.
 
     A cabinet stands against a wall with its longer side. A round table touches no wall.

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.geodesic.box_tree import (
     END_OF_TREE,
@@ -45,6 +44,7 @@ from robocov.geodesic.walls import (
     find_vertex,
     get_relative_ends,
 )
+from robocov.typing import FloatArray, IntArray
 
 _ANGLE_PADDING = 1e-9
 """Margin by which the range of pseudo-angles of a wall or a box is widened, far larger than rounding
@@ -87,14 +87,14 @@ class AngularWallIndex(NamedTuple):
     The bins cover a full turn. Each contains a linked list of entries, one for each wall in these directions.
     """
 
-    positions: Array
+    positions: FloatArray
     """(n, 2) Positions of the sources."""
-    squared_ranges: Array
+    squared_ranges: FloatArray
     """(n,) Squares of the distances up to which the walls around each source are in the index."""
-    squared_clear_distances: Array
+    squared_clear_distances: FloatArray
     """(n, bins) Squares of the distances up to which no point is hidden by a wall. If the source is at a
     vertex, they are `_SOURCE_AT_VERTEX`."""
-    squared_horizons: Array
+    squared_horizons: FloatArray
     """(n, bins) Squares of the distances beyond which every point is hidden."""
     heads: IntArray
     """(n, bins) The entry that was last added to each bin, or `NO_ENTRY`."""
@@ -176,7 +176,7 @@ def compute_pseudo_angle(dx: float, dy: float) -> float:
 
 
 @kernel
-def is_box_hidden(boxes: Array, box: int, index: AngularWallIndex, source: int) -> bool:
+def is_box_hidden(boxes: FloatArray, box: int, index: AngularWallIndex, source: int) -> bool:
     """Return whether a box is certainly hidden from a source by walls.
 
     The directions from the source are divided into angular bins. In each bin, walls hide everything beyond
@@ -298,7 +298,7 @@ def add_walls(
 
 
 @kernel
-def _push_children(stack: IntArray, stack_size: int, tree: Array, node: int, x: float, y: float) -> int:
+def _push_children(stack: IntArray, stack_size: int, tree: FloatArray, node: int, x: float, y: float) -> int:
     """Push the two children of a node on the stack, the nearer one last; return the new size of the stack.
 
     The nearer child is then visited first, because its walls may hide the box of the other child.
@@ -582,7 +582,7 @@ def _is_visible_past_walls(
 
 
 @kernel
-def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
+def _hides(ends: FloatArray, wall: int, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether a wall that faces (x, y) hides the point at offset (dx, dy) from there."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     # The point is behind the wall, and its direction is between those of the ends of the wall.
@@ -594,7 +594,7 @@ def _hides(ends: Array, wall: int, x: float, y: float, dx: float, dy: float) -> 
 
 
 @kernel
-def _faces(ends: Array, wall: int, x: float, y: float) -> bool:
+def _faces(ends: FloatArray, wall: int, x: float, y: float) -> bool:
     """Return whether (x, y) is in front of a wall, or in its interior."""
     ax, ay, bx, by = get_relative_ends(ends, wall, x, y)
     side: float = cross(ax, ay, bx - ax, by - ay)
@@ -628,7 +628,7 @@ def _is_segment_free(walls: Walls, x: float, y: float, dx: float, dy: float) -> 
 
 
 @kernel
-def _is_box_off_segment(tree: Array, node: int, x: float, y: float, dx: float, dy: float) -> bool:
+def _is_box_off_segment(tree: FloatArray, node: int, x: float, y: float, dx: float, dy: float) -> bool:
     """Return whether the box of a node certainly does not meet the segment from (x, y) to (x + dx, y + dy).
 
     By the separating axis theorem, the two do not meet if they are apart in x, in y, or in the direction

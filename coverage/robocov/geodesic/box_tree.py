@@ -11,8 +11,8 @@ nodes below a box that is too far away: `skip_subtree` returns the next node, or
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
+from robocov.typing import FloatArray, IntArray
 
 ROOT = 1
 """The node that contains all items."""
@@ -32,7 +32,7 @@ Z_ORDER_BITS = 16
 """Number of bits of each coordinate in `compute_z_order`."""
 
 
-def build_box_tree(low: Array, high: Array) -> Array:
+def build_box_tree(low: FloatArray, high: FloatArray) -> FloatArray:
     """Build a binary tree of bounding boxes, in which each box contains the boxes of its two children.
 
     Parameters
@@ -91,13 +91,13 @@ def compute_z_order(columns: IntArray, rows: IntArray) -> IntArray:
 
 
 @kernel
-def _get_first_leaf(tree: Array) -> int:
+def _get_first_leaf(tree: FloatArray) -> int:
     """Return the first node that is a leaf: the leaves are the second half of the nodes."""
     return len(tree) // 2
 
 
 @kernel
-def is_leaf(tree: Array, node: int) -> bool:
+def is_leaf(tree: FloatArray, node: int) -> bool:
     """Return whether a node is a leaf.
 
     Parameters
@@ -113,7 +113,7 @@ def is_leaf(tree: Array, node: int) -> bool:
 
 
 @kernel
-def get_first_item(tree: Array, leaf: int) -> int:
+def get_first_item(tree: FloatArray, leaf: int) -> int:
     """Return the index of the first of the `LEAF_SIZE` items of a leaf.
 
     Parameters
@@ -131,7 +131,7 @@ def get_first_item(tree: Array, leaf: int) -> int:
 
 
 @kernel
-def get_leaf(tree: Array, item: int) -> int:
+def get_leaf(tree: FloatArray, item: int) -> int:
     """Return the leaf that contains an item.
 
     Parameters
@@ -185,7 +185,7 @@ def skip_subtree(node: int) -> int:
 
 
 @kernel
-def compute_squared_box_distance(boxes: Array, box: int, x: float, y: float) -> float:
+def compute_squared_box_distance(boxes: FloatArray, box: int, x: float, y: float) -> float:
     """Compute the squared distance from a point to a box.
 
     Parameters

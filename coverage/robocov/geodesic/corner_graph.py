@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import (
     NO_SPACE,
@@ -27,6 +26,7 @@ from robocov.geodesic.box_tree import (
     skip_subtree,
 )
 from robocov.geodesic.walls import Walls, can_bend_at_corner
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 NO_CORNER = -1
 """Used in place of a corner if a path is straight, and does not bend."""
@@ -42,14 +42,14 @@ class CornerGraph(NamedTuple):
     """(k + 1,) The links of corner i are those from ``link_starts[i]`` up to ``link_starts[i + 1]``."""
     neighbors: IntArray
     """(l,) The corner to which each link leads."""
-    lengths: Array
+    lengths: FloatArray
     """(l,) Length of each link, grid steps."""
 
 
 class CornerPaths(NamedTuple):
     """Paths from several sources to all k corners, one for each corner; in the end, the shortest ones."""
 
-    lengths: Array
+    lengths: FloatArray
     """(k,) Length of each path, grid steps; inf if there is none."""
     sources: IntArray
     """(k,) The source at which each path starts."""
@@ -102,7 +102,7 @@ class CornerQueue(NamedTuple):
         return cls(corners=np.empty(corner_count + 1, np.int64), is_waiting=np.empty(corner_count, np.bool_))
 
 
-def build_corner_graph(corner_count: int, pairs: IntArray, lengths: Array) -> CornerGraph:
+def build_corner_graph(corner_count: int, pairs: IntArray, lengths: FloatArray) -> CornerGraph:
     """Build the graph of corners from the pairs of linked corners.
 
     Parameters
@@ -185,7 +185,7 @@ def find_links(
     end: int,
     index: AngularWallIndex,
     pairs: IntArray,
-    lengths: Array,
+    lengths: FloatArray,
 ) -> int:
     """Find the corners with higher indices to which each corner of a range is linked.
 

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.compiled import kernel
 from robocov.environment import GRID_M, Environment
 from robocov.errors import InputError
@@ -26,6 +26,7 @@ from robocov.geodesic.corner_graph import (
 )
 from robocov.geodesic.integer_grid import Grid
 from robocov.geodesic.walls import Walls, build_walls, count_windings
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _Result = TypeVar("_Result")
 
@@ -58,7 +59,7 @@ class CornerComputation(Protocol):
     """
 
     def __call__(
-        self, first: int, end: int, wall_index: AngularWallIndex, indices: IntArray, lengths: Array, /
+        self, first: int, end: int, wall_index: AngularWallIndex, indices: IntArray, lengths: FloatArray, /
     ) -> int:
         """Write rows of `indices` and `lengths`, and return their number."""
 
@@ -136,7 +137,7 @@ class Geodesics:
         index_columns: int,
         length_columns: int,
         progress: Callable[[float], None] | None = None,
-    ) -> tuple[IntArray, Array]:
+    ) -> tuple[IntArray, FloatArray]:
         """Compute two tables with rows for all corners, in batches of corners.
 
         Parameters
@@ -171,17 +172,17 @@ class Geodesics:
 
     def _run_for_batch(
         self,
-        compute: Callable[[AngularWallIndex, IntArray, Array], int],
+        compute: Callable[[AngularWallIndex, IntArray, FloatArray], int],
         index_columns: int,
         length_columns: int,
-    ) -> tuple[IntArray, Array]:
+    ) -> tuple[IntArray, FloatArray]:
         """Return the rows of `indices` and `lengths` that a computation writes for one batch of corners.
 
         The computation returns the number of rows, or `NO_SPACE` if the tables or the wall index are too
         small. It is then repeated with more space.
         """
 
-        def compute_rows(wall_index: AngularWallIndex) -> tuple[IntArray, Array] | None:
+        def compute_rows(wall_index: AngularWallIndex) -> tuple[IntArray, FloatArray] | None:
             """Return the indices and lengths; None if there is not enough space."""
             # The tables get as many rows as the index has entries, so that all of them grow together.
             max_rows = len(wall_index.entry_walls)
@@ -222,7 +223,7 @@ class Geodesics:
                 return result
             self._entries_per_source[bin_count] *= 2
 
-    def snap_to_free_space(self, points: Array, name: str = "positions") -> tuple[Array, BoolArray]:
+    def snap_to_free_space(self, points: FloatArray, name: str = "positions") -> tuple[FloatArray, BoolArray]:
         """Convert points of the free space to grid coordinates.
 
         Points that are only slightly outside the free space (2 µm plus 1e-9 of the map's size) are moved to
@@ -259,7 +260,7 @@ class Geodesics:
             is_inside[i] = self.count_windings(grid_positions[i : i + 1])[0] > 0
         return grid_positions, is_inside
 
-    def _move_inside(self, point: Array, name: str) -> Array:
+    def _move_inside(self, point: FloatArray, name: str) -> FloatArray:
         """Return the free grid point nearest to a point in meters; raise InputError if it is too far away."""
         coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
         if not np.isfinite(point).all():
@@ -274,7 +275,7 @@ class Geodesics:
             )
         return nearest
 
-    def count_windings(self, grid_positions: Array) -> IntArray:
+    def count_windings(self, grid_positions: FloatArray) -> IntArray:
         """Compute the winding number of the boundary of each component of the free space around points.
 
         Parameters
@@ -292,7 +293,7 @@ class Geodesics:
         count_windings(self.walls, np.ascontiguousarray(grid_positions), windings)
         return windings
 
-    def _find_nearest_free(self, grid_position: Array) -> Array:
+    def _find_nearest_free(self, grid_position: FloatArray) -> FloatArray:
         """Return the nearest grid point of the closed free space, or one that is a few steps farther away."""
         line = shapely.shortest_line(self.free, shapely.Point(grid_position))
         foot = np.rint(shapely.get_coordinates(line)[0])
@@ -307,7 +308,7 @@ class Geodesics:
         distances = compute_lengths(free_points - grid_position)
         return np.asarray(free_points[distances.argmin()])
 
-    def compute_distances(self, sources: Array, targets: Array) -> Array:
+    def compute_distances(self, sources: FloatArray, targets: FloatArray) -> FloatArray:
         """Compute the geodesic distances from each source to each target.
 
         Parameters
@@ -330,7 +331,7 @@ class Geodesics:
         ends, _ = self.snap_to_free_space(targets, "targets")
         return self.compute_grid_distances(starts, ends) * self.grid.spacing
 
-    def compute_grid_distances(self, sources: Array, targets: Array) -> Array:
+    def compute_grid_distances(self, sources: FloatArray, targets: FloatArray) -> FloatArray:
         """Compute the geodesic distances from each source to each target, in grid coordinates.
 
         Parameters
@@ -357,8 +358,8 @@ class Geodesics:
         return distances
 
     def _compute_corner_distances(
-        self, grid_positions: Array, *, must_be_straight: bool
-    ) -> tuple[AngularWallIndex, Array, CornerPaths]:
+        self, grid_positions: FloatArray, *, must_be_straight: bool
+    ) -> tuple[AngularWallIndex, FloatArray, CornerPaths]:
         """Compute the geodesic distances from n grid points to the k corners of the walls.
 
         With `must_be_straight`, the distance is infinite unless a straight path leads from the point to the
@@ -381,7 +382,7 @@ class Geodesics:
         )
         return index, distances, paths
 
-    def find_path(self, source: Array, target: Array) -> Array:
+    def find_path(self, source: FloatArray, target: FloatArray) -> FloatArray:
         """Find a shortest path between two points.
 
         Parameters
@@ -428,9 +429,9 @@ def _find_corner_distances(
     walls: Walls,
     index: AngularWallIndex,
     graph: CornerGraph,
-    points: Array,
+    points: FloatArray,
     must_be_straight: bool,
-    distances: Array,
+    distances: FloatArray,
     paths: CornerPaths,
 ) -> bool:
     """Write the distances from (n, 2) points to the corners, (n, k), along shortest paths around the walls.
@@ -485,10 +486,10 @@ def _start_straight_paths(
 def _combine_distances(
     walls: Walls,
     index: AngularWallIndex,
-    from_sources: Array,
-    targets: Array,
-    to_targets: Array,
-    distances: Array,
+    from_sources: FloatArray,
+    targets: FloatArray,
+    to_targets: FloatArray,
+    distances: FloatArray,
 ) -> None:
     """Write the distances from the sources of an index to (m, 2) targets, (n, m).
 

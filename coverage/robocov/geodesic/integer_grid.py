@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.compiled import kernel
+from robocov.typing import FloatArray
 
 GRID_BITS = 48
 """Number of bits of a coordinate: the square around the map is at most 2**48 grid steps wide.
@@ -35,11 +35,11 @@ class Grid:
         Length of a grid step. It is a power of two, so that multiplying by it does not round.
     """
 
-    origin: Array
+    origin: FloatArray
     spacing: float
 
     @classmethod
-    def from_square(cls, low: Array, side: float) -> Grid:
+    def from_square(cls, low: FloatArray, side: float) -> Grid:
         """Build the finest grid on which a square is at most 2**48 steps wide; the step is a power of two.
 
         Parameters
@@ -63,7 +63,7 @@ class Grid:
         side_exponent = math.ceil(math.log2(side))
         return cls(origin=np.asarray(low, dtype=float), spacing=2.0 ** (side_exponent - GRID_BITS))
 
-    def snap(self, points: Array) -> Array:
+    def snap(self, points: FloatArray) -> FloatArray:
         """Round points to the grid.
 
         Parameters
@@ -77,7 +77,7 @@ class Grid:
         """
         return np.rint((points - self.origin) / self.spacing)
 
-    def to_meters(self, points: Array) -> Array:
+    def to_meters(self, points: FloatArray) -> FloatArray:
         """Convert points from grid coordinates to meters.
 
         Parameters
@@ -118,7 +118,7 @@ def cross(ux: float, uy: float, vx: float, vy: float) -> float:
     return value
 
 
-def compute_crosses(u: Array, v: Array) -> Array:
+def compute_crosses(u: FloatArray, v: FloatArray) -> FloatArray:
     """Compute the cross products of many pairs of vectors with their exact signs; see `cross`.
 
     Parameters

@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.box_tree import (
     END_OF_TREE,
@@ -27,6 +26,7 @@ from robocov.geodesic.box_tree import (
     skip_subtree,
 )
 from robocov.geodesic.integer_grid import GRID_BITS, compute_crosses, cross
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 START_X = 0
 """Column of `Walls.ends`: x of the start of a wall."""
@@ -65,7 +65,7 @@ class Walls(NamedTuple):
     turn is a corner too. A vertex has at most one corner.
     """
 
-    ends: Array
+    ends: FloatArray
     """(w, 4) Start and end of each wall; for the columns, see `START_X`. The walls are sorted so that nearby
     ones have nearby indices."""
     next_walls: IntArray
@@ -74,29 +74,29 @@ class Walls(NamedTuple):
     """(w,) The component of the free space that each wall bounds."""
     can_hide_free_space: BoolArray
     """(w,) Whether free space can be behind each wall; false for walls on the convex hull of the map."""
-    tree: Array
+    tree: FloatArray
     """The box tree of the walls."""
-    vertices: Array
+    vertices: FloatArray
     """(v, 2) Vertices, sorted by x, then by y."""
     sector_starts: IntArray
     """(v + 1,) The sectors of vertex k are those from ``sector_starts[k]`` up to ``sector_starts[k + 1]``."""
-    sector_walls: Array
+    sector_walls: FloatArray
     """(s, 4) Directions of the incoming and the outgoing wall of each sector; for the columns, see
     `INCOMING_X`."""
     sector_is_corner: BoolArray
     """(s,) Whether each sector is a corner."""
-    corners: Array
+    corners: FloatArray
     """(k, 2) Positions of the corners, sorted so that nearby ones have nearby indices."""
-    corner_walls: Array
+    corner_walls: FloatArray
     """(k, 4) Directions of the incoming and the outgoing wall of each corner, like `sector_walls`."""
-    corner_tree: Array
+    corner_tree: FloatArray
     """The box tree of the corners."""
 
 
 class _Segments(NamedTuple):
     """Walls as pairs of vertices."""
 
-    vertices: Array
+    vertices: FloatArray
     """(v, 2) grid steps, sorted by x, then by y."""
     starts: IntArray
     """(w,) Index of the vertex where each wall starts."""
@@ -189,7 +189,7 @@ def _sort_spatially(segments: _Segments) -> _Segments:
     )
 
 
-def _compute_spatial_order(points: Array) -> IntArray:
+def _compute_spatial_order(points: FloatArray) -> IntArray:
     """Return the indices that sort (n, 2) points, in grid steps, along a Z-order curve."""
     # The highest bits of the coordinates say in which cell of a coarse grid a point is.
     cells = (points * 2.0 ** (Z_ORDER_BITS - GRID_BITS)).clip(0, 2**Z_ORDER_BITS - 1).astype(np.int64)
@@ -222,12 +222,12 @@ def _find_sectors(segments: _Segments) -> _Sectors:
     return _Sectors(sector_vertices, incoming_starts, outgoing_ends)
 
 
-def _compute_angles(vectors: Array) -> Array:
+def _compute_angles(vectors: FloatArray) -> FloatArray:
     """Return the angles of (n, 2) vectors, (n,) rad."""
     return np.asarray(np.arctan2(vectors[:, 1], vectors[:, 0]))
 
 
-def _find_corners(sector_vertices: IntArray, incoming: Array, outgoing: Array) -> BoolArray:
+def _find_corners(sector_vertices: IntArray, incoming: FloatArray, outgoing: FloatArray) -> BoolArray:
     """Find the sectors that are corners, given their vertices and the directions of their walls.
 
     A sector, the wedge of free space between an incoming and an outgoing wall, is a corner if it is wider
@@ -263,7 +263,7 @@ def _find_hull_walls(segments: _Segments) -> BoolArray:
 
 
 @kernel
-def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float, float, float, float]:
+def get_relative_ends(ends: FloatArray, wall: int, x: float, y: float) -> tuple[float, float, float, float]:
     """Return the ends of a wall relative to a point.
 
     Parameters
@@ -284,7 +284,9 @@ def get_relative_ends(ends: Array, wall: int, x: float, y: float) -> tuple[float
 
 
 @kernel
-def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: float, y: float) -> bool:
+def can_bend_at_corner(
+    corners: FloatArray, corner_walls: FloatArray, corner: int, x: float, y: float
+) -> bool:
     """Return whether a shortest path that bends at a corner can come straight from a point, or go there.
 
     A corner is a wedge of free space wider than half a turn, between an incoming and an outgoing wall with
@@ -316,7 +318,7 @@ def can_bend_at_corner(corners: Array, corner_walls: Array, corner: int, x: floa
 
 
 @kernel
-def find_vertex(vertices: Array, x: float, y: float) -> int:
+def find_vertex(vertices: FloatArray, x: float, y: float) -> int:
     """Find the vertex that a point coincides with.
 
     Parameters
@@ -379,7 +381,7 @@ def contains_direction(walls: Walls, vertex: int, dx: float, dy: float) -> bool:
 
 
 @kernel
-def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
+def count_windings(walls: Walls, points: FloatArray, windings: IntArray) -> None:
     """Compute the winding number of the boundary of each component of the free space around points.
 
     The winding number is the number of walls to the right of a point that run up, minus the number of those
@@ -413,7 +415,7 @@ def count_windings(walls: Walls, points: Array, windings: IntArray) -> None:
 
 
 @kernel
-def _count_winding(ends: Array, wall: int, x: float, y: float) -> int:
+def _count_winding(ends: FloatArray, wall: int, x: float, y: float) -> int:
     """Return the contribution of a wall to the winding number of a point.
 
     It is 1 if the wall runs up to the right of the point, -1 if it runs down there, `_ON_BOUNDARY` if the

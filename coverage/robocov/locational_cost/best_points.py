@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.density import Density
 from robocov.errors import ParameterError, describe_unknown_name
@@ -24,6 +23,7 @@ from robocov.locational_cost.integrals import CellDerivatives, compute_derivativ
 from robocov.locational_cost.performance import Distance, Performance, Sensing, SquaredDistance
 from robocov.locational_cost.weighted_derivatives import compute_weighted_derivatives
 from robocov.observation import Cells
+from robocov.typing import BoolArray, FloatArray
 
 TARGETS = ("centroid", "sensing", "median")
 """Names of the targets: the best points for f = r² (12), for f = 1/(r²+h²) (14), and for f = r as in (22)."""
@@ -84,17 +84,17 @@ class _Search(NamedTuple):
         Fraction of each full step that leads to the trial point; nan before the first step.
     """
 
-    points: Array
-    trials: Array
+    points: FloatArray
+    trials: FloatArray
     is_active: BoolArray
-    clearances: Array
-    steps_x: Array
-    steps_y: Array
-    slopes: Array
-    fractions: Array
+    clearances: FloatArray
+    steps_x: FloatArray
+    steps_y: FloatArray
+    slopes: FloatArray
+    fractions: FloatArray
 
 
-def find_targets(cells: Cells, density: Density | None, target: str, height: float) -> Array:
+def find_targets(cells: Cells, density: Density | None, target: str, height: float) -> FloatArray:
     """Find the target of each robot: the best point of its cell.
 
     Parameters
@@ -136,7 +136,7 @@ def find_targets(cells: Cells, density: Density | None, target: str, height: flo
     return find_best_points(cells, f, density)
 
 
-def find_best_points(cells: Cells, f: Performance, density: Density | None = None) -> Array:
+def find_best_points(cells: Cells, f: Performance, density: Density | None = None) -> FloatArray:
     """Find the point of each cell at which the locational cost is best.
 
     Parameters
@@ -183,7 +183,9 @@ def find_best_points(cells: Cells, f: Performance, density: Density | None = Non
     return cells.generators + points
 
 
-def _search_uniform(cells: Cells, f: Performance, shapes: CellDerivatives, centroids: Array) -> Array:
+def _search_uniform(
+    cells: Cells, f: Performance, shapes: CellDerivatives, centroids: FloatArray
+) -> FloatArray:
     """Return the best points for density 1, (n, 2) m relative to the generators.
 
     `shapes` contains the shapes of the cells, and the clearances of their centroids.
@@ -199,8 +201,8 @@ def _search_uniform(cells: Cells, f: Performance, shapes: CellDerivatives, centr
 
 
 def _search_weighted(
-    cells: Cells, f: Performance, density: Density, shapes: CellDerivatives, centroids: Array
-) -> Array:
+    cells: Cells, f: Performance, density: Density, shapes: CellDerivatives, centroids: FloatArray
+) -> FloatArray:
     """Return the best points for a density that is not uniform, (n, 2) m relative to the generators.
 
     `shapes` contains the shapes of the cells, and the clearances of their centroids. Cells that are not
@@ -223,7 +225,7 @@ def _search_weighted(
     return search.points
 
 
-def _start_search(points: Array, is_active: BoolArray) -> _Search:
+def _start_search(points: FloatArray, is_active: BoolArray) -> _Search:
     """Return the state of a search that first tries the given points, (n, 2) m relative to the generators."""
     cell_count = len(points)
     return _Search(

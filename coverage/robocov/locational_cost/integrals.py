@@ -23,10 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import CellEdges
 from robocov.locational_cost.performance import DISTANCE, SENSING, SQUARED_DISTANCE, Performance
+from robocov.typing import FloatArray, IntArray
 
 _GAUSS_RULE = np.stack(np.polynomial.legendre.leggauss(16))
 """Gauss-Legendre rule with 16 nodes on [-1, 1]: the nodes, then the weights.
@@ -69,14 +69,14 @@ class CellDerivatives(NamedTuple):
         Area of each cell.
     """
 
-    x: Array
-    y: Array
-    xx: Array
-    xy: Array
-    yy: Array
-    clearances: Array
-    half_perimeters: Array
-    areas: Array
+    x: FloatArray
+    y: FloatArray
+    xx: FloatArray
+    xy: FloatArray
+    yy: FloatArray
+    clearances: FloatArray
+    half_perimeters: FloatArray
+    areas: FloatArray
 
 
 class _RelativeEdge(NamedTuple):
@@ -108,7 +108,7 @@ class _EdgeIntegral(NamedTuple):
     """∫ f'(r)/r d ds, the derivative of `total` with respect to d."""
 
 
-def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) -> Array:
+def compute_locational_costs(edges: CellEdges, points: FloatArray, f: Performance) -> FloatArray:
     """Compute the locational cost (4) of each cell, for density 1.
 
     Parameters
@@ -138,7 +138,7 @@ def compute_locational_costs(edges: CellEdges, points: Array, f: Performance) ->
     return _sum_edge_costs(edges.starts, edges.ends, edges.cells, points, f.kind, f.height, _GAUSS_RULE)
 
 
-def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
+def compute_gradients(edges: CellEdges, points: FloatArray, f: Performance) -> FloatArray:
     """Compute the gradient of the locational cost of each cell with respect to its point, for density 1.
 
     The cells do not move with the points.
@@ -162,7 +162,7 @@ def compute_gradients(edges: CellEdges, points: Array, f: Performance) -> Array:
     return np.column_stack([derivatives.x, derivatives.y])
 
 
-def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> CellDerivatives:
+def compute_derivatives(edges: CellEdges, points: FloatArray, f: Performance) -> CellDerivatives:
     """Compute the derivatives of the locational cost of each cell with respect to its point, for density 1.
 
     The cells do not move with the points.
@@ -183,7 +183,7 @@ def compute_derivatives(edges: CellEdges, points: Array, f: Performance) -> Cell
 
 @kernel
 def _sum_derivatives(
-    starts: Array, ends: Array, cells: IntArray, points: Array, kind: int, height: float
+    starts: FloatArray, ends: FloatArray, cells: IntArray, points: FloatArray, kind: int, height: float
 ) -> CellDerivatives:
     """Return the gradients and Hessians of the costs, and the shapes of the cells.
 
@@ -252,7 +252,7 @@ def _add_edge(sums: CellDerivatives, i: int, edge: _RelativeEdge, integral: _Edg
 
 
 @kernel
-def _compute_relative_edge(starts: Array, ends: Array, k: int, x: float, y: float) -> _RelativeEdge:
+def _compute_relative_edge(starts: FloatArray, ends: FloatArray, k: int, x: float, y: float) -> _RelativeEdge:
     """Return edge k relative to the point (x, y)."""
     along_x = ends[k, 0] - starts[k, 0]
     along_y = ends[k, 1] - starts[k, 1]
@@ -362,8 +362,14 @@ def _subtract_arctan(x: float) -> float:
 
 @kernel
 def _sum_edge_costs(
-    starts: Array, ends: Array, cells: IntArray, points: Array, kind: int, height: float, rule: Array
-) -> Array:
+    starts: FloatArray,
+    ends: FloatArray,
+    cells: IntArray,
+    points: FloatArray,
+    kind: int,
+    height: float,
+    rule: FloatArray,
+) -> FloatArray:
     """Return the cost of each cell: the sum of the integrals of f over triangles from the point to the edges.
 
     An edge is at the distance d from the point, and s runs along it from s1 to s2, so that r² = s² + d². Let
@@ -393,7 +399,7 @@ def _sum_edge_costs(
 
 
 @kernel
-def _add_sensing_cost(sums: Array, i: int, edge: _RelativeEdge, height: float, rule: Array) -> None:
+def _add_sensing_cost(sums: FloatArray, i: int, edge: _RelativeEdge, height: float, rule: FloatArray) -> None:
     """Add to sum i the integral of 1/(r²+h²) over the triangle between a point and an edge.
 
     This is the integral of d F(r)/r² along the edge, where F(r) = ½ log(1 + r²/h²) is the integral of

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.density import Density
 from robocov.locational_cost.performance import Distance, Performance, Sensing
 from robocov.observation import Cells
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _NODES_ALONG = 16
 """Number of nodes along an edge."""
@@ -37,24 +37,29 @@ class WeightedDerivatives(NamedTuple):
         Entries of the Hessians.
     """
 
-    x: Array
-    y: Array
-    xx: Array
-    xy: Array
-    yy: Array
+    x: FloatArray
+    y: FloatArray
+    xx: FloatArray
+    xy: FloatArray
+    yy: FloatArray
 
 
 class _Nodes(NamedTuple):
     """The nodes of the quadrature in the triangles between e edges and the points of their cells."""
 
-    offsets: Array
+    offsets: FloatArray
     """(e, 16, 12, 2) Offset of each node from the point, by node along the edge and by node outward, m."""
-    weights: Array
+    weights: FloatArray
     """(e, 16, 12) Weight of each node, m²."""
 
 
 def compute_weighted_derivatives(
-    cells: Cells, density: Density, f: Performance, max_diameters: Array, points: Array, is_needed: BoolArray
+    cells: Cells,
+    density: Density,
+    f: Performance,
+    max_diameters: FloatArray,
+    points: FloatArray,
+    is_needed: BoolArray,
 ) -> WeightedDerivatives:
     """Compute the gradients and Hessians of weighted locational costs with respect to the points.
 
@@ -115,7 +120,7 @@ def compute_weighted_derivatives(
     )
 
 
-def _place_nodes(starts: Array, ends: Array, u_nodes: Array, u_weights: Array) -> _Nodes:
+def _place_nodes(starts: FloatArray, ends: FloatArray, u_nodes: FloatArray, u_weights: FloatArray) -> _Nodes:
     """Return the nodes in the triangles between edges and the points of their cells.
 
     The edges lead from `starts` to `ends`, (e, 2) m relative to the points. A node is on the segment from
@@ -131,13 +136,13 @@ def _place_nodes(starts: Array, ends: Array, u_nodes: Array, u_weights: Array) -
     return _Nodes(offsets, weights)
 
 
-def _build_gauss_rule(node_count: int) -> tuple[Array, Array]:
+def _build_gauss_rule(node_count: int) -> tuple[FloatArray, FloatArray]:
     """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(node_count)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
-def _build_outward_rule(f: Performance, max_diameters: Array) -> tuple[Array, Array]:
+def _build_outward_rule(f: Performance, max_diameters: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the nodes u from the point of each cell to its edges, and their weights, (n, 12) each.
 
     The weights include the factor u of the area element. For `Sensing`, the rule is a Gauss rule in x, where
@@ -154,6 +159,6 @@ def _build_outward_rule(f: Performance, max_diameters: Array) -> tuple[Array, Ar
     return nodes, nodes * weights
 
 
-def _sum_by_cell(integrand: Array, edge_cells: IntArray, cell_count: int) -> Array:
+def _sum_by_cell(integrand: FloatArray, edge_cells: IntArray, cell_count: int) -> FloatArray:
     """Return the sum of an integrand, (e, 16, 12), over the nodes of each cell, (n,)."""
     return np.asarray(np.bincount(edge_cells, integrand.sum(axis=(1, 2)), cell_count))

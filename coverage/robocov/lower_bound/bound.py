@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from scipy.optimize import Bounds, minimize
 
-from robocov.arrays import Array, BoolArray, IntArray, freeze
+from robocov.arrays import freeze
 from robocov.cost import CoverageCost
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import GRID_M, Environment, compute_center_areas
@@ -32,6 +32,7 @@ from robocov.lower_bound.profit_bounds import (
     halve_triangles,
 )
 from robocov.lower_bound.site_distances import SiteDistances
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 MIN_PRECISION = 1e-5
 """The smallest precision that may be requested."""
@@ -119,7 +120,7 @@ class LowerBound:
     mean_distance: float
     value: float
     placement_mean_distance: float
-    prices: Array
+    prices: FloatArray
 
     @property
     def gap(self) -> float:
@@ -131,7 +132,7 @@ class LowerBound:
 
 def compute_lower_bound(
     environment: Environment,
-    positions: Array,
+    positions: FloatArray,
     *,
     radius: float = DEFAULT_RADIUS_M,
     lattice: int = 64,
@@ -220,20 +221,20 @@ class _Proof(NamedTuple):
 
     bound: float
     """Lower bound on the cost, as a weighted sum over the sites, m."""
-    prices: Array
+    prices: FloatArray
     """(m,) Prices of the sites that prove the bound, m."""
-    better_candidates: Array
+    better_candidates: FloatArray
     """(p, 2) Positions with a higher profit than any position in the table, grid steps."""
 
 
 class _ProfitBounds(NamedTuple):
     """Profits in t triangles."""
 
-    centers: Array
+    centers: FloatArray
     """(t, 2) A point of the free space in each triangle, grid steps."""
-    center_profits: Array
+    center_profits: FloatArray
     """(t,) Profits of these points, m."""
-    bounds: Array
+    bounds: FloatArray
     """(t,) An upper bound on the profit of every point of each triangle, m."""
 
 
@@ -312,14 +313,14 @@ class _Dual:
     site_numbers: IntArray
     site_data: SiteData
     placement_cost: float
-    max_prices: Array
-    initial_prices: Array
+    max_prices: FloatArray
+    initial_prices: FloatArray
     candidate_spacing: float
-    triangles: Array
+    triangles: FloatArray
     table: SiteDistances
 
     @classmethod
-    def build(cls, cost: CoverageCost, positions: Array, radius: float) -> _Dual:
+    def build(cls, cost: CoverageCost, positions: FloatArray, radius: float) -> _Dual:
         """Build the dual problem for a team with as many robots as a placement.
 
         The placement should have a low cost, because the initial prices are derived from it, and its
@@ -367,7 +368,9 @@ class _Dual:
         dual.add_candidates(np.concatenate([robots, site_candidates]))
         return dual
 
-    def _choose_site_candidates(self, configuration_space: shapely.Geometry, site_positions: Array) -> Array:
+    def _choose_site_candidates(
+        self, configuration_space: shapely.Geometry, site_positions: FloatArray
+    ) -> FloatArray:
         """Return evenly spread sites at which the center of a robot can be, (p, 2) grid steps.
 
         `site_positions` are the positions of all sites, (m, 2), in meters like the configuration space.
@@ -382,7 +385,7 @@ class _Dual:
         return self.geodesics.grid.spacing
 
     @property
-    def weights(self) -> Array:
+    def weights(self) -> FloatArray:
         """Weights of the sites, (m,)."""
         return self.site_data.weights
 
@@ -391,21 +394,23 @@ class _Dual:
         """Sum of the weights of the sites."""
         return float(self.weights.sum())
 
-    def _thin_out(self, candidates: Array) -> Array:
+    def _thin_out(self, candidates: FloatArray) -> FloatArray:
         """Return the first candidate in each square of a grid with half the candidate spacing."""
         squares = np.floor(candidates / (self.candidate_spacing / 2.0))
         _, first = np.unique(squares, axis=0, return_index=True)
         in_original_order = np.sort(first)
         return candidates[in_original_order]
 
-    def add_candidates(self, candidates: Array) -> None:
+    def add_candidates(self, candidates: FloatArray) -> None:
         """Add candidate positions, (p, 2) grid steps, to the table."""
         for first in range(0, len(candidates), _CANDIDATES_PER_BLOCK):
             block = candidates[first : first + _CANDIDATES_PER_BLOCK]
             distances = self.geodesics.compute_grid_distances(block, self.site_data.sites) * self.grid_spacing
             self.table = self.table.with_positions(distances, self.max_prices)
 
-    def improve_prices(self, prices: Array, smoothing: float, heartbeat: Callable[[], None]) -> Array:
+    def improve_prices(
+        self, prices: FloatArray, smoothing: float, heartbeat: Callable[[], None]
+    ) -> FloatArray:
         """Search for prices, (m,) m, that maximize the dual over the positions in the table.
 
         The dual is the sum of the weighted prices minus n times the maximum profit of a position. The maximum
@@ -418,7 +423,7 @@ class _Dual:
         scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self.geodesics.size)
         s = smoothing * scale / self.robot_count
 
-        def compute_negative_dual(prices: Array) -> tuple[float, Array]:
+        def compute_negative_dual(prices: FloatArray) -> tuple[float, FloatArray]:
             """Return minus the smoothed dual for given prices, and its gradient, both divided by `scale`."""
             heartbeat()
             profits = self.table.compute_profits(prices, weights)
@@ -444,7 +449,7 @@ class _Dual:
         )
         return np.asarray(solution.x)
 
-    def bound_triangle_profits(self, prices: Array, triangles: Array) -> _ProfitBounds:
+    def bound_triangle_profits(self, prices: FloatArray, triangles: FloatArray) -> _ProfitBounds:
         """Compute an upper bound on the profit of all points of each of several triangles.
 
         Parameters
@@ -465,7 +470,7 @@ class _Dual:
         scratch = TriangleScratch.allocate(len(self.geodesics.corners))
         grid_prices = prices / self.grid_spacing
 
-        def run_kernel(wall_index: AngularWallIndex) -> Array | None:
+        def run_kernel(wall_index: AngularWallIndex) -> FloatArray | None:
             """Return the profits and their bounds, (2, t); None if the wall index is too small."""
             profits = np.empty((2, len(triangles)))
             has_space = bound_profits(
@@ -481,7 +486,7 @@ class _Dual:
             centers=centers, center_profits=profits[CENTER_PROFIT], bounds=profits[PROFIT_BOUND]
         )
 
-    def prove(self, prices: Array, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
+    def prove(self, prices: FloatArray, tolerance: float, heartbeat: Callable[[], None]) -> _Proof:
         """Prove a lower bound on the cost by branch and bound over triangles.
 
         The lower bound is the sum of the weighted prices minus n times an upper bound on the profit of any
@@ -569,7 +574,7 @@ def _build_configuration_space(cost: CoverageCost, is_covered: BoolArray, radius
     return area
 
 
-def _triangulate(area: shapely.Geometry) -> Array:
+def _triangulate(area: shapely.Geometry) -> FloatArray:
     """Return triangles that cover an area, (t, 3, 2), in meters."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(area))
     assert math.isclose(shapely.area(triangles).sum(), area.area, rel_tol=1e-9)
@@ -577,7 +582,9 @@ def _triangulate(area: shapely.Geometry) -> Array:
     return np.asarray(rings[:, :3])
 
 
-def _compute_initial_prices(geodesics: Geodesics, robots: Array, sites: Array) -> tuple[Array, Array]:
+def _compute_initial_prices(
+    geodesics: Geodesics, robots: FloatArray, sites: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return the maximum and the initial prices of the sites, (m,) m each.
 
     The positions of the n robots and the m sites are in grid steps. The maximum price of a site is its

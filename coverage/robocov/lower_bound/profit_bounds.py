@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import NO_SPACE, ONLY_SOURCE, AngularWallIndex, index_walls, is_visible
 from robocov.geodesic.corner_graph import find_visible_corners
 from robocov.geodesic.walls import Walls
+from robocov.typing import FloatArray, IntArray
 
 CENTER_PROFIT = 0
 """Row of the result of `bound_profits`: the profits of the centers of the triangles."""
@@ -27,11 +27,11 @@ class SiteData(NamedTuple):
 
     walls: Walls
     """The boundary of the free space."""
-    sites: Array
+    sites: FloatArray
     """(m, 2) Positions of the sites."""
-    weights: Array
+    weights: FloatArray
     """(m,) Weights of the sites."""
-    from_corners: Array
+    from_corners: FloatArray
     """(m, k) Geodesic distance of each site from each corner."""
 
 
@@ -44,13 +44,13 @@ class TriangleScratch(NamedTuple):
 
     corners: IntArray
     """(k,) The corners that are visible from the center, at the beginning of the array."""
-    corner_distances: Array
+    corner_distances: FloatArray
     """(k,) Distances from the center to these corners."""
-    vertices: Array
+    vertices: FloatArray
     """(3, 2) The vertices, relative to the center."""
-    min_distances: Array
+    min_distances: FloatArray
     """(3,) A lower bound on the distance from each vertex to the current site."""
-    max_profits: Array
+    max_profits: FloatArray
     """(3,) An upper bound on the profit of each vertex, from the sites so far."""
 
     @classmethod
@@ -89,11 +89,11 @@ class _Center(NamedTuple):
 def bound_profits(
     site_data: SiteData,
     wall_index: AngularWallIndex,
-    prices: Array,
-    triangles: Array,
-    centers: Array,
+    prices: FloatArray,
+    triangles: FloatArray,
+    centers: FloatArray,
     scratch: TriangleScratch,
-    profits: Array,
+    profits: FloatArray,
 ) -> bool:
     """Compute the profit of the center of each triangle, and an upper bound on the profit of all its points.
 
@@ -139,8 +139,8 @@ def _set_triangle(
     site_data: SiteData,
     wall_index: AngularWallIndex,
     scratch: TriangleScratch,
-    triangle: Array,
-    center: Array,
+    triangle: FloatArray,
+    center: FloatArray,
 ) -> _Center:
     """Write a triangle, and the corners that are visible from its center, to the scratch space.
 
@@ -246,7 +246,7 @@ def _apply_tangent_bound(
         scratch.min_distances[vertex] = min(scratch.min_distances[vertex], length + rise)
 
 
-def halve_triangles(triangles: Array) -> Array:
+def halve_triangles(triangles: FloatArray) -> FloatArray:
     """Halve triangles by a cut from the middle of their longest edge to the opposite vertex.
 
     Parameters

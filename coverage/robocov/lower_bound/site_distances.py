@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
+from robocov.typing import Float32Array, FloatArray, Int32Array, IntArray
 
 _MIN_SHARE = 1e-9
 """Smaller shares of a robot at a position are ignored, which saves most of the work."""
@@ -23,9 +22,9 @@ class SiteDistances(NamedTuple):
 
     entry_starts: IntArray
     """(p + 1,) The entries of position k are those from ``entry_starts[k]`` up to ``entry_starts[k + 1]``."""
-    sites: NDArray[np.int32]
+    sites: Int32Array
     """(e,) The site of each entry."""
-    distances: NDArray[np.float32]
+    distances: Float32Array
     """(e,) Distance from the position of each entry to its site, m."""
 
     @classmethod
@@ -38,7 +37,7 @@ class SiteDistances(NamedTuple):
         """
         return cls(np.zeros(1, np.int64), np.empty(0, np.int32), np.empty(0, np.float32))
 
-    def with_positions(self, distances: Array, max_distances: Array) -> SiteDistances:
+    def with_positions(self, distances: FloatArray, max_distances: FloatArray) -> SiteDistances:
         """Return a table with more positions at the end.
 
         Parameters
@@ -62,7 +61,7 @@ class SiteDistances(NamedTuple):
             distances=np.append(self.distances, new_distances),
         )
 
-    def compute_profits(self, prices: Array, weights: Array) -> Array:
+    def compute_profits(self, prices: FloatArray, weights: FloatArray) -> FloatArray:
         """Compute the profit of a robot at each position of the table.
 
         A site pays its price for a robot, less the distance to the robot, if the difference is positive. The
@@ -84,7 +83,7 @@ class SiteDistances(NamedTuple):
         _write_profits(self, prices, weights, profits)
         return profits
 
-    def sum_paid_shares(self, prices: Array, shares: Array) -> Array:
+    def sum_paid_shares(self, prices: FloatArray, shares: FloatArray) -> FloatArray:
         """Compute the number of robots that each site pays for, if robots are divided among the positions.
 
         A site pays for a robot if the price of the site is higher than its distance to the robot.
@@ -106,7 +105,9 @@ class SiteDistances(NamedTuple):
 
 
 @kernel
-def _write_profits(table: SiteDistances, prices: Array, weights: Array, profits: Array) -> None:
+def _write_profits(
+    table: SiteDistances, prices: FloatArray, weights: FloatArray, profits: FloatArray
+) -> None:
     """Write the profit of each position: the sum over the sites of weight * max(price - distance, 0)."""
     for position in range(len(profits)):
         profit = 0.0
@@ -117,7 +118,9 @@ def _write_profits(table: SiteDistances, prices: Array, weights: Array, profits:
 
 
 @kernel
-def _add_paid_shares(table: SiteDistances, prices: Array, shares: Array, paid_shares: Array) -> None:
+def _add_paid_shares(
+    table: SiteDistances, prices: FloatArray, shares: FloatArray, paid_shares: FloatArray
+) -> None:
     """Add the share at each position to the paid shares of all sites that pay for a robot there."""
     for position in range(len(shares)):
         if shares[position] > _MIN_SHARE:

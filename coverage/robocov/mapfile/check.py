@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.density import Density, Gaussians
 from robocov.environment import (
@@ -25,6 +25,7 @@ from robocov.environment import (
     find_overlaps,
 )
 from robocov.errors import StartError, format_count, format_path, summarize_names
+from robocov.typing import FloatArray
 
 MANY_VERTICES = 5000
 """Number of vertices above which there is a warning about the computing time of a map."""
@@ -232,7 +233,7 @@ def _find_maximum(density: Density) -> float:
     # Importing the package takes longer than checking most maps.
     from scipy.optimize import minimize
 
-    def evaluate_negative(point: Array) -> float:
+    def evaluate_negative(point: FloatArray) -> float:
         return -float(density.evaluate(point[None])[0])
 
     return -float(min(minimize(evaluate_negative, peak.center).fun for peak in density.peaks))

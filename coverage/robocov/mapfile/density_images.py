@@ -5,9 +5,9 @@ from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.density import MAX_RASTER_SIZE
 from robocov.errors import InputError, describe_error, to_one_line
+from robocov.typing import FloatArray
 
 MAX_IMAGE_BYTES = 8_000_000
 """Largest size of an image file."""
@@ -66,7 +66,7 @@ def _resolve_inside(name: str, folder: Path) -> Path:
     return path
 
 
-def read_gray_levels(content: bytes) -> Array:
+def read_gray_levels(content: bytes) -> FloatArray:
     """Read the gray levels of a PNG or PGM image.
 
     Parameters

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.density import Density, Raster
 from robocov.environment import Environment, Ring
 from robocov.errors import (
@@ -26,6 +25,7 @@ from robocov.mapfile.density_images import read_gray_levels, read_image_file
 from robocov.mapfile.models import HEADER, MIN_WEIGHT, DensityModel, RasterModel
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import NO_WEIGHT, validate_document
+from robocov.typing import FloatArray
 
 _WEIGHT_DECIMALS = 6
 """Decimal places of the weights that are read from an image. They keep the file short if the map is saved."""
@@ -255,7 +255,7 @@ def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, sou
     return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 
-def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> Array:
+def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> FloatArray:
     """Read the weights of the pixels of an image, (rows, columns), the top row first."""
     path = ("density", "image")
     black = 0.0 if model.black is None else model.black

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.density import WeightedArea, WeightedPolygons
 from robocov.environment import (
@@ -24,6 +24,7 @@ from robocov.environment import (
 from robocov.errors import Issue, JsonPath, MapError, StartError, format_path
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
+from robocov.typing import FloatArray
 
 _MIN_HULL_AREA_RATIO = 1e-9
 """Smallest area of the convex hull of a ring, relative to its squared extent. A ring with a smaller hull
@@ -108,7 +109,7 @@ def _find_line_issues(path: JsonPath, line: Ring, noun: str) -> Iterator[Issue]:
         yield Issue.at_path(path, message)
 
 
-def _build_crossing_issue(path: JsonPath, points: Array, polygon: Polygon) -> Issue:
+def _build_crossing_issue(path: JsonPath, points: FloatArray, polygon: Polygon) -> Issue:
     """Build the issue for a ring that crosses or touches itself, with the two edges that meet."""
     reason = shapely.is_valid_reason(polygon)
     # The reason ends with the coordinates of a point, as in "Self-intersection[5 5]".

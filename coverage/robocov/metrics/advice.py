@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.errors import format_count, summarize_names
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov.record import Record
+from robocov.typing import FloatArray, IntArray
 
 TREMBLE_WINDOW_S = 5.0
 """Duration of the period at the end of a run that is checked for trembling."""
@@ -29,7 +30,7 @@ _MIN_DISTANCE_M = 1e-12
 """Lower limit of distances in divisions."""
 
 
-def advise(record: Record, clearances: Array) -> list[str]:
+def advise(record: Record, clearances: FloatArray) -> list[str]:
     """Find signs that the control period or the maximum acceleration is unsuitable.
 
     Parameters
@@ -106,7 +107,7 @@ def find_trembling_robots(record: Record) -> IntArray:
     return np.flatnonzero(is_trembling)
 
 
-def _compute_turning_angles(displacements: Array) -> Array:
+def _compute_turning_angles(displacements: FloatArray) -> FloatArray:
     """Return the magnitudes of the angles between consecutive displacements, (k - 1, n) rad."""
     incoming = displacements[:-1]
     outgoing = displacements[1:]
@@ -115,7 +116,7 @@ def _compute_turning_angles(displacements: Array) -> Array:
     return np.asarray(np.abs(np.arctan2(cross_products, dot_products)))
 
 
-def count_zigzags(record: Record, clearances: Array) -> IntArray:
+def count_zigzags(record: Record, clearances: FloatArray) -> IntArray:
     """Count how many times each robot moved quickly from one wall to the opposite wall, touching both.
 
     Parameters

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.compiled import kernel
 from robocov.record import Record
 from robocov.sensor import RangeSensor
+from robocov.typing import FloatArray, IntArray
 from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
 
 MAX_CONTACT_GAP_M = 1e-3
@@ -29,13 +30,13 @@ _RANGE_FACTOR = 4.0
 class RobotGaps(NamedTuple):
     """Gaps between the rims of robots over a run."""
 
-    min_gaps: Array
+    min_gaps: FloatArray
     """(T,) m, the smallest gap between two working robots at each time step; inf if fewer than two work."""
     contact_count: int
     """Number of times that two robots came into contact."""
 
 
-def compute_clearances(record: Record) -> Array:
+def compute_clearances(record: Record) -> FloatArray:
     """Compute the gap between each robot's rim and the nearest wall, at each time step.
 
     Parameters
@@ -54,7 +55,7 @@ def compute_clearances(record: Record) -> Array:
     return _compute_clearances_from_sensed_points(record)
 
 
-def _compute_clearances_from_sensed_points(record: Record) -> Array:
+def _compute_clearances_from_sensed_points(record: Record) -> FloatArray:
     """Compute the clearances from the obstacle points that the robots sensed.
 
     This is valid only if walls do not change and sensing is exact. A robot that sensed no obstacle is farther
@@ -69,7 +70,7 @@ def _compute_clearances_from_sensed_points(record: Record) -> Array:
     return np.asarray(distances - record.team.radius)
 
 
-def _find_distant_points(record: Record, positions: Array) -> Array:
+def _find_distant_points(record: Record, positions: FloatArray) -> FloatArray:
     """Find the wall points nearest to positions at any distance, (k, 2) m, by queries of growing range."""
     sensor = RangeSensor(build_solid_pieces(record.environment))
     nearest_points = np.full(positions.shape, np.nan)
@@ -83,7 +84,7 @@ def _find_distant_points(record: Record, positions: Array) -> Array:
     return nearest_points
 
 
-def _compute_clearances_by_queries(record: Record) -> Array:
+def _compute_clearances_by_queries(record: Record) -> FloatArray:
     """Compute the clearances by a query for the nearest wall of each robot at each time step.
 
     Unlike the sensed points, queries are also valid for noisy sensing, moving obstacles and failed robots.
@@ -107,7 +108,7 @@ def _compute_clearances_by_queries(record: Record) -> Array:
     return clearances
 
 
-def count_contacts(record: Record, clearances: Array) -> int:
+def count_contacts(record: Record, clearances: FloatArray) -> int:
     """Count how many times a robot came into contact with a wall or with another robot.
 
     Parameters
@@ -153,7 +154,7 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
 
 
 @kernel
-def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Array) -> int:
+def _measure_gaps(positions: FloatArray, radius: FloatArray, order: IntArray, min_gaps: FloatArray) -> int:
     """Write the smallest gap of each time step to `min_gaps`, (T,) m; return the number of contacts.
 
     `order`, (T, n), contains the indices of the robots, sorted by x at each time step. The positions of
@@ -187,7 +188,7 @@ def _measure_gaps(positions: Array, radius: Array, order: IntArray, min_gaps: Ar
 
 
 @kernel
-def _compute_distance(positions: Array, t: int, i: int, j: int) -> float:
+def _compute_distance(positions: FloatArray, t: int, i: int, j: int) -> float:
     """Return the distance between the centers of robots i and j at time step t, m."""
     return math.sqrt(
         (positions[t, i, 0] - positions[t, j, 0]) ** 2 + (positions[t, i, 1] - positions[t, j, 1]) ** 2

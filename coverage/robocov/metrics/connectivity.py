@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from robocov.arrays import Array
 from robocov.observation.neighbors import Neighbors
+from robocov.typing import FloatArray
 
 _EIGENVALUE_DECIMALS = 12
 """Decimal places to which eigenvalues are rounded. Smaller differences are rounding errors."""
@@ -24,7 +24,7 @@ class Connectivity(NamedTuple):
     """Second smallest eigenvalue of the graph's Laplacian. It is 0 if the graph has several components."""
 
 
-def measure_connectivity(positions: Array, ranges: Array) -> Connectivity:
+def measure_connectivity(positions: FloatArray, ranges: FloatArray) -> Connectivity:
     """Measure the connectivity of the communication graph.
 
     Two robots are linked if each is within the communication range of the other.

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.drawing import Drawable
 from robocov.errors import format_count, require_type
 from robocov.record import Record, select_nearest_steps
+from robocov.typing import FloatArray
 
 DEFAULT_RATE_HZ = 10.0
 """Number of samples of the coverage cost per simulated second."""
@@ -49,11 +49,11 @@ class CostHistory(Drawable):
 
     _drawing_name = "history"
 
-    time: Array
-    mean_distance: Array
-    cost: Array
-    uncovered_area: Array
-    mean_time: Array | None = None
+    time: FloatArray
+    mean_distance: FloatArray
+    cost: FloatArray
+    uncovered_area: FloatArray
+    mean_time: FloatArray | None = None
 
     def __repr__(self) -> str:
         first = float(self.mean_distance[0])
@@ -162,7 +162,7 @@ def select_sampled_steps(record: Record, rate: float) -> list[int]:
     return [int(step) for step in select_nearest_steps(record.time, rate)]
 
 
-def compute_mean_over_run(time: Array, values: Array) -> float:
+def compute_mean_over_run(time: FloatArray, values: FloatArray) -> float:
     """Compute the mean over time of values that were sampled over a run, by the trapezoidal rule.
 
     Parameters

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.record import TIME_ROUNDING_S
+from robocov.typing import BoolArray, FloatArray
 
 STUCK_WINDOW_S = 5.0
 """Time over which the net displacement of a stuck robot is measured."""
@@ -15,7 +16,7 @@ MIN_STUCK_GOAL_DISTANCE_M = 0.5
 """Distance of a stuck robot from its goal, which is more than this."""
 
 
-def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) -> Array:
+def compute_path_lengths(positions: FloatArray, traveled: BoolArray | None = None) -> FloatArray:
     """Compute the length of each robot's path.
 
     Parameters
@@ -41,7 +42,7 @@ def compute_path_lengths(positions: Array, traveled: BoolArray | None = None) ->
     return np.asarray(lengths.sum(axis=0))
 
 
-def count_stuck_robots(time: Array, positions: Array, goals: Array) -> int | None:
+def count_stuck_robots(time: FloatArray, positions: FloatArray, goals: FloatArray) -> int | None:
     """Count the robots that are far from their goals at the end of a run and no longer move.
 
     A robot is stuck if its distance from its goal exceeds `MIN_STUCK_GOAL_DISTANCE_M` and its net

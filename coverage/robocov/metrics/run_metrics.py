@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.errors import ParameterError, format_count, quote
 from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.communication import compute_sent_rate
@@ -16,6 +16,7 @@ from robocov.metrics.connectivity import Connectivity, measure_connectivity
 from robocov.metrics.cost_history import CostHistory
 from robocov.metrics.visible_area import CoveredAreas, compute_covered_areas
 from robocov.record import Record, select_nearest_steps
+from robocov.typing import FloatArray, IntArray
 
 DEFAULT_RATE_HZ = 2.0
 """Number of samples of the metrics per simulated second."""
@@ -83,17 +84,17 @@ class RunMetrics:
     ((2,), 1.0)
     """
 
-    time: Array
-    sensed_area: Array
-    range_area: Array
-    visible_area: Array
-    work: Array
-    effort: Array
-    path_length: Array
+    time: FloatArray
+    sensed_area: FloatArray
+    range_area: FloatArray
+    visible_area: FloatArray
+    work: FloatArray
+    effort: FloatArray
+    path_length: FloatArray
     components: IntArray
-    algebraic_connectivity: Array
-    wall_clearance: Array
-    robot_clearance: Array
+    algebraic_connectivity: FloatArray
+    wall_clearance: FloatArray
+    robot_clearance: FloatArray
     free_area: float
 
     def __repr__(self) -> str:
@@ -136,9 +137,9 @@ class RunMetrics:
 class _Integrals(NamedTuple):
     """Integrals from the start of a run to each time step, (T,) each; see `RunMetrics` for their meanings."""
 
-    work: Array
-    effort: Array
-    path_length: Array
+    work: FloatArray
+    effort: FloatArray
+    path_length: FloatArray
 
 
 def compute_run_metrics(
@@ -288,6 +289,6 @@ def _integrate(record: Record) -> _Integrals:
     )
 
 
-def _accumulate(increments: Array) -> Array:
+def _accumulate(increments: FloatArray) -> FloatArray:
     """Return the cumulative sums of increments, starting with 0."""
     return np.concatenate([[0.0], np.cumsum(increments)])

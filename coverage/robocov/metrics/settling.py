@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, compute_point_distances
+from robocov.arrays import compute_point_distances
+from robocov.typing import BoolArray, FloatArray
 
 SETTLED_WINDOW_S = 4.0
 """Time over which the net displacement of a robot at rest is measured."""
@@ -12,7 +13,7 @@ SETTLED_DISTANCE_M = 0.05
 """Net displacement of a robot at rest, which is less than this."""
 
 
-def is_team_at_rest(before: Array, after: Array, distance: float = SETTLED_DISTANCE_M) -> BoolArray:
+def is_team_at_rest(before: FloatArray, after: FloatArray, distance: float = SETTLED_DISTANCE_M) -> BoolArray:
     """Return whether a team is at rest: all its robots have a small net displacement over a window of time.
 
     Parameters
@@ -42,8 +43,8 @@ def is_team_at_rest(before: Array, after: Array, distance: float = SETTLED_DISTA
 
 
 def find_settling_time(
-    time: Array,
-    positions: Array,
+    time: FloatArray,
+    positions: FloatArray,
     window: float = SETTLED_WINDOW_S,
     distance: float = SETTLED_DISTANCE_M,
 ) -> float | None:

@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.geodesic.angular_index import (
     NO_ENTRY,
@@ -27,6 +26,7 @@ from robocov.geodesic.angular_index import (
 )
 from robocov.geodesic.integer_grid import Grid
 from robocov.geodesic.walls import END_X, END_Y, NO_WALL, START_X, START_Y, Walls, build_walls
+from robocov.typing import FloatArray, IntArray
 
 _BIN_COUNT = 512
 """Number of angular bins of a robot's view, a power of 2."""
@@ -51,15 +51,15 @@ class CoveredAreas(NamedTuple):
 class _Sectors(NamedTuple):
     """Sectors of a view, counter-clockwise, (s,) each. In each sector, one wall is visible."""
 
-    starts: Array
+    starts: FloatArray
     """Angle at which each sector starts, rad from +x."""
-    ends: Array
+    ends: FloatArray
     """Angle at which each sector ends, rad from +x."""
     walls: IntArray
     """Index of the wall that is visible in each sector."""
 
 
-def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -> CoveredAreas:
+def compute_covered_areas(free: BaseGeometry, positions: FloatArray, ranges: FloatArray) -> CoveredAreas:
     """Compute the areas that robots cover.
 
     Parameters
@@ -113,7 +113,7 @@ def compute_covered_areas(free: BaseGeometry, positions: Array, ranges: Array) -
     return CoveredAreas(sensed, within_range, visible)
 
 
-def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterator[BaseGeometry]:
+def compute_visibility_polygons(free: BaseGeometry, positions: FloatArray) -> Iterator[BaseGeometry]:
     """Compute the visibility polygon of each position.
 
     Parameters
@@ -157,7 +157,7 @@ def compute_visibility_polygons(free: BaseGeometry, positions: Array) -> Iterato
         yield view if shapely.is_valid(view) else shapely.make_valid(view)
 
 
-def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tuple[AngularWallIndex, int]:
+def _index_walls(walls: Walls, index: AngularWallIndex, position: FloatArray) -> tuple[AngularWallIndex, int]:
     """Index the walls around a position; return the index, enlarged if needed, and its number of entries."""
     x, y = position
     entry_count = index_walls(walls, index, x, y)
@@ -167,7 +167,7 @@ def _index_walls(walls: Walls, index: AngularWallIndex, position: Array) -> tupl
     return index, entry_count
 
 
-def _find_sectors(walls: Walls, index: AngularWallIndex, entry_count: int, position: Array) -> _Sectors:
+def _find_sectors(walls: Walls, index: AngularWallIndex, entry_count: int, position: FloatArray) -> _Sectors:
     """Find the sectors of the view from a position, whose index of walls has `entry_count` entries.
 
     The visible wall can only change in the directions of the ends of walls. In each sector between two such
@@ -192,7 +192,9 @@ def _find_sectors(walls: Walls, index: AngularWallIndex, entry_count: int, posit
 
 
 @kernel
-def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, nearest: IntArray) -> None:
+def _find_nearest_walls(
+    ends: FloatArray, index: AngularWallIndex, rays: FloatArray, nearest: IntArray
+) -> None:
     """Find the wall that each of (m, 2) rays from the source hits first.
 
     The indices of the walls, or `NO_WALL`, are written to `nearest`, (m,).
@@ -222,7 +224,7 @@ def _find_nearest_walls(ends: Array, index: AngularWallIndex, rays: Array, neare
             entry = index.previous_entries[entry]
 
 
-def _intersect(walls: Array, angles: Array) -> Array:
+def _intersect(walls: FloatArray, angles: FloatArray) -> FloatArray:
     """Return the points at which rays from the origin meet walls, one ray for each of (m, 4) walls, (m, 2).
 
     If rounding errors put a point beyond an end of its wall, the end is returned.

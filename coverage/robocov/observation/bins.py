@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
+from robocov.typing import FloatArray, IntArray
 
 _MIN_BINNED_POINTS = 24
 """Minimum number of points for more than one bin: with fewer points, bins save no time."""
@@ -65,7 +65,7 @@ def count_starts(point_count: int) -> int:
 
 
 @kernel
-def _fit_bins(points: Array, first: int, stop: int, max_distance: float) -> Bins:
+def _fit_bins(points: FloatArray, first: int, stop: int, max_distance: float) -> Bins:
     """Return bins that cover ``points[first:stop]`` and whose sides are longer than the distance.
 
     The sides are also long enough to limit the number of bins in proportion to the number of points.
@@ -93,7 +93,7 @@ def _fit_bins(points: Array, first: int, stop: int, max_distance: float) -> Bins
 
 
 @kernel
-def _find_bin_of_point(bins: Bins, points: Array, i: int) -> int:
+def _find_bin_of_point(bins: Bins, points: FloatArray, i: int) -> int:
     """Return the bin that contains point i."""
     row = find_bin(points[i, 1] - bins.bottom, bins.scale)
     column = find_bin(points[i, 0] - bins.left, bins.scale)
@@ -102,7 +102,7 @@ def _find_bin_of_point(bins: Bins, points: Array, i: int) -> int:
 
 @kernel
 def sort_into_bins(
-    points: Array, first: int, stop: int, max_distance: float, starts: IntArray, order: IntArray
+    points: FloatArray, first: int, stop: int, max_distance: float, starts: IntArray, order: IntArray
 ) -> Bins:
     """Sort points into square bins, such that close points are in the same bin or in adjacent bins.
 

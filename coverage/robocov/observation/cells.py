@@ -10,12 +10,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
-from robocov.arrays import Array, IntArray
 from robocov.density.base import Density, Uniform
 from robocov.density.cell_edges import POLAR_MOMENT, CellEdges
+from robocov.typing import FloatArray, Int32Array, IntArray
 
 
 @dataclass(eq=False)
@@ -28,15 +25,15 @@ class Cells(ABC):
     WeightedCells : Cells of the first robot to arrive.
     """
 
-    generators: Array
+    generators: FloatArray
     """(n, 2) m, the points to which the cells belong."""
-    masses: Array
+    masses: FloatArray
     """(n,) m², M of equation (2): the area of each cell if the density is 1."""
-    centroids: Array
+    centroids: FloatArray
     """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
     """φ, the density of masses, centroids and moments; None stands for 1 everywhere."""
-    triangulation: NDArray[np.int32] | None = None
+    triangulation: Int32Array | None = None
     """Triangulation from which the partition of slightly moved generators can start, or None."""
 
     @property
@@ -46,7 +43,7 @@ class Cells(ABC):
 
     @property
     @abstractmethod
-    def outlines(self) -> tuple[list[Array], IntArray]:
+    def outlines(self) -> tuple[list[FloatArray], IntArray]:
         """The outlines, (k, 2) m each, in the order in which to paint them, and the cell of each outline."""
 
     @cached_property
@@ -59,7 +56,7 @@ class Cells(ABC):
         return self.edges.list_adjacent_pairs()
 
     @cached_property
-    def polar_moments(self) -> Array:
+    def polar_moments(self) -> FloatArray:
         """J_{V,p} of equation (2), (n,) m⁴: the polar moment of each cell about its generator."""
         density = self.density or Uniform()
         return density.compute_moments(self.edges, self.generators)[:, POLAR_MOMENT]

@@ -1,13 +1,12 @@
 """Pairs of points that are close to each other."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation.bins import count_starts, find_bin, sort_into_bins
+from robocov.typing import AnyArray, FloatArray, IntArray
 
 _INITIAL_NEIGHBORS = 8
 """Number of neighbors per point for which the arrays have space at first."""
@@ -20,11 +19,11 @@ class ClosePairs(NamedTuple):
     """(m,) Index of the first point of each pair."""
     second: IntArray
     """(m,) Index of the second point."""
-    distances: Array
+    distances: FloatArray
     """(m,) m"""
 
 
-def find_close_pairs(positions: Array, max_distance: float) -> ClosePairs:
+def find_close_pairs(positions: FloatArray, max_distance: float) -> ClosePairs:
     """Find the directed pairs of points that are close to each other.
 
     Parameters
@@ -48,7 +47,7 @@ def find_close_pairs(positions: Array, max_distance: float) -> ClosePairs:
 
 
 @kernel
-def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePairs]:
+def find_pairs_in_range(points: FloatArray, ranges: FloatArray) -> tuple[IntArray, ClosePairs]:
     """Find the directed pairs of points whose distance is at most the smaller of their ranges.
 
     Parameters
@@ -105,7 +104,7 @@ def find_pairs_in_range(points: Array, ranges: Array) -> tuple[IntArray, ClosePa
 
 
 @kernel
-def _enlarge(values: NDArray[Any], used: int, capacity: int) -> NDArray[Any]:
+def _enlarge(values: AnyArray, used: int, capacity: int) -> AnyArray:
     """Return an array of length `capacity` that begins with the used values."""
     larger = np.empty(capacity, values.dtype)
     larger[:used] = values[:used]
@@ -113,7 +112,9 @@ def _enlarge(values: NDArray[Any], used: int, capacity: int) -> NDArray[Any]:
 
 
 @kernel
-def _insert(second: IntArray, distance: Array, begin: int, end: int, point: int, separation: float) -> None:
+def _insert(
+    second: IntArray, distance: FloatArray, begin: int, end: int, point: int, separation: float
+) -> None:
     """Insert a point and its distance so that ``second[begin:end + 1]`` is ascending; index `end` is free."""
     k = end
     while k > begin and second[k - 1] > point:

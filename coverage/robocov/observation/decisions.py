@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, quote
 from robocov.observation.cells import Cells
 from robocov.observation.messages import Message, check_messages
+from robocov.typing import FloatArray
 
 
 @dataclass(slots=True, eq=False)
@@ -50,9 +50,9 @@ class Decision:
     ((3, 2), ['attraction', 'repulsion_obstacle', 'repulsion_robots'])
     """
 
-    forces: Array
-    goals: Array | None = None
-    terms: Mapping[str, Array] = field(default_factory=dict)
+    forces: FloatArray
+    goals: FloatArray | None = None
+    terms: Mapping[str, FloatArray] = field(default_factory=dict)
     cells: Cells | None = None
     memory: Any = None
     messages: Sequence[Sequence[Message]] = ()
@@ -150,7 +150,7 @@ def _copy_message(message: Message) -> Message:
         return message
 
 
-def check_forces(values: Any, robot_count: int, name: str) -> Array:
+def check_forces(values: Any, robot_count: int, name: str) -> FloatArray:
     """Check forces that do not come from a controller, and return them as an array of floats.
 
     Parameters
@@ -177,7 +177,7 @@ def check_forces(values: Any, robot_count: int, name: str) -> Array:
     return forces
 
 
-def to_numbers(values: object) -> Array | None:
+def to_numbers(values: object) -> FloatArray | None:
     """Convert real numbers to an array of floats.
 
     Complex numbers, strings and objects are rejected even if they can be converted to floats.
@@ -201,13 +201,13 @@ def to_numbers(values: object) -> Array | None:
         return None
 
 
-def _is_finite(forces: Array) -> bool:
+def _is_finite(forces: FloatArray) -> bool:
     # The sum of squares is fast to compute, and finite only if all forces are. It may overflow for huge
     # finite forces; only then is each force tested.
     return isfinite(np.vdot(forces, forces)) or bool(np.isfinite(forces).all())
 
 
-def _to_rows(values: Any, robot_count: int, name: str, suffix: str = "") -> Array:
+def _to_rows(values: Any, robot_count: int, name: str, suffix: str = "") -> FloatArray:
     """Convert two numbers for each robot to a (robot_count, 2) array; an array of floats is not copied.
 
     In messages, `suffix` follows the values.

@@ -7,9 +7,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.density.base import Density
 from robocov.errors import ParameterError
+from robocov.typing import FloatArray, IntArray
 
 _RANGE_TOLERANCE_M = 1e-9
 """Distance by which a point may exceed the sensing range because of rounding."""
@@ -46,13 +47,18 @@ class DensitySensor:
     (True, array([5.]))
     """
 
-    def __init__(self, measure: Callable[[IntArray, Array], Array]) -> None:
+    def __init__(self, measure: Callable[[IntArray, FloatArray], FloatArray]) -> None:
         self._measure = measure
         self.log: DensityLog = {}
 
     @classmethod
     def build(
-        cls, density: Density | None, *, positions: Array, known_positions: Array, sensing_ranges: Array
+        cls,
+        density: Density | None,
+        *,
+        positions: FloatArray,
+        known_positions: FloatArray,
+        sensing_ranges: FloatArray,
     ) -> DensitySensor:
         """Build the sensor of a step.
 
@@ -72,7 +78,7 @@ class DensitySensor:
         DensitySensor
         """
 
-        def measure(robots: IntArray, points: Array) -> Array:
+        def measure(robots: IntArray, points: FloatArray) -> FloatArray:
             offsets = points - known_positions[robots]
             distances = compute_point_distances(points, known_positions[robots])
             is_too_far = distances > sensing_ranges[robots] + _RANGE_TOLERANCE_M
@@ -91,7 +97,7 @@ class DensitySensor:
 
         return cls(measure)
 
-    def measure(self, robots: Any, points: Any) -> Array:
+    def measure(self, robots: Any, points: Any) -> FloatArray:
         """Measure the density at points.
 
         Parameters
@@ -142,7 +148,7 @@ class RecordedDensitySensor(DensitySensor):
     def __reduce__(self) -> tuple[Any, ...]:
         return RecordedDensitySensor, (self.log, self._robot)
 
-    def _repeat(self, robots: IntArray, points: Array) -> Array:
+    def _repeat(self, robots: IntArray, points: FloatArray) -> FloatArray:
         values = np.ones(len(points))
         for k, robot in enumerate(robots.tolist()):
             if self._robot is not None and robot != self._robot:

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation.close_pairs import find_pairs_in_range
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _NO_INDICES: IntArray = np.empty(0, dtype=np.intp)
-_NO_POSITIONS: Array = np.empty((0, 2))
+_NO_POSITIONS: FloatArray = np.empty((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +48,12 @@ class Neighbors:
     """
 
     robot_count: int
-    ranges: Array | None = None
+    ranges: FloatArray | None = None
     indptr: IntArray | None = None
     indices: IntArray | None = None
 
     @classmethod
-    def from_ranges(cls, positions: Array, ranges: Array) -> Neighbors:
+    def from_ranges(cls, positions: FloatArray, ranges: FloatArray) -> Neighbors:
         """Build the graph that links two robots if each is within the communication range of the other.
 
         Parameters
@@ -81,7 +81,7 @@ class Neighbors:
 
     @classmethod
     def from_pairs(
-        cls, robot_count: int, robot: IntArray, neighbor: IntArray, ranges: Array | None = None
+        cls, robot_count: int, robot: IntArray, neighbor: IntArray, ranges: FloatArray | None = None
     ) -> Neighbors:
         """Build the graph from its directed pairs.
 
@@ -193,11 +193,11 @@ class NeighborPositions(NamedTuple):
     """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i."""
     indices: IntArray
     """(m,)"""
-    positions: Array
+    positions: FloatArray
     """(m, 2) m, reported positions in the order of `indices`; empty without reports."""
 
     @classmethod
-    def from_graph(cls, neighbors: Neighbors, reported_positions: Array | None) -> NeighborPositions:
+    def from_graph(cls, neighbors: Neighbors, reported_positions: FloatArray | None) -> NeighborPositions:
         """Build the positions from a communication graph.
 
         Parameters

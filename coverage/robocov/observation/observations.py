@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.density.base import Density
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.density_sensor import DensitySensor
@@ -16,6 +16,7 @@ from robocov.observation.messages import ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.observation.scans import Scans
+from robocov.typing import FloatArray, IntArray
 
 
 class NearNeighbors(NamedTuple):
@@ -25,9 +26,9 @@ class NearNeighbors(NamedTuple):
     """(m,) Index of the robot of each pair."""
     neighbors: IntArray
     """(m,) Index of the neighbor."""
-    offsets: Array
+    offsets: FloatArray
     """(m, 2) m, from the known position of the neighbor to the robot."""
-    distances: Array
+    distances: FloatArray
     """(m,) m"""
 
 
@@ -93,20 +94,20 @@ class Observations:
     ((3, 2), array([1, 2]))
     """
 
-    positions: Array
-    velocities: Array
+    positions: FloatArray
+    velocities: FloatArray
     neighbors: Neighbors
-    obstacle_points: Array
+    obstacle_points: FloatArray
     region: Region
     time: float = 0.0
-    max_speeds: Array | None = None
-    reported_positions: Array | None = None
-    report_ages: Array | None = None
+    max_speeds: FloatArray | None = None
+    reported_positions: FloatArray | None = None
+    report_ages: FloatArray | None = None
     density: Density | None = None
     scans: Scans | None = None
-    steering: Array | None = None
+    steering: FloatArray | None = None
     messages: Sequence[Sequence[ReceivedMessage]] = ()
-    send_limits: Array | None = None
+    send_limits: FloatArray | None = None
     density_sensor: DensitySensor | None = None
 
     @property
@@ -116,7 +117,7 @@ class Observations:
             return False
         return self.density is None or self.density.is_uniform
 
-    def measure_density(self, robots: Any, points: Any) -> Array:
+    def measure_density(self, robots: Any, points: Any) -> FloatArray:
         """Measure the density at points near robots.
 
         Parameters
@@ -165,7 +166,7 @@ class Observations:
         """
         return self.messages[robot] if self.messages else ()
 
-    def get_neighbor_positions(self, robot: int) -> Array:
+    def get_neighbor_positions(self, robot: int) -> FloatArray:
         """Return the known positions of a robot's neighbors.
 
         Parameters

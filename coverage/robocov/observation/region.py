@@ -7,8 +7,9 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array, BoolArray, compute_lengths, freeze
+from robocov.arrays import compute_lengths, freeze
 from robocov.errors import InputError
+from robocov.typing import BoolArray, FloatArray
 
 SIDE_X = 0
 """Column of a side of the region: x of its start, m."""
@@ -68,13 +69,13 @@ class Region:
     (12.0, 5.0)
     """
 
-    vertices: Array
-    edges: Array = field(init=False)
-    normals: Array = field(init=False)
-    offsets: Array = field(init=False)
-    sides: Array = field(init=False)
+    vertices: FloatArray
+    edges: FloatArray = field(init=False)
+    normals: FloatArray = field(init=False)
+    offsets: FloatArray = field(init=False)
+    sides: FloatArray = field(init=False)
     area: float = field(init=False)
-    centroid: Array = field(init=False)
+    centroid: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         hull = shapely.convex_hull(shapely.MultiPoint(np.asarray(self.vertices, dtype=float)))
@@ -116,7 +117,7 @@ class Region:
         low_x, low_y, high_x, high_y = self.bounds
         return float(np.hypot(high_x - low_x, high_y - low_y))
 
-    def contains(self, points: Array, tolerance: float = 0.0) -> BoolArray:
+    def contains(self, points: FloatArray, tolerance: float = 0.0) -> BoolArray:
         """Return a mask of the points inside.
 
         Parameters
@@ -133,7 +134,7 @@ class Region:
         return np.asarray(is_inside.all(axis=-1))
 
 
-def _remove_collinear_vertices(ring: Array) -> Array:
+def _remove_collinear_vertices(ring: FloatArray) -> FloatArray:
     """Return a convex ring, (k, 2), without its collinear vertices."""
     before = ring - np.roll(ring, 1, axis=0)
     after = np.roll(ring, -1, axis=0) - ring

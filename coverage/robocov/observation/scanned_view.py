@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import Density
 from robocov.observation.observations import Observations
 from robocov.observation.scans import Scanning
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _PATH_INTERVALS = 4
 """Number of equal intervals into which a path is divided. The points between them are tested for walls."""
@@ -26,7 +26,7 @@ _ACCELERATION_FACTOR = 1.2
 class View(NamedTuple):
     """Visible distances along the rays of the last scan of each robot."""
 
-    distances: Array
+    distances: FloatArray
     """(n, rays) m, at most the range of the view."""
     is_hit: BoolArray
     """(n, rays) Whether the ray ends at an obstacle."""
@@ -44,13 +44,15 @@ class Windows(NamedTuple):
     """(w,) Index of the robot."""
     rays: IntArray
     """(w,) Index of the first ray that passes the corner."""
-    directions: Array
+    directions: FloatArray
     """(w, 2) t, the direction in which the robot has to move to see more."""
-    corner_distances: Array
+    corner_distances: FloatArray
     """(w,) m, ρ."""
 
 
-def compute_view(seen: Observations, previous: View | None, scanning: Scanning, max_distances: Array) -> View:
+def compute_view(
+    seen: Observations, previous: View | None, scanning: Scanning, max_distances: FloatArray
+) -> View:
     """Return the views of the robots, which are those of their last scans.
 
     Parameters
@@ -76,7 +78,7 @@ def compute_view(seen: Observations, previous: View | None, scanning: Scanning, 
     return View(distances=np.broadcast_to(max_distances[:, None], shape), is_hit=np.zeros(shape, dtype=bool))
 
 
-def find_windows(view: View, directions: Array, max_distances: Array, min_jump: float) -> Windows:
+def find_windows(view: View, directions: FloatArray, max_distances: FloatArray, min_jump: float) -> Windows:
     """Find the rays at which views become abruptly deeper than at the ray before.
 
     Seen at a low angle, a wall also becomes deeper from ray to ray. Along a straight wall, 1/distance is a
@@ -122,7 +124,9 @@ def find_windows(view: View, directions: Array, max_distances: Array, min_jump: 
     )
 
 
-def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: Array) -> Array:
+def integrate_over_windows(
+    windows: Windows, view: View, depths: FloatArray, weight: FloatArray
+) -> FloatArray:
     """Compute the growth rate of the weighted area of a view at each of its windows.
 
     Parameters
@@ -149,7 +153,7 @@ def integrate_over_windows(windows: Windows, view: View, depths: Array, weight: 
     return np.asarray(integral[:, None] * windows.directions)
 
 
-def _predict_depth(view: View, max_distances: Array, side: int) -> Array:
+def _predict_depth(view: View, max_distances: FloatArray, side: int) -> FloatArray:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
 
     The rays are in counter-clockwise order if `side` is 1, and in clockwise order if it is -1.
@@ -166,7 +170,7 @@ def _predict_depth(view: View, max_distances: Array, side: int) -> Array:
     return np.where(has_second_hit, np.maximum(wall_depth, previous_depth), previous_depth)
 
 
-def evaluate_density(density: Density | None, points: Array) -> Array:
+def evaluate_density(density: Density | None, points: FloatArray) -> FloatArray:
     """Evaluate a density at points.
 
     Parameters
@@ -184,7 +188,9 @@ def evaluate_density(density: Density | None, points: Array) -> Array:
     return density.evaluate(points.reshape(-1, 2)).reshape(points.shape[:-1])
 
 
-def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: Array | None) -> Array:
+def compute_speed_fractions(
+    gradient: FloatArray, previous: FloatArray | None, fraction: FloatArray | None
+) -> FloatArray:
     """Compute the fraction of full speed at which robots follow discontinuous gradients.
 
     The visible area as a function of the position has ridges, for example at doors. On both sides of a ridge
@@ -213,7 +219,7 @@ def compute_speed_fractions(gradient: Array, previous: Array | None, fraction: A
 
 
 @kernel
-def is_behind_wall(x: float, y: float, wall_distances: Array) -> bool:
+def is_behind_wall(x: float, y: float, wall_distances: FloatArray) -> bool:
     """Return whether a point, relative to the robot, is farther away than the wall in its direction.
 
     Parameters
@@ -232,7 +238,7 @@ def is_behind_wall(x: float, y: float, wall_distances: Array) -> bool:
 
 
 @kernel
-def is_path_clear(x: float, y: float, dx: float, dy: float, wall_distances: Array) -> bool:
+def is_path_clear(x: float, y: float, dx: float, dy: float, wall_distances: FloatArray) -> bool:
     """Return whether a straight path stays in front of the walls that the robot sees.
 
     Parameters

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.errors import require_number
+from robocov.typing import BoolArray, FloatArray
 
 MAX_RAYS = 3600
 """Maximum number of rays of a scan: one for each tenth of a degree."""
@@ -79,7 +79,7 @@ class Scans:
     Scanning : Settings with which a controller requests scans.
     """
 
-    distances: Array
+    distances: FloatArray
     is_hit: BoolArray
 
     @property
@@ -88,12 +88,12 @@ class Scans:
         return int(self.distances.shape[1])
 
     @property
-    def directions(self) -> Array:
+    def directions(self) -> FloatArray:
         """Unit vectors along the rays, (rays, 2)."""
         return compute_ray_directions(self.rays)
 
 
-def compute_ray_directions(rays: int) -> Array:
+def compute_ray_directions(rays: int) -> FloatArray:
     """Compute unit vectors along evenly spaced rays.
 
     Parameters

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from robocov.arrays import Array, BoolArray
 from robocov.errors import format_count
 from robocov.observation.decisions import Decision
 from robocov.observation.observations import Observations
+from robocov.typing import BoolArray, FloatArray
 
 
 @dataclass(slots=True, eq=False)
@@ -51,7 +51,7 @@ class Snapshot:
 
     seen: Observations
     decision: Decision
-    true_positions: Array | None = None
+    true_positions: FloatArray | None = None
     working: BoolArray | None = None
     inbox: Any = None
     sent_bytes: int = 0
@@ -65,16 +65,16 @@ class Snapshot:
         return self.seen.time
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """True positions of the robots, (n, 2) m."""
         return self.seen.positions if self.true_positions is None else self.true_positions
 
     @property
-    def velocities(self) -> Array:
+    def velocities(self) -> FloatArray:
         """Velocities, (n, 2) m/s."""
         return self.seen.velocities
 
     @property
-    def steering(self) -> Array | None:
+    def steering(self) -> FloatArray | None:
         """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
         return self.seen.steering

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.environment import (
     compute_center_areas,
     compute_start_clearance,
@@ -16,6 +16,7 @@ from robocov.environment import (
     find_nearest_inside,
 )
 from robocov.potential import compute_spread_directions
+from robocov.typing import FloatArray, IntArray
 
 _EDGES_PER_QUARTER = 32
 """Number of edges that replace a quarter circle around a corner. They are closer to the corner than the
@@ -77,7 +78,7 @@ class ConfigurationSpace:
         self.components: tuple[BaseGeometry, ...] = tuple(areas)
         shapely.prepare(list(self.components))
 
-    def find_nearest(self, positions: Array, robot_components: IntArray) -> Array | None:
+    def find_nearest(self, positions: FloatArray, robot_components: IntArray) -> FloatArray | None:
         """Find positions at which all robots fit, near the given ones.
 
         Each robot moves to the nearest position clear of walls. Robots that are too close together are then
@@ -106,7 +107,7 @@ class ConfigurationSpace:
             positions = find_nearest_inside(areas, self._push_apart(positions, ordered_pairs))
         return None
 
-    def _push_apart(self, positions: Array, pairs: IntArray) -> Array:
+    def _push_apart(self, positions: FloatArray, pairs: IntArray) -> FloatArray:
         """Return the positions, (n, 2), after the two robots of each of the pairs, (p, 2), are pushed apart.
 
         Both robots of a pair move by the same distance.

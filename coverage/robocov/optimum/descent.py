@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.optimum.configuration_space import ConfigurationSpace
+from robocov.typing import FloatArray, IntArray
 
 _MAX_STEPS = 300
 """Maximum number of steps of a descent. A few dozen are typical."""
@@ -43,16 +44,16 @@ of the squared change."""
 class _CurvaturePair:
     """A step of the descent and the change of the gradient, from which the curvature is estimated."""
 
-    move: Array
+    move: FloatArray
     """(n, 2) m, change of the positions."""
-    gradient_change: Array
+    gradient_change: FloatArray
     """(n, 2) change of the gradient."""
 
 
 def descend(
     cost: CoverageCost,
     space: ConfigurationSpace,
-    positions: Array,
+    positions: FloatArray,
     robot_components: IntArray,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> CoverageResult:
@@ -146,7 +147,9 @@ class _Descent:
         self.result = improved
         return True
 
-    def _search_line(self, gradient: Array, direction: Array, max_trials: int) -> CoverageResult | None:
+    def _search_line(
+        self, gradient: FloatArray, direction: FloatArray, max_trials: int
+    ) -> CoverageResult | None:
         """Return the result of the longest trial step that lowers the cost enough, or None if none does.
 
         The first trial step is the whole `direction`, (n, 2) m. Each later one is half as long as the
@@ -167,14 +170,14 @@ class _Descent:
         return None
 
 
-def _compute_gradient(result: CoverageResult) -> Array:
+def _compute_gradient(result: CoverageResult) -> FloatArray:
     """Return the derivative of the mean distance with respect to the positions, (n, 2)."""
     if not result.value > 0.0:
         return np.zeros_like(result.positions)
     return result.gradient * (result.mean_distance / result.value)
 
 
-def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
+def _compute_curvature(result: CoverageResult, min_distance: float) -> FloatArray:
     """Return the curvature of the cost for each robot, (n,) 1/m, as in Weiszfeld's iteration.
 
     It is the sum of the weights of the robot's sites, each divided by the distance from the robot to its
@@ -194,7 +197,9 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> Array:
     return np.where(curvatures > 0.0, curvatures, 1.0)
 
 
-def _compute_quasi_newton_direction(gradient: Array, curvature: Array, pairs: deque[_CurvaturePair]) -> Array:
+def _compute_quasi_newton_direction(
+    gradient: FloatArray, curvature: FloatArray, pairs: deque[_CurvaturePair]
+) -> FloatArray:
     """Return the L-BFGS direction, (n, 2) m, for an initial curvature of each robot, (n, 1) 1/m."""
     moves = np.array([pair.move for pair in pairs]).reshape(len(pairs), -1)
     changes = np.array([pair.gradient_change for pair in pairs]).reshape(len(pairs), -1)

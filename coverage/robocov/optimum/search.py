@@ -18,7 +18,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_lengths, freeze
+from robocov.arrays import compute_lengths, freeze
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
@@ -26,6 +26,7 @@ from robocov.errors import ParameterError, is_number, quote, require_number
 from robocov.k_median import apply_best_swaps, run_lloyd, seed_sources
 from robocov.optimum.configuration_space import ConfigurationSpace
 from robocov.optimum.descent import descend
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 MAX_ROBOTS = 500
 """Maximum number of robots."""
@@ -94,12 +95,12 @@ class Optimum:
     0.1
     """
 
-    positions: Array
+    positions: FloatArray
     mean_distance: float
     value: float
     uncovered_area: float
-    costs: Array
-    costs_before_descent: Array
+    costs: FloatArray
+    costs_before_descent: FloatArray
     restart: int
 
     def compute_agreement(self, within: float = 0.005) -> float:
@@ -232,7 +233,7 @@ class _Outcome(NamedTuple):
 
     mean_distance_before_descent: float
     """Mean distance before the descent of the exact cost, m."""
-    positions: Array
+    positions: FloatArray
     """(n, 2) Positions of the robots, m."""
     mean_distance: float
     """Mean geodesic distance from a site to the nearest robot, m."""
@@ -262,7 +263,7 @@ class _SiteGroups(NamedTuple):
 
     representatives: IntArray
     """(t,) The site of each group from which distances are measured."""
-    weights: Array | IntArray
+    weights: FloatArray | IntArray
     """(t,) Sum of the weights of each group's sites; their number if all weights are equal."""
 
 
@@ -314,7 +315,7 @@ class _Search:
         # Many restarts find the same sources. The descent from these is computed only once.
         self._outcome_by_sources: dict[tuple[int, ...], _Outcome] = {}
 
-    def _spread_candidates(self, covered: list[int]) -> list[Array]:
+    def _spread_candidates(self, covered: list[int]) -> list[FloatArray]:
         """Return the candidate positions in each of the covered components, (c, 2) m each."""
         areas = [self.space.components[k] for k in covered]
         total_area = sum(area.area for area in areas)
@@ -378,7 +379,7 @@ class _Search:
             weights = np.add.reduceat(cost.weights[sites], first_sites)
         return _SiteGroups(representatives=sites[first_sites], weights=weights)
 
-    def _compute_table(self, groups: _SiteGroups) -> Array:
+    def _compute_table(self, groups: _SiteGroups) -> FloatArray:
         """Compute the table of weighted distances from the groups of sites to the candidates, (t, c) m."""
         cost = self.cost
         distances = cost.geodesics.compute_distances(self.candidates, cost.points[groups.representatives])
@@ -407,7 +408,7 @@ def _compute_offsets(indices: IntArray, block_side: int) -> IntArray:
     return 2 * (indices % block_side) - (block_side - 1)
 
 
-def _spread_points(area: BaseGeometry, spacing: float) -> Array:
+def _spread_points(area: BaseGeometry, spacing: float) -> FloatArray:
     """Return points in an area, (p, 2), at least `spacing` apart, with no large gaps between them.
 
     Every third row and column of a fine grid form a coarse grid. The gaps between the coarse grid and the
@@ -435,7 +436,7 @@ def _spread_points(area: BaseGeometry, spacing: float) -> Array:
     return _fill_gaps(coarse_points, other_points, _STEPS_PER_SPACING * step)
 
 
-def _fill_gaps(points: Array, candidates: Array, spacing: float) -> Array:
+def _fill_gaps(points: FloatArray, candidates: FloatArray, spacing: float) -> FloatArray:
     """Add candidates to points, (p, 2), as long as one is at least `spacing` away from all of them.
 
     Each time, the candidate that is farthest from the nearest point is added.

@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.observation import compute_ray_directions
 from robocov.planning.raster import CellGrid, Raster, find_column, find_row
+from robocov.typing import BoolArray, FloatArray
 
 UNKNOWN = 0
 FREE = 1
@@ -82,7 +82,7 @@ class DiscoveredMap:
         """Whether each cell is a wall, a presumed wall, or outside the region, (rows, columns)."""
         return np.asarray((self.state >= PRESUMED_WALL) | self.raster.is_outside)
 
-    def add_scan(self, position: Array, distances: Array, is_hit: BoolArray) -> DiscoveredMap:
+    def add_scan(self, position: FloatArray, distances: FloatArray, is_hit: BoolArray) -> DiscoveredMap:
         """Return the map updated by one scan of a range sensor.
 
         Cells that rays pass through become free, cells in which they hit an obstacle become walls, and cells
@@ -105,7 +105,11 @@ class DiscoveredMap:
         return self.add_scans(position[None], distances[None], is_hit[None])
 
     def add_scans(
-        self, positions: Array, distances: Array, is_hit: BoolArray, robot_radius: float | None = None
+        self,
+        positions: FloatArray,
+        distances: FloatArray,
+        is_hit: BoolArray,
+        robot_radius: float | None = None,
     ) -> DiscoveredMap:
         """Return the map updated by several scans, one after another; see `add_scan`.
 
@@ -137,7 +141,7 @@ class DiscoveredMap:
                 _mark_robots(state, grid, positions[scan : scan + 1], robot_radius)
         return self._replace_state(state)
 
-    def add_robots(self, positions: Array, radius: float) -> DiscoveredMap:
+    def add_robots(self, positions: FloatArray, radius: float) -> DiscoveredMap:
         """Return the map with the cells that robots cover marked as free. Cells that are walls stay walls.
 
         Parameters
@@ -260,7 +264,11 @@ def _is_open(state: NDArray[np.uint8], row: int, column: int) -> bool:
 
 @kernel
 def _mark_passed_cells(
-    state: NDArray[np.uint8], grid: CellGrid, position: Array, directions: Array, lengths: Array
+    state: NDArray[np.uint8],
+    grid: CellGrid,
+    position: FloatArray,
+    directions: FloatArray,
+    lengths: FloatArray,
 ) -> None:
     """Mark the cells that rays pass through as free; walls only become less certain.
 
@@ -294,7 +302,9 @@ def _mark_passed_cells(
 
 
 @kernel
-def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, lengths: Array) -> Array:
+def _compute_ray_ends(
+    grid: CellGrid, position: FloatArray, directions: FloatArray, lengths: FloatArray
+) -> FloatArray:
     """Compute points, (rays, 2) m, just inside the obstacles at the ends of the rays."""
     ends = np.empty(directions.shape)
     for ray in range(len(lengths)):
@@ -305,7 +315,9 @@ def _compute_ray_ends(grid: CellGrid, position: Array, directions: Array, length
 
 
 @kernel
-def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
+def _mark_presumed_walls(
+    state: NDArray[np.uint8], grid: CellGrid, ends: FloatArray, is_hit: BoolArray
+) -> None:
     """Mark unknown cells between the ends of neighboring rays as presumed walls, and known walls as certain.
 
     If the ends of two neighboring rays are close together, both have probably hit the same surface.
@@ -330,7 +342,7 @@ def _mark_presumed_walls(state: NDArray[np.uint8], grid: CellGrid, ends: Array, 
 
 
 @kernel
-def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hit: BoolArray) -> None:
+def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: FloatArray, is_hit: BoolArray) -> None:
     """Mark the cells in which rays have hit an obstacle as walls."""
     rows, columns = state.shape
     for ray in range(len(ends)):
@@ -341,7 +353,7 @@ def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: Array, is_hi
 
 
 @kernel
-def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: Array, radius: float) -> None:
+def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: FloatArray, radius: float) -> None:
     """Mark the cells whose center is within a radius of a robot as free, except for walls."""
     rows, columns = state.shape
     for x, y in positions:

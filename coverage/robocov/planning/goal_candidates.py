@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.lattice_graph import LatticeGraph
 from robocov.planning.window import Window
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _MAX_CANDIDATES = 180
 """Maximum number of nodes that `_choose_regular_nodes` returns in a small window."""
@@ -24,7 +24,7 @@ class TeamCandidates(NamedTuple):
 
     nodes: IntArray
     """(c,) Indices of the nodes."""
-    distances: Array
+    distances: FloatArray
     """(c, m) m, distances from these nodes to all nodes."""
 
 

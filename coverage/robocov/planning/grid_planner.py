@@ -7,7 +7,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from robocov.arrays import Array, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.goal_candidates import TeamCandidates, choose_candidates
 from robocov.planning.lattice_graph import LatticeGraph
@@ -15,6 +15,7 @@ from robocov.planning.map_window import MapWindow
 from robocov.planning.node_visibility import NodeVisibility
 from robocov.planning.routes import find_route
 from robocov.planning.window import Window
+from robocov.typing import FloatArray
 
 
 @dataclass(eq=False)
@@ -98,7 +99,7 @@ class GridPlanner:
             return self
         return later
 
-    def compute_distances_from(self, positions: Array) -> Array:
+    def compute_distances_from(self, positions: FloatArray) -> FloatArray:
         """Compute the distance from each node to the nearest of the given positions.
 
         Parameters
@@ -117,7 +118,7 @@ class GridPlanner:
             offsets.append(compute_point_distances(self.map_window.nodes[entry_nodes], position))
         return self.graph.compute_nearest_distances(np.concatenate(sources), np.concatenate(offsets))
 
-    def look_up_distances(self, position: Array, table: Array) -> Array:
+    def look_up_distances(self, position: FloatArray, table: FloatArray) -> FloatArray:
         """Return the distances from a position to given nodes, based on a table of distances between nodes.
 
         This takes less time than a search from the position.
@@ -160,7 +161,7 @@ class GridPlanner:
             self._team_candidates[first_node] = TeamCandidates(nodes, distances)
         return self._team_candidates[first_node]
 
-    def find_route(self, position: Array, goal: Array) -> Array:
+    def find_route(self, position: FloatArray, goal: FloatArray) -> FloatArray:
         """Find the shortest route from a position to a goal.
 
         Parameters

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import inlined_kernel, kernel
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half of the moves from a node to its neighbors. The others are their opposites."""
@@ -45,7 +45,7 @@ class LatticeCells(NamedTuple):
 class Edges(NamedTuple):
     """The edges of a directed graph with m nodes, in compressed sparse rows."""
 
-    lengths: Array
+    lengths: FloatArray
     """(e,) m"""
     ends: IntArray
     """(e,) The node that each edge leads to."""
@@ -79,7 +79,7 @@ class _Moves(NamedTuple):
     """(k,) Number of rows of nodes that each move leads up."""
     columns: IntArray
     """(k,) Number of columns of nodes that each move leads to the right."""
-    lengths: Array
+    lengths: FloatArray
     """(k,) m, length of each move."""
     crossed_rows: IntArray
     """(c,) Row of each cell that the moves cross, relative to the cell of the node."""
@@ -143,7 +143,9 @@ def _list_crossed_cells(up: int, right: int, stride: int) -> tuple[tuple[int, in
 
 
 @kernel
-def _compute_move_lengths(cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int) -> Array:
+def _compute_move_lengths(
+    cells: LatticeCells, moves: _Moves, rows: int, columns: int, stride: int
+) -> FloatArray:
     """Compute the length of each move from each node, m; infinite for moves that are not possible.
 
     A move leads from a node to a neighbor up to `_MAX_MOVE` rows and columns away. The result has the shape
@@ -203,7 +205,7 @@ def _examine_crossed_cells(
 
 
 @kernel
-def _compress_edges(lengths: Array, columns: int) -> Edges:
+def _compress_edges(lengths: FloatArray, columns: int) -> Edges:
     """Collect the possible moves from all nodes as edges in compressed sparse rows.
 
     Entry [node, _MAX_MOVE + up, _MAX_MOVE + right] of `lengths` is the length in meters of the move by `up`
@@ -227,8 +229,8 @@ def _compress_edges(lengths: Array, columns: int) -> Edges:
 
 @kernel
 def compute_distances(
-    edges: Edges, shortest_edge: float, sources: IntArray, offsets: Array, limit: float
-) -> Array:
+    edges: Edges, shortest_edge: float, sources: IntArray, offsets: FloatArray, limit: float
+) -> FloatArray:
     """Compute the distance from each node to the nearest of several sources.
 
     Parameters
@@ -286,7 +288,7 @@ def compute_distances(
 
 @kernel
 def _add_sources(
-    sources: IntArray, offsets: Array, distances: Array, front: IntArray, is_in_front: BoolArray
+    sources: IntArray, offsets: FloatArray, distances: FloatArray, front: IntArray, is_in_front: BoolArray
 ) -> int:
     """Set the distances of the sources, in m, and add them to an empty front; return the number added.
 
@@ -305,7 +307,7 @@ def _add_sources(
 
 @kernel
 def _settle_nearest_nodes(
-    distances: Array, front: IntArray, front_size: int, shortest_edge: float, settled: IntArray
+    distances: FloatArray, front: IntArray, front_size: int, shortest_edge: float, settled: IntArray
 ) -> int:
     """Move the nodes to settle from the front to `settled`; return the number of nodes that remain.
 
@@ -329,7 +331,9 @@ def _settle_nearest_nodes(
 
 
 @kernel
-def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, max_count: int) -> IntArray:
+def find_nearest_nodes(
+    position: FloatArray, nodes: FloatArray, is_candidate: BoolArray, max_count: int
+) -> IntArray:
     """Find the candidates that are nearest to a position, in order of distance.
 
     Parameters
@@ -367,7 +371,7 @@ def find_nearest_nodes(position: Array, nodes: Array, is_candidate: BoolArray, m
 
 @kernel
 def find_clear_lines(
-    position: Array, ends: Array, is_obstructing: BoolArray, frame: Frame, ignored_length: float
+    position: FloatArray, ends: FloatArray, is_obstructing: BoolArray, frame: Frame, ignored_length: float
 ) -> BoolArray:
     """Find the straight lines from a position that cross no obstructing cell.
 

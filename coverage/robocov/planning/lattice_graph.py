@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, IntArray
 from robocov.planning.lattice import Edges, LatticeCells, build_edges, compute_distances
 from robocov.planning.map_window import MapWindow
 from robocov.planning.portals import Portals, add_portals, find_portals
+from robocov.typing import FloatArray, IntArray
 
 
 @dataclass(eq=False)
@@ -31,7 +31,7 @@ class LatticeGraph:
     """
 
     map_window: MapWindow
-    _distances_of_node: dict[int, Array] = field(default_factory=dict, init=False, repr=False)
+    _distances_of_node: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def moves(self) -> Edges:
@@ -88,7 +88,7 @@ class LatticeGraph:
 
     def compute_nearest_distances(
         self, sources: ArrayLike, offsets: ArrayLike, limit: float = math.inf
-    ) -> Array:
+    ) -> FloatArray:
         """Compute the distance from each node to the nearest of several sources.
 
         Parameters
@@ -113,7 +113,7 @@ class LatticeGraph:
             limit,
         )
 
-    def get_distances(self, node: int) -> Array:
+    def get_distances(self, node: int) -> FloatArray:
         """Return the distances from a node to all nodes.
 
         Parameters
@@ -129,7 +129,7 @@ class LatticeGraph:
             self._distances_of_node[node] = self.compute_nearest_distances([node], [0.0])
         return self._distances_of_node[node]
 
-    def compute_distance_table(self, nodes: Sequence[int] | IntArray, limit: float = math.inf) -> Array:
+    def compute_distance_table(self, nodes: Sequence[int] | IntArray, limit: float = math.inf) -> FloatArray:
         """Compute the distances from each of the given nodes to all nodes.
 
         Distances that `get_distances` has stored are reused, but no further ones are stored.
@@ -151,7 +151,7 @@ class LatticeGraph:
             table[row] = self.compute_nearest_distances([node], [0.0], limit) if stored is None else stored
         return table
 
-    def find_shortest_paths(self, node: int) -> tuple[Array, IntArray]:
+    def find_shortest_paths(self, node: int) -> tuple[FloatArray, IntArray]:
         """Find the shortest paths from a node to all nodes.
 
         This takes longer than `get_distances`, which does not find the paths.

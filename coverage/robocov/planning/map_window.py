@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap, dilate
 from robocov.planning.openness import MAX_BLOCKS, compute_openness
 from robocov.planning.raster import SIDE_STEPS
 from robocov.planning.window import Window
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 
 class Frontier(NamedTuple):
@@ -39,7 +39,7 @@ class UnknownArea(NamedTuple):
     """(p,) Label of the patch, from 1."""
     nodes: IntArray
     """(p,) Index of the node."""
-    expected_free_counts: Array
+    expected_free_counts: FloatArray
     """(p,) Expected number of free ones among these cells."""
 
 
@@ -88,7 +88,7 @@ class MapWindow:
         return dilate(self.is_blocked, self.clearance / self.known_map.raster.cell_size)
 
     @cached_property
-    def openness(self) -> Array:
+    def openness(self) -> FloatArray:
         """Probability that each unknown cell is free, (h, w); 0 for all other cells."""
         state = self.window.crop(self.known_map.state, np.uint8(UNKNOWN))
         max_blocks = min(MAX_BLOCKS, self.window.rows * self.window.columns)
@@ -106,7 +106,7 @@ class MapWindow:
         return self.window.stride * self.known_map.raster.cell_size
 
     @cached_property
-    def nodes(self) -> Array:
+    def nodes(self) -> FloatArray:
         """Positions of the nodes, (m, 2) m, row by row."""
         return self.window.compute_nodes(self.known_map.raster)
 
@@ -117,12 +117,12 @@ class MapWindow:
         return np.asarray(~self.is_near_wall[stride // 2 :: stride, stride // 2 :: stride].ravel())
 
     @cached_property
-    def free_counts(self) -> Array:
+    def free_counts(self) -> FloatArray:
         """Number of free cells that each node represents, (m,)."""
         return self.sum_by_node(self.is_free)
 
     @cached_property
-    def expected_free_counts(self) -> Array:
+    def expected_free_counts(self) -> FloatArray:
         """Expected number of free cells that each node represents, (m,), with unknown ones by openness."""
         return self.sum_by_node(self.is_free + self.openness)
 
@@ -159,7 +159,7 @@ class MapWindow:
             patches=pairs // node_count, nodes=pairs % node_count, expected_free_counts=expected_free_counts
         )
 
-    def sum_by_node(self, values: Array | BoolArray) -> Array:
+    def sum_by_node(self, values: FloatArray | BoolArray) -> FloatArray:
         """Sum the values of the cells that each node represents.
 
         Parameters

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.lattice import Frame, find_clear_lines, find_nearest_nodes
 from robocov.planning.map_window import MapWindow
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 NO_NODE = -1
 """Index that stands for no node."""
@@ -50,7 +50,7 @@ class NodeVisibility:
         )
 
     def find_clear_lines(
-        self, position: Array, ends: Array, is_obstructing: BoolArray, ignored_length: float = 0.0
+        self, position: FloatArray, ends: FloatArray, is_obstructing: BoolArray, ignored_length: float = 0.0
     ) -> BoolArray:
         """Find the straight lines from a position that cross no obstructing cell.
 
@@ -71,7 +71,7 @@ class NodeVisibility:
         """
         return find_clear_lines(position, ends, is_obstructing, self._frame, ignored_length)
 
-    def find_nearest_nodes(self, position: Array, is_candidate: BoolArray) -> IntArray:
+    def find_nearest_nodes(self, position: FloatArray, is_candidate: BoolArray) -> IntArray:
         """Find the candidates that are nearest to a position, whether they are visible or not.
 
         Parameters
@@ -87,7 +87,7 @@ class NodeVisibility:
         """
         return find_nearest_nodes(position, self.map_window.nodes, is_candidate, _MAX_NEAREST_NODES)
 
-    def find_nearest_node(self, position: Array) -> int:
+    def find_nearest_node(self, position: FloatArray) -> int:
         """Find the nearest node with clearance, whether it is visible or not.
 
         Parameters
@@ -102,7 +102,7 @@ class NodeVisibility:
         nearest_nodes = self.find_nearest_nodes(position, self.map_window.has_clearance)
         return int(nearest_nodes[0]) if len(nearest_nodes) else NO_NODE
 
-    def find_entry_node(self, position: Array) -> int:
+    def find_entry_node(self, position: FloatArray) -> int:
         """Find the nearest node at which a path from a position can enter the lattice.
 
         Parameters
@@ -117,7 +117,7 @@ class NodeVisibility:
         entry_nodes = self.get_entry_nodes(position)
         return int(entry_nodes[0]) if len(entry_nodes) else NO_NODE
 
-    def get_entry_nodes(self, position: Array) -> IntArray:
+    def get_entry_nodes(self, position: FloatArray) -> IntArray:
         """Return the nodes at which a path from a position can enter the lattice.
 
         These are the nodes visible from the position, among the nearest ones with clearance. If none of them

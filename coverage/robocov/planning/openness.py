@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.planning.discovered_map import FREE, UNKNOWN
 from robocov.planning.raster import SIDE_STEPS
+from robocov.typing import BoolArray, FloatArray
 
 PRIOR_OPENNESS = 0.8
 """Openness of cells that are far from all known cells."""
@@ -32,19 +32,21 @@ _OUTSIDE = 255
 class _BlockGrid(NamedTuple):
     """Square blocks of cells, with the number of sides that their unknown cells share with other cells."""
 
-    unknown_counts: Array
+    unknown_counts: FloatArray
     """(rows, columns) Number of unknown cells in each block."""
-    free_side_counts: Array
+    free_side_counts: FloatArray
     """(rows, columns) Number of sides between unknown cells of each block and free cells."""
-    wall_side_counts: Array
+    wall_side_counts: FloatArray
     """(rows, columns) Number of sides between unknown cells of each block and walls."""
-    link_counts_up: Array
+    link_counts_up: FloatArray
     """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of the block above."""
-    link_counts_right: Array
+    link_counts_right: FloatArray
     """(rows + 1, columns + 1) Number of sides between unknown cells of a block and of its right neighbor."""
 
 
-def compute_openness(state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS) -> Array:
+def compute_openness(
+    state: NDArray[np.uint8], is_outside: BoolArray, max_blocks: int = MAX_BLOCKS
+) -> FloatArray:
     """Compute the probability that each unknown cell is free.
 
     Parameters
@@ -158,7 +160,7 @@ def _count_sides(cells: NDArray[np.uint8], block_side: int, i: int, j: int, bloc
 
 
 @kernel
-def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
+def _solve_laplace(blocks: _BlockGrid, block_side: int) -> FloatArray:
     """Compute the openness u of blocks, (rows + 1, columns + 1), by successive overrelaxation.
 
     u is the probability that a random walk through unknown cells reaches a free cell before a wall. It solves
@@ -193,7 +195,7 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> Array:
 
 
 @kernel
-def _spread_to_cells(cells: NDArray[np.uint8], block_openness: Array, block_side: int) -> Array:
+def _spread_to_cells(cells: NDArray[np.uint8], block_openness: FloatArray, block_side: int) -> FloatArray:
     """Give each unknown cell the openness of its block, and all other cells 0."""
     rows, columns = cells.shape
     openness = np.zeros((rows, columns))

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.map_window import MapWindow
 from robocov.planning.node_visibility import NO_NODE
 from robocov.planning.raster import SIDE_STEPS
 from robocov.planning.team_placement import UNREACHABLE_M
+from robocov.typing import FloatArray, IntArray
 
 _MAX_MOVES = 6
 """Maximum number of moves of a search, each to a neighboring node."""
@@ -28,11 +28,11 @@ _MAX_SHIFT_SPACINGS = 0.5
 class OwnGoal(NamedTuple):
     """A local minimum of the coverage cost as a function of the position of one robot."""
 
-    goal: Array
+    goal: FloatArray
     """(2,) m"""
     node: int
     """The node at which the search ended, close to the goal."""
-    cell_distances: Array
+    cell_distances: FloatArray
     """(m,) m, distances from that node to the nodes of the robot's own cell, 0 for all other nodes."""
     cost: float
     """Coverage cost J of the whole team with the robot at that node, in cells times meters."""
@@ -40,10 +40,10 @@ class OwnGoal(NamedTuple):
 
 def find_own_goal(
     planner: GridPlanner,
-    weights: Array,
-    other_positions: Array,
+    weights: FloatArray,
+    other_positions: FloatArray,
     first_node: int,
-    previous_goal: Array,
+    previous_goal: FloatArray,
     min_saving: float,
 ) -> OwnGoal:
     """Find a local minimum of the coverage cost as a function of the position of one robot.
@@ -105,7 +105,9 @@ class _NodeSearch:
         Coverage cost with the robot at each node that has been evaluated.
     """
 
-    def __init__(self, planner: GridPlanner, weights: Array, other_positions: Array, first_node: int) -> None:
+    def __init__(
+        self, planner: GridPlanner, weights: FloatArray, other_positions: FloatArray, first_node: int
+    ) -> None:
         """Start a search at a node.
 
         Parameters
@@ -120,16 +122,16 @@ class _NodeSearch:
         self._planner = planner
         distances = planner.graph.get_distances(first_node)
         self.targets: IntArray = np.flatnonzero(np.isfinite(distances) & (weights > 0.0))
-        self.target_weights: Array = weights[self.targets]
+        self.target_weights: FloatArray = weights[self.targets]
         other_distances = planner.compute_distances_from(other_positions)[self.targets]
-        self._other_distances: Array = np.minimum(other_distances, UNREACHABLE_M)
+        self._other_distances: FloatArray = np.minimum(other_distances, UNREACHABLE_M)
         own_distances = distances[self.targets]
         cell_radius = float(own_distances[own_distances < self._other_distances].max(initial=0.0))
         spacing = planner.map_window.spacing
         # Nodes beyond the limit cannot become part of the robot's cell within the few moves of the search.
         self._limit = _LIMIT_PER_CELL_RADIUS * cell_radius + _LIMIT_MARGIN_SPACINGS * spacing
         self._node_count = len(weights)
-        self._distances: dict[int, Array] = {}
+        self._distances: dict[int, FloatArray] = {}
         self.costs: dict[int, float] = {}
 
     def evaluate_neighbors(self, node: int) -> list[int]:
@@ -144,7 +146,7 @@ class _NodeSearch:
             self.costs[new_node] = float((self.target_weights * nearest).sum())
         return neighbors
 
-    def compute_cell_distances(self, node: int) -> Array:
+    def compute_cell_distances(self, node: int) -> FloatArray:
         """Compute the distances from a node to those of the robot's own cell, 0 for all others, (m,) m."""
         distances = self._distances[node]
         is_own = distances < self._other_distances
@@ -170,8 +172,12 @@ def _list_neighbors(map_window: MapWindow, node: int) -> list[int]:
 
 
 def _refine_goal(
-    map_window: MapWindow, node: int, neighbors: list[int], costs: Mapping[int, float], previous_goal: Array
-) -> tuple[Array, float]:
+    map_window: MapWindow,
+    node: int,
+    neighbors: list[int],
+    costs: Mapping[int, float],
+    previous_goal: FloatArray,
+) -> tuple[FloatArray, float]:
     """Return the position of minimum cost near a node, and the excess cost of the previous goal.
 
     The cost is approximated by a parabola in x and one in y, each through the costs of the node and of its

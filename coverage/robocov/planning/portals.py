@@ -17,10 +17,10 @@ from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.planning.lattice import Edges
 from robocov.planning.raster import SIDE_STEPS
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _CORNER_STEPS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 """Steps, in rows and columns, to the four neighbors of a cell that share only a corner with it."""
@@ -43,7 +43,7 @@ class Portals(NamedTuple):
     """(p,) The node at the start of each path."""
     last_nodes: IntArray
     """(p,) The node at the end of each path."""
-    lengths: Array
+    lengths: FloatArray
     """(p,) Length of each path, in sides of a cell."""
     paths: list[IntArray]
     """Rows and columns, in the window, of the cells on each path between its two nodes, (k, 2)."""

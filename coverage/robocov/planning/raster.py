@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
 from robocov.observation.region import Region
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 SIDE_STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 """Steps, in rows and columns, to the four cells that share a side with a cell: right, above, left, below."""
@@ -81,7 +81,7 @@ class Raster:
         rows, columns = np.indices(self.shape)
         return np.asarray(~self.region.contains(self.compute_centers(rows, columns)))
 
-    def compute_centers(self, rows: IntArray, columns: IntArray) -> Array:
+    def compute_centers(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Compute the centers of cells.
 
         Parameters
@@ -95,7 +95,7 @@ class Raster:
         x, y = self.origin
         return np.stack([x + (columns + 0.5) * self.cell_size, y + (rows + 0.5) * self.cell_size], axis=-1)
 
-    def find_cells(self, points: Array) -> tuple[IntArray, IntArray]:
+    def find_cells(self, points: FloatArray) -> tuple[IntArray, IntArray]:
         """Find the cells that contain points. A point outside the raster belongs to the nearest cell.
 
         Parameters

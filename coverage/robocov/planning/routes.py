@@ -7,12 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.planning.lattice_graph import LatticeGraph
 from robocov.planning.node_visibility import NO_NODE, NodeVisibility
+from robocov.typing import FloatArray
 
 
-def find_route(graph: LatticeGraph, visibility: NodeVisibility, position: Array, goal: Array) -> Array:
+def find_route(
+    graph: LatticeGraph, visibility: NodeVisibility, position: FloatArray, goal: FloatArray
+) -> FloatArray:
     """Find the shortest route from a position to a goal.
 
     Parameters
@@ -59,7 +61,7 @@ def find_route(graph: LatticeGraph, visibility: NodeVisibility, position: Array,
     return _remove_detours(visibility, position, points)
 
 
-def _find_first_node(visibility: NodeVisibility, position: Array) -> int:
+def _find_first_node(visibility: NodeVisibility, position: FloatArray) -> int:
     """Return the first node of a route: the nearest node with clearance in sight of a position.
 
     If possible, the line to the node crosses no cell near a wall, except for those around the position: the
@@ -76,7 +78,7 @@ def _find_first_node(visibility: NodeVisibility, position: Array) -> int:
     return int(candidates[is_visible.argmax()]) if is_visible.any() else NO_NODE
 
 
-def _expand_portals(graph: LatticeGraph, path: Sequence[int]) -> Array:
+def _expand_portals(graph: LatticeGraph, path: Sequence[int]) -> FloatArray:
     """Return the positions along a path of nodes, (k, 2) m, with those of the cells in its portals."""
     nodes = graph.map_window.nodes
     window = graph.map_window.window
@@ -91,14 +93,14 @@ def _expand_portals(graph: LatticeGraph, path: Sequence[int]) -> Array:
     return np.concatenate(positions)
 
 
-def _remove_detours(visibility: NodeVisibility, position: Array, points: Array) -> Array:
+def _remove_detours(visibility: NodeVisibility, position: FloatArray, points: FloatArray) -> FloatArray:
     """Return the points of a route without those that can be skipped, because later ones are in sight.
 
     A point is in sight if the line to it crosses no cell near a wall. On the first line, cells around the
     position do not count, because the robot may itself be too close to a wall.
     """
     map_window = visibility.map_window
-    remaining: list[Array] = []
+    remaining: list[FloatArray] = []
     current = position
     k = 0
     while k < len(points):

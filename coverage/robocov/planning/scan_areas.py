@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.planning.raster import Raster
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 
 class ScanAreas(NamedTuple):
@@ -33,7 +33,7 @@ class ScanAreas(NamedTuple):
     """(k,) Last column, inclusive."""
 
     @classmethod
-    def build(cls, positions: Array, ranges: Array, raster: Raster) -> ScanAreas:
+    def build(cls, positions: FloatArray, ranges: FloatArray, raster: Raster) -> ScanAreas:
         """Build the bounding boxes of scans.
 
         Parameters

@@ -16,11 +16,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation import Scans
 from robocov.observation.region import Region
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.scan_areas import ScanAreas
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 REPORTED_ROUNDS = 64
 """Number of rounds that an `Inventory` reports one by one, after the first missing scan of a robot."""
@@ -58,7 +58,7 @@ class NumberedScan:
     robot: int
     round_number: int
     time: float
-    position: Array
+    position: FloatArray
     distances: NDArray[np.uint16]
     is_hit: BoolArray
 
@@ -81,7 +81,7 @@ class NumberedScan:
 
 
 def number_scans(
-    scans: Scans, positions: Array, region: Region, *, round_number: int, time: float
+    scans: Scans, positions: FloatArray, region: Region, *, round_number: int, time: float
 ) -> list[NumberedScan]:
     """Build the numbered scans of a round.
 

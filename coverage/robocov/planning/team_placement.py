@@ -16,12 +16,13 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.density import Density
 from robocov.k_median import improve_sources, move_first_source
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.map_window import MapWindow
 from robocov.planning.node_visibility import NO_NODE
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 UNREACHABLE_M = 1e9
 """Finite value used in place of the infinite distance to a node that cannot be reached."""
@@ -34,13 +35,13 @@ _MAX_ROBOTS_FOR_THOROUGH_SEARCH = 8
 class TeamSituation(NamedTuple):
     """Positions and previous goals of k robots, as known to the first of them, which makes the plan."""
 
-    positions: Array
+    positions: FloatArray
     """(k, 2) m"""
-    previous_goals: Array
+    previous_goals: FloatArray
     """(k, 2) m, goals in the previous plan, or the positions of robots without one."""
     is_fixed: BoolArray
     """(k,) Whether each robot keeps its previous goal. The first robot never does."""
-    other_positions: Array
+    other_positions: FloatArray
     """(o, 2) m, positions of robots that do not move and are not part of the plan."""
 
 
@@ -60,7 +61,7 @@ class MinSavings(NamedTuple):
 
 def compute_node_weights(
     map_window: MapWindow, density: Density | None = None, *, only_known: bool = False
-) -> Array:
+) -> FloatArray:
     """Compute the weights w of the nodes of a map window.
 
     Parameters
@@ -82,7 +83,9 @@ def compute_node_weights(
     return weights
 
 
-def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_savings: MinSavings) -> Array:
+def place_team(
+    planner: GridPlanner, weights: FloatArray, team: TeamSituation, min_savings: MinSavings
+) -> FloatArray:
     """Compute goals for a team that have a low coverage cost and need few relocations.
 
     Parameters
@@ -140,7 +143,7 @@ def place_team(planner: GridPlanner, weights: Array, team: TeamSituation, min_sa
 
 
 def _choose_previous_candidates(
-    planner: GridPlanner, candidates: IntArray, distances: Array, team: TeamSituation
+    planner: GridPlanner, candidates: IntArray, distances: FloatArray, team: TeamSituation
 ) -> IntArray:
     """Return the candidate closest to each previous goal, (k,), without using any candidate twice.
 
@@ -170,7 +173,7 @@ def _choose_previous_candidates(
     return chosen
 
 
-def _improve_goals(table: Array, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
+def _improve_goals(table: FloatArray, chosen: IntArray, team: TeamSituation, min_saving: float) -> IntArray:
     """Return goals with a lower coverage cost for the k robots of a plan, as indices of candidates, (k,).
 
     Parameters
@@ -203,7 +206,7 @@ def _improve_goals(table: Array, chosen: IntArray, team: TeamSituation, min_savi
 
 
 def _move_first_goal(
-    table: Array, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
+    table: FloatArray, chosen: IntArray, is_in_own_cell: BoolArray, min_saving: float
 ) -> IntArray:
     """Return the goals, (k,), after that of the first robot has moved to the best candidate in its own cell.
 
@@ -228,7 +231,7 @@ def _move_first_goal(
     return moved_columns[:-1]
 
 
-def _assign_goals(path_lengths: Array, min_saving: float) -> IntArray:
+def _assign_goals(path_lengths: FloatArray, min_saving: float) -> IntArray:
     """Assign goals to robots so that the sum of squared path lengths is minimal.
 
     Parameters

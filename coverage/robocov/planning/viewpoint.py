@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.planning.map_window import MapWindow
 from robocov.planning.raster import SIDE_STEPS
+from robocov.typing import FloatArray, IntArray
 
 _MIN_VIEWPOINT_DISTANCE_M = 0.6
 """Minimum distance of a viewpoint from all viewpoints that the robot has already visited."""
@@ -26,11 +26,11 @@ class _Candidates(NamedTuple):
 
 def find_viewpoint(
     map_window: MapWindow,
-    cell_distances: Array,
-    path_lengths: Array,
+    cell_distances: FloatArray,
+    path_lengths: FloatArray,
     min_cost: float,
-    previous_viewpoints: Sequence[Array],
-) -> Array | None:
+    previous_viewpoints: Sequence[FloatArray],
+) -> FloatArray | None:
     """Find the best viewpoint from which a robot can look into an unknown patch of its own cell.
 
     An unknown patch is a connected area of cells of the map that the robot has not seen.
@@ -84,7 +84,7 @@ def find_viewpoint(
     return np.asarray(_compute_first_center(map_window) + cell * map_window.known_map.raster.cell_size)
 
 
-def _compute_patch_costs(map_window: MapWindow, cell_distances: Array) -> Array:
+def _compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> FloatArray:
     """Return the expected cost of each unknown patch, by label; see `find_viewpoint`."""
     # Each entry of `unknown` belongs to a patch and a node that represents some of its cells.
     unknown = map_window.unknown_area
@@ -93,7 +93,7 @@ def _compute_patch_costs(map_window: MapWindow, cell_distances: Array) -> Array:
     return np.asarray(np.bincount(unknown.patches, costs, minlength=label_count))
 
 
-def _get_path_lengths(map_window: MapWindow, path_lengths: Array, candidates: _Candidates) -> Array:
+def _get_path_lengths(map_window: MapWindow, path_lengths: FloatArray, candidates: _Candidates) -> FloatArray:
     """Return the length of the path to each candidate, (b, 4) m, from the lengths to all nodes, (m,) m."""
     window = map_window.window
     nodes = candidates.rows // window.stride * window.columns + candidates.columns // window.stride
@@ -102,7 +102,10 @@ def _get_path_lengths(map_window: MapWindow, path_lengths: Array, candidates: _C
 
 
 def _exclude_visited(
-    values: Array, map_window: MapWindow, candidates: _Candidates, previous_viewpoints: Sequence[Array]
+    values: FloatArray,
+    map_window: MapWindow,
+    candidates: _Candidates,
+    previous_viewpoints: Sequence[FloatArray],
 ) -> None:
     """Set the values, (b, 4), of all candidates close to a previous viewpoint to zero."""
     cell_size = map_window.known_map.raster.cell_size
@@ -114,7 +117,7 @@ def _exclude_visited(
         values[squared_distances < min_distance**2] = 0.0
 
 
-def _compute_first_center(map_window: MapWindow) -> Array:
+def _compute_first_center(map_window: MapWindow) -> FloatArray:
     """Return the center of the first cell of the window, in row 0 and column 0, (2,) m."""
     window = map_window.window
     raster = map_window.known_map.raster

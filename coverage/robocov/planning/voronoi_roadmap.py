@@ -10,14 +10,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_point_distances
+from robocov.arrays import compute_point_distances
 from robocov.compiled import kernel
 from robocov.planning.raster import SIDE_STEPS
+from robocov.typing import BoolArray, FloatArray, Int32Array, IntArray
 
 _MIN_FACING_ANGLE_RAD = math.radians(120.0)
 """Minimum angle between the directions from a point to two walls that face each other."""
@@ -43,7 +43,7 @@ class VoronoiRoadmap(NamedTuple):
 
     vertices: IntArray
     """(v, 2) Row and column of the cell of each vertex."""
-    distances: Array
+    distances: FloatArray
     """(v, v) Distances along the graph, in cells; infinite between vertices that it does not connect."""
     vertex_of_cell: IntArray
     """(rows, columns) The vertex that each cell belongs to, or `NO_VERTEX`."""
@@ -116,7 +116,7 @@ def find_voronoi_cells(is_free: BoolArray) -> BoolArray:
     return is_in_graph[1:-1, 1:-1]
 
 
-def _find_cells_between_walls(wall_distances: Array, nearest_walls: NDArray[np.int32]) -> BoolArray:
+def _find_cells_between_walls(wall_distances: FloatArray, nearest_walls: Int32Array) -> BoolArray:
     """Find the cells whose nearest wall is in a very different direction from that of an adjacent cell.
 
     Parameters

@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.planning.raster import Raster
+from robocov.typing import FloatArray, IntArray
 
 _MIN_HALF_WIDTH_CELLS = 4
 """Minimum of half the width of a window."""
@@ -34,7 +34,7 @@ class Window(NamedTuple):
     """Number of cells along the side of a block."""
 
     @classmethod
-    def build_around(cls, raster: Raster, center: Array, half_width: float, max_nodes: int) -> Window:
+    def build_around(cls, raster: Raster, center: FloatArray, half_width: float, max_nodes: int) -> Window:
         """Build the window around a point, with the smallest possible blocks.
 
         Parameters
@@ -109,7 +109,7 @@ class Window(NamedTuple):
             return cropped
         return np.pad(cropped, ((0, missing_rows), (0, missing_columns)), constant_values=fill)
 
-    def compute_nodes(self, raster: Raster) -> Array:
+    def compute_nodes(self, raster: Raster) -> FloatArray:
         """Compute the positions of the nodes, row by row.
 
         Parameters

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import get_controller_label
 from robocov.controllers.gains import Value
@@ -32,6 +31,7 @@ from robocov.record.record_arrays import ARRAYS, COLUMNS, SENT_BYTES, STEERING, 
 from robocov.record.run_document import JoinEvent, RunDocument
 from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_steps
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov.voronoi import VoronoiPartition, WeightedCells, partition, partition_by_travel_time
 
 FORMAT = "robocov-run"
@@ -112,17 +112,17 @@ class Record(Drawable):
     start: str | None
     seed: int | None
     dt: float
-    time: Array
-    positions: Array
-    velocities: Array
-    forces: Array
-    goals: Array
-    obstacle_points: Array
+    time: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
+    forces: FloatArray
+    goals: FloatArray
+    obstacle_points: FloatArray
     session: Mapping[str, Any] = field(default_factory=dict)
     conditions: Conditions | None = None
-    steering: Array | None = None
+    steering: FloatArray | None = None
     joined: tuple[JoinedRobot, ...] = ()
-    sent_bytes: Array | None = None
+    sent_bytes: FloatArray | None = None
 
     @cached_property
     def working(self) -> BoolArray:
@@ -322,7 +322,7 @@ class Record(Drawable):
         """
         pandas = import_optional("pandas", "pandas")
         step_count, robot_count = self.positions.shape[:2]
-        columns: dict[str, Array | IntArray] = {
+        columns: dict[str, FloatArray | IntArray] = {
             "time_s": np.repeat(self.time, robot_count),
             "robot": np.tile(np.arange(robot_count), step_count),
         }

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import InputError
 from robocov.files.array_files import read_arrays
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
 """Names of the arrays of every record."""
@@ -52,7 +52,7 @@ def list_array_names(team: Team) -> tuple[str, ...]:
     return (*ARRAYS, STEERING) if team.is_unicycle.any() else ARRAYS
 
 
-def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
+def read_record_arrays(path: Path, team: Team) -> dict[str, FloatArray]:
     """Read the arrays of a record.
 
     Parameters
@@ -89,7 +89,9 @@ def read_record_arrays(path: Path, team: Team) -> dict[str, Array]:
     return {name: saved[name] for name in names}
 
 
-def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...], robot_count: int) -> None:
+def _check_shape(
+    path: Path, name: str, array: FloatArray, time_shape: tuple[int, ...], robot_count: int
+) -> None:
     """Raise an InputError unless an array has one row for each time step, and the right type."""
     is_per_step = name in ("time", SENT_BYTES)
     shape = time_shape if is_per_step else (*time_shape, robot_count, 2)
@@ -101,7 +103,7 @@ def _check_shape(path: Path, name: str, array: Array, time_shape: tuple[int, ...
         )
 
 
-def _check_range(path: Path, name: str, array: Array, maximum: float) -> None:
+def _check_range(path: Path, name: str, array: FloatArray, maximum: float) -> None:
     """Raise an InputError if the absolute value of a number exceeds the maximum, or is nan."""
     is_in_range = np.abs(array) <= maximum
     if not is_in_range.all():

@@ -7,7 +7,6 @@ from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import Controller, get_gain_values
 from robocov.controllers.gains import Value
@@ -18,6 +17,7 @@ from robocov.observation import Snapshot
 from robocov.record.record import Record
 from robocov.record.record_arrays import STEERING, list_array_names
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 
 @dataclass(eq=False)
@@ -81,7 +81,7 @@ class Recorder:
                 )
         self._times: list[float] = []
         self._sent_bytes: list[int] = []
-        self._rows: dict[str, list[Array]] = {
+        self._rows: dict[str, list[FloatArray]] = {
             name: [] for name in list_array_names(self.team) if name != "time"
         }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 
 TIME_ROUNDING_S = 5e-7
 """Maximum difference between times that is attributed to rounding: times are sums of control periods."""
@@ -12,7 +12,7 @@ _TIE_DECIMALS = 6
 """Number of decimals, in periods, to which distances are compared; further decimals are rounding errors."""
 
 
-def select_nearest_steps(time: Array, rate: float) -> IntArray:
+def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     """Select the time steps nearest to multiples of 1/rate, and the first and last ones.
 
     Parameters

@@ -11,7 +11,6 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Controller, IndividualController, make_controller
 from robocov.controllers.gains import Value, get_gain_values
@@ -38,6 +37,7 @@ from robocov.record import Record, Recorder
 from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ScenarioDocument
 from robocov.simulation import Simulation, TeamState, check_dt, check_joins
 from robocov.team import PARAMETERS, Team
+from robocov.typing import FloatArray
 
 MAX_RECORD_ROWS = 2e7
 """Maximum number of recorded steps times the number of robots: about 2 GB."""
@@ -120,9 +120,9 @@ class Scenario:
     team: Team
     start: str | None
     seed: int | None
-    given_starts: Array | None
-    velocities: Array | None
-    steering: Array | None
+    given_starts: FloatArray | None
+    velocities: FloatArray | None
+    steering: FloatArray | None
     duration: float
     dt: float
     conditions: Conditions | None
@@ -180,7 +180,7 @@ class Scenario:
         return f"<Scenario {self.controller} on {self.environment.name}, {robots}, {self.duration:g} s>"
 
     @cached_property
-    def starts(self) -> Array:
+    def starts(self) -> FloatArray:
         """Starting positions, (n, 2) m, sampled unless they were given.
 
         Raises

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.conditions.communication import Inbox, Radio
 from robocov.controllers import has_memory
@@ -26,6 +25,7 @@ from robocov.simulation.controller_caller import ControllerCaller
 from robocov.simulation.sensing import build_observations, is_scan_due
 from robocov.simulation.simulation import MAX_START_OVERLAP_M
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.world import World
 from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_obstacles
@@ -38,9 +38,9 @@ teams come from a triangulation, for which one call per run is just as fast."""
 class _BatchDecision(NamedTuple):
     """The decision for the robots of all runs in a step."""
 
-    forces: Array
+    forces: FloatArray
     """(runs * n, 2) N"""
-    goals: Array | None
+    goals: FloatArray | None
     """(runs * n, 2) m; None if the controller has no goals."""
     memories: list[Any]
     """The memory of each run; a single one if the controller decides for all runs at once."""
@@ -103,7 +103,7 @@ class SimulationBatch:
         self,
         environment: Environment,
         controller: Controller | IndividualController,
-        starts: Array | Sequence[Array],
+        starts: FloatArray | Sequence[FloatArray],
         team: Team | None = None,
         dt: float = DEFAULT_DT_S,
     ) -> None:
@@ -176,12 +176,12 @@ class SimulationBatch:
         return self._steps * self.dt
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """Positions of the robots' centers, (runs, n, 2) m."""
         return self._world.positions.reshape(len(self), -1, 2)
 
     @property
-    def velocities(self) -> Array:
+    def velocities(self) -> FloatArray:
         """Velocities, (runs, n, 2) m/s."""
         return self._world.velocities.reshape(len(self), -1, 2)
 
@@ -190,7 +190,7 @@ class SimulationBatch:
         """Mask of the robots that have not failed, (runs, n) bool; in a batch, none fails."""
         return self._world.working.reshape(len(self), -1)
 
-    def step(self, *, forces: Array | None = None) -> None:
+    def step(self, *, forces: FloatArray | None = None) -> None:
         """Advance all runs by one control step: observe, decide, move.
 
         Parameters
@@ -268,7 +268,7 @@ class SimulationBatch:
             steering=None if observations.steering is None else observations.steering[rows],
         )
 
-    def _check_forces(self, forces: Any) -> Array:
+    def _check_forces(self, forces: Any) -> FloatArray:
         """Check forces passed to `step`, and return them with one row for each robot of all runs."""
         shape = (len(self), len(self.team), 2)
         if np.shape(forces) != shape:
@@ -327,7 +327,7 @@ class SimulationBatch:
             self._sent_bytes[run] += sent_bytes
         return inboxes
 
-    def restart(self, run: int, starts: Array) -> None:
+    def restart(self, run: int, starts: FloatArray) -> None:
         """Restart one run from other positions. The simulation time of the batch continues.
 
         Parameters
@@ -411,7 +411,7 @@ class SimulationBatch:
         return {**vars(self), "_graphs": None, "_observations": None, "_decision": None}
 
 
-def _to_starts(starts: Any) -> Array:
+def _to_starts(starts: Any) -> FloatArray:
     """Return the start positions of all runs, (runs, n, 2) m."""
     positions = to_floats("starts", starts, "[x, y] of each robot of each run in meters", StartError)
     if positions.ndim != 3 or positions.shape[2] != 2 or 0 in positions.shape:
@@ -422,7 +422,7 @@ def _to_starts(starts: Any) -> Array:
     return positions
 
 
-def _join_goals(decisions: Sequence[Decision]) -> Array | None:
+def _join_goals(decisions: Sequence[Decision]) -> FloatArray | None:
     """Return the goals of the robots of all runs, nan where there is none; None if no run has goals."""
     if all(decision.goals is None for decision in decisions):
         return None

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.conditions.communication import Inbox, Radio
 from robocov.conditions.perception import Perception, restrict_decision_to_working
@@ -34,6 +33,7 @@ from robocov.simulation.controller_caller import ControllerCaller
 from robocov.simulation.sensing import build_observations, get_known_map, is_scan_due
 from robocov.simulation.team_state import TeamState, to_team_state
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.world import MAX_PENETRATION_M, ChangingWorld, World
 from robocov.world.free_positions import require_free_starts
 from robocov.world.obstacle_pieces import build_moving_obstacles, build_obstacles, build_solid_pieces
@@ -112,7 +112,7 @@ class Simulation:
         self,
         environment: Environment,
         controller: Controller | IndividualController,
-        starts: Array | list[list[float]] | TeamState,
+        starts: FloatArray | list[list[float]] | TeamState,
         team: Team | None = None,
         dt: float = DEFAULT_DT_S,
         *,
@@ -195,17 +195,17 @@ class Simulation:
         return self._steps * self.dt
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """Positions of the robots' centers, (n, 2) m."""
         return self._world.positions
 
     @property
-    def velocities(self) -> Array:
+    def velocities(self) -> FloatArray:
         """Velocities, (n, 2) m/s."""
         return self._world.velocities
 
     @property
-    def steering(self) -> Array | None:
+    def steering(self) -> FloatArray | None:
         """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of point robots."""
         return self._world.steering
 
@@ -214,7 +214,7 @@ class Simulation:
         """Mask of the robots that are present and have not failed, (n,) bool."""
         return self._world.working
 
-    def step(self, external_forces: Array | None = None, *, forces: Array | None = None) -> None:
+    def step(self, external_forces: FloatArray | None = None, *, forces: FloatArray | None = None) -> None:
         """Advance by one control step: observe, decide, move.
 
         Parameters
@@ -329,7 +329,7 @@ class Simulation:
             scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
         )
 
-    def _find_new_robots(self, positions_before: Array) -> tuple[JoinedRobot, ...]:
+    def _find_new_robots(self, positions_before: FloatArray) -> tuple[JoinedRobot, ...]:
         """Return the robots that joined at the end of the last step.
 
         `positions_before` are the positions before that step. That of a robot that has not joined yet is the
@@ -499,9 +499,9 @@ class Simulation:
         environment: Environment | None = None,
         controller: Controller | IndividualController | None = None,
         team: Team | None = None,
-        positions: Array | None = None,
-        velocities: Array | None = None,
-        steering: Array | None = None,
+        positions: FloatArray | None = None,
+        velocities: FloatArray | None = None,
+        steering: FloatArray | None = None,
         conditions: Conditions | None = None,
     ) -> Simulation:
         """Return a changed copy of the simulation, which continues from the current state.

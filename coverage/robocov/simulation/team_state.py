@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import StartError, quote, to_floats
+from robocov.typing import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class TeamState:
     array([[0.5, 0. ]])
     """
 
-    positions: Array
-    velocities: Array | None = None
-    steering: Array | None = None
+    positions: FloatArray
+    velocities: FloatArray | None = None
+    steering: FloatArray | None = None
     steps: int = 0
     is_computed: bool = False
 
@@ -78,7 +78,7 @@ class TeamState:
         return len(self.positions)
 
 
-def _check_rows(name: str, rows: Array, shape: tuple[int, ...], columns: str) -> None:
+def _check_rows(name: str, rows: FloatArray, shape: tuple[int, ...], columns: str) -> None:
     """Raise a StartError unless an array has the given shape and is finite."""
     if rows.shape != shape or not np.isfinite(rows).all():
         raise StartError(f"{name}: expected finite {columns} for each robot, got {quote(rows.tolist())}")

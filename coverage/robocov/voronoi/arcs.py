@@ -13,9 +13,10 @@ from math import comb
 
 import numpy as np
 
-from robocov.arrays import Array, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.compiled import kernel
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT
+from robocov.typing import FloatArray
 
 START_X = 0
 """Column of a piece: x of its start relative to the generator, m."""
@@ -49,7 +50,7 @@ _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 
 
-def compute_moments(pieces: Array, cell_count: int) -> Array:
+def compute_moments(pieces: FloatArray, cell_count: int) -> FloatArray:
     """Compute the moments of cells from the pieces of their boundaries.
 
     Parameters
@@ -68,7 +69,7 @@ def compute_moments(pieces: Array, cell_count: int) -> Array:
 
 
 @kernel
-def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
+def _compute_moments(pieces: FloatArray, cell_count: int, series: FloatArray) -> FloatArray:
     """Return the areas, first moments in x and y, and polar moments of the cells, (n, 4).
 
     By Green's theorem, each piece of a boundary adds the moments of the triangle between its chord and the
@@ -114,7 +115,7 @@ def _compute_moments(pieces: Array, cell_count: int, series: Array) -> Array:
 
 
 @kernel
-def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, float, float]:
+def _compute_segment_moments(half_angle: float, series: FloatArray) -> tuple[float, float, float]:
     """Return the area, first moment and polar moment of the circular segment on a chord of length 1.
 
     The first moment is about the line of the chord, and positive on the side away from the center of the
@@ -140,7 +141,7 @@ def _compute_segment_moments(half_angle: float, series: Array) -> tuple[float, f
     return area, first_moment, polar_moment
 
 
-def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
+def split_into_chords(pieces: FloatArray, max_deviation: float) -> list[FloatArray]:
     """Replace each piece by chords.
 
     Parameters
@@ -158,7 +159,7 @@ def split_into_chords(pieces: Array, max_deviation: float) -> list[Array]:
     return [_split_piece(piece, max_deviation) for piece in pieces[:, :CELL].tolist()]
 
 
-def _split_piece(piece: list[float], max_deviation: float) -> Array:
+def _split_piece(piece: list[float], max_deviation: float) -> FloatArray:
     """Return the ends of the chords that replace a piece, (k, 2) m. A segment is a single chord."""
     start_x, start_y, end_x, end_y, half_angle = piece
     dx = end_x - start_x
@@ -192,7 +193,7 @@ def _count_chords(length: float, half_angle: float, max_deviation: float) -> int
     return int(np.ceil(abs(half_angle) / max(max_half_angle, _MIN_CHORD_HALF_ANGLE)))
 
 
-def link_rings(pieces: Array, max_deviation: float) -> list[Array]:
+def link_rings(pieces: FloatArray, max_deviation: float) -> list[FloatArray]:
     """Link pieces into closed rings, in which chords replace the arcs.
 
     Parameters

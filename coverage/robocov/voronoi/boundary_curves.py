@@ -25,10 +25,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.compiled import kernel
 from robocov.density.cell_edges import REGION
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET
+from robocov.typing import BoolArray, FloatArray
 from robocov.voronoi.arcs import (
     CELL,
     END_X,
@@ -125,8 +125,8 @@ class _Intersection(NamedTuple):
 
 @kernel
 def trace_boundaries(
-    points: Array, sides: Array, pairs: Array, edges: Array, is_straight: BoolArray
-) -> Array:
+    points: FloatArray, sides: FloatArray, pairs: FloatArray, edges: FloatArray, is_straight: BoolArray
+) -> FloatArray:
     """Find the pieces of the boundaries of all cells.
 
     If only the region and the neighbors of the same speed bounded it, a cell would be a convex polygon. The
@@ -183,7 +183,9 @@ def trace_boundaries(
 
 
 @kernel
-def _add_boundaries(curves: Array, line_count: int, pieces: Array, piece_count: int) -> tuple[Array, int]:
+def _add_boundaries(
+    curves: FloatArray, line_count: int, pieces: FloatArray, piece_count: int
+) -> tuple[FloatArray, int]:
     """Add the pieces of the boundary of a cell to the array of pieces, from row `piece_count` on.
 
     The first `line_count` curves are lines, and the others circles. Return the array, which is a larger copy
@@ -203,7 +205,7 @@ def _add_boundaries(curves: Array, line_count: int, pieces: Array, piece_count: 
 
 
 @kernel
-def _find_group_end(table: Array, column: int, value: int, first_row: int) -> int:
+def _find_group_end(table: FloatArray, column: int, value: int, first_row: int) -> int:
     """Return the end of the rows, from `first_row` on, in which a column of a sorted table has a value."""
     row = first_row
     while row < len(table) and table[row, column] == value:
@@ -212,7 +214,7 @@ def _find_group_end(table: Array, column: int, value: int, first_row: int) -> in
 
 
 @kernel
-def _reserve(pieces: Array, piece_count: int, new_pieces: int) -> Array:
+def _reserve(pieces: FloatArray, piece_count: int, new_pieces: int) -> FloatArray:
     """Return the array of pieces if it has space for a number of new pieces, and otherwise a larger copy."""
     if piece_count + new_pieces <= len(pieces):
         return pieces
@@ -222,7 +224,7 @@ def _reserve(pieces: Array, piece_count: int, new_pieces: int) -> Array:
 
 
 @kernel
-def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
+def _add_edges(edges: FloatArray, pieces: FloatArray, piece_count: int) -> int:
     """Append edges to the pieces, as pieces whose half angle is 0; return the new number of pieces."""
     for e in range(len(edges)):
         pieces[piece_count, START_X] = edges[e, EDGE_START_X]
@@ -237,7 +239,7 @@ def _add_edges(edges: Array, pieces: Array, piece_count: int) -> int:
 
 
 @kernel
-def _is_cell_empty(pairs: Array) -> bool:
+def _is_cell_empty(pairs: FloatArray) -> bool:
     """Return whether the cell of a robot is empty because a faster robot is at the same position."""
     for k in range(len(pairs)):
         squared_distance = pairs[k, PAIR_DX] ** 2 + pairs[k, PAIR_DY] ** 2
@@ -247,7 +249,7 @@ def _is_cell_empty(pairs: Array) -> bool:
 
 
 @kernel
-def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
+def _write_circles(curves: FloatArray, pairs: FloatArray, edges: FloatArray) -> int:
     """Write the circles that may bound a cell to `curves`, after the rows of its lines.
 
     Two robots of speeds v and w, at a distance d from each other, arrive at the points of a circle at the
@@ -280,7 +282,7 @@ def _write_circles(curves: Array, pairs: Array, edges: Array) -> int:
 
 
 @kernel
-def _bound_distance(pairs: Array, edges: Array) -> float:
+def _bound_distance(pairs: FloatArray, edges: FloatArray) -> float:
     """Return an upper bound on the distance of the points of a cell from its generator, m.
 
     The edges bound a convex polygon that contains the cell. A circle of Apollonius around the robot, which is
@@ -301,7 +303,9 @@ def _bound_distance(pairs: Array, edges: Array) -> float:
 
 
 @kernel
-def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point: Array) -> None:
+def _write_lines(
+    curves: FloatArray, pairs: FloatArray, edges: FloatArray, sides: FloatArray, point: FloatArray
+) -> None:
     """Write the edges of a cell to the first rows of `curves`, as lines that start and end at their vertices.
 
     The line of an edge is either the bisector to a neighbor, or a side of the region.
@@ -322,7 +326,7 @@ def _write_lines(curves: Array, pairs: Array, edges: Array, sides: Array, point:
 
 
 @kernel
-def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
+def _write_bisector(curve: FloatArray, pairs: FloatArray, neighbor: float) -> None:
     """Write the normal of the bisector to a neighbor, and its distance from the generator, to a curve.
 
     They do not follow from the edge, because it may be so short that rounding decides its direction.
@@ -336,7 +340,7 @@ def _write_bisector(curve: Array, pairs: Array, neighbor: float) -> None:
 
 
 @kernel
-def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
+def _write_side(curve: FloatArray, edge: FloatArray, sides: FloatArray, point: FloatArray) -> None:
     """Write the normal of the side of the region on which an edge lies, and the edge's distance, to a curve.
 
     The distance is that of the line of the edge from the generator.
@@ -358,7 +362,7 @@ def _write_side(curve: Array, edge: Array, sides: Array, point: Array) -> None:
 
 
 @kernel
-def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
+def _find_crossings(curves: FloatArray, line_count: int, crossings: FloatArray) -> None:
     """Find where each curve enters and leaves the cell's side of each other curve.
 
     Only the points of a curve that are on the cell's side of all other curves can bound the cell. Entry [i,
@@ -396,13 +400,13 @@ def _find_crossings(curves: Array, line_count: int, crossings: Array) -> None:
 
 
 @kernel
-def _make_empty(curves: Array, curve: int) -> None:
+def _make_empty(curves: FloatArray, curve: int) -> None:
     """Make the interval of t empty in which a curve may bound the cell: let it end at minus infinity."""
     curves[curve, _END] = -np.inf
 
 
 @kernel
-def _intersect(first: Array, second: Array) -> _Intersection:
+def _intersect(first: FloatArray, second: FloatArray) -> _Intersection:
     """Find where a curve enters and leaves the cell's side of another one.
 
     The cell is on the side of the second curve where a |q|² + b q <= c. For the point q(t) of the first
@@ -467,7 +471,7 @@ def _compute_angle(first: _Equation, second: _Equation) -> tuple[float, float]:
 
 
 @kernel
-def _compute_equation(curve: Array) -> _Equation:
+def _compute_equation(curve: FloatArray) -> _Equation:
     """Return the coefficients of the equation a |q|² + b q = c of a curve.
 
     b and c follow from b² + 4 a c = 1, and from a r² + |b| r = c at the point nearest to the generator, which
@@ -480,7 +484,9 @@ def _compute_equation(curve: Array) -> _Equation:
 
 
 @kernel
-def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, piece_count: int) -> int:
+def _add_boundary(
+    curve: FloatArray, crossings: FloatArray, gaps: FloatArray, pieces: FloatArray, piece_count: int
+) -> int:
     """Add the sections of a curve on the cell's side of all other curves; return the new number of pieces.
 
     `crossings`, (k, 2), are the values of the parameter t at which the curve enters and leaves the cell's
@@ -514,7 +520,7 @@ def _add_boundary(curve: Array, crossings: Array, gaps: Array, pieces: Array, pi
 
 
 @kernel
-def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None:
+def _insert_gap(gaps: FloatArray, gap_count: int, enter: float, leave: float) -> None:
     """Insert the gap from t = leave to t = enter into the first `gap_count` rows, sorted by start."""
     # Move the gaps that start later by one row.
     row = gap_count
@@ -527,7 +533,7 @@ def _insert_gap(gaps: Array, gap_count: int, enter: float, leave: float) -> None
 
 
 @kernel
-def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_count: int) -> int:
+def _add_pieces(curve: FloatArray, start: float, end: float, pieces: FloatArray, piece_count: int) -> int:
     """Append the section of a curve from t = start to t = end to the pieces; return the new number of pieces.
 
     The angle of the point q(t) of a circle of curvature k, measured at its center from the point nearest to
@@ -552,7 +558,7 @@ def _add_pieces(curve: Array, start: float, end: float, pieces: Array, piece_cou
 
 
 @kernel
-def _evaluate(curve: Array, t: float) -> tuple[float, float]:
+def _evaluate(curve: FloatArray, t: float) -> tuple[float, float]:
     """Return the point q(t) of a curve, in meters; for the formula, see the description of the module.
 
     `outward` is the coordinate along the normal n of the curve, and `leftward` that along u, which is n
@@ -574,7 +580,7 @@ def _evaluate(curve: Array, t: float) -> tuple[float, float]:
 
 
 @kernel
-def _find_parameter(curve: Array, x: float, y: float) -> float:
+def _find_parameter(curve: FloatArray, x: float, y: float) -> float:
     """Return the parameter t of a point on a curve: the inverse of `_evaluate`.
 
     The point may lie off the curve because of rounding.

@@ -11,7 +11,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
@@ -19,6 +18,7 @@ from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
+from robocov.typing import FloatArray, IntArray
 from robocov.voronoi.clipped_cells import compute_clipped_cells
 from robocov.voronoi.clipping import EDGE_CELL, EDGE_COLUMNS, EDGE_END_X, EDGE_OTHER_CELL, CellArrays
 from robocov.voronoi.delaunay import CORNER, ENTRIES_PER_TRIANGLE, NOT_TRIANGULATED, Mesh
@@ -79,22 +79,22 @@ class VoronoiPartition(Cells):
         return self._compute_edges()
 
     @cached_property
-    def polygons(self) -> list[Array]:
+    def polygons(self) -> list[FloatArray]:
         """The vertices of each cell, (k, 2) m, counter-clockwise; of shape (0, 2) if the cell is empty."""
         return self.edges.build_polygons(self.generators)
 
     @property
-    def outlines(self) -> tuple[list[Array], IntArray]:
+    def outlines(self) -> tuple[list[FloatArray], IntArray]:
         """The polygons of the cells, and the index of the cell of each polygon."""
         return self.polygons, np.arange(len(self.generators))
 
 
 def partition(
-    generators: Array,
+    generators: FloatArray,
     region: Region,
     neighbors: Neighbors | None = None,
     triangulation: Mesh | None = None,
-    reported_positions: Array | None = None,
+    reported_positions: FloatArray | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition:
     """Compute the Voronoi cells of robots within a convex region, without regard to obstacles.
@@ -178,7 +178,7 @@ def partition(
     return apply_density(voronoi_cells, density)
 
 
-def to_generators(values: object) -> Array:
+def to_generators(values: object) -> FloatArray:
     """Convert the positions of generators to a new array.
 
     Parameters
@@ -205,7 +205,7 @@ def to_generators(values: object) -> Array:
     return points
 
 
-def check_neighbors(neighbors: Neighbors, reported_positions: Array | None, robot_count: int) -> None:
+def check_neighbors(neighbors: Neighbors, reported_positions: FloatArray | None, robot_count: int) -> None:
     """Check that neighbors and reported positions match each other and the number of robots.
 
     Parameters
@@ -277,7 +277,7 @@ def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) 
 
 
 def _compute_edges(
-    points: Array, sides: Array, neighbor_positions: NeighborPositions, mesh: Mesh, edge_count: int
+    points: FloatArray, sides: FloatArray, neighbor_positions: NeighborPositions, mesh: Mesh, edge_count: int
 ) -> CellEdges:
     """Compute the cells again, with space for all `edge_count` edges, and return the edges."""
     edges = np.empty((edge_count, EDGE_COLUMNS))
@@ -294,7 +294,7 @@ def _compute_edges(
 
 @kernel
 def _compute_cells(
-    points: Array, sides: Array, neighbors: NeighborPositions, mesh: Mesh, cells: CellArrays
+    points: FloatArray, sides: FloatArray, neighbors: NeighborPositions, mesh: Mesh, cells: CellArrays
 ) -> int:
     """Compute all cells; return the number of their edges, or `_NOT_FINITE`.
 

@@ -1,8 +1,8 @@
 """Cells from clipping the region along the bisectors to all neighbors, one robot at a time."""
 
-from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.neighbors import NeighborPositions
+from robocov.typing import FloatArray
 from robocov.voronoi.clipping import (
     CellArrays,
     Workspace,
@@ -15,7 +15,7 @@ from robocov.voronoi.clipping import (
 
 @kernel
 def compute_clipped_cells(
-    points: Array, sides: Array, neighbors: NeighborPositions, cells: CellArrays
+    points: FloatArray, sides: FloatArray, neighbors: NeighborPositions, cells: CellArrays
 ) -> int:
     """Compute all cells by clipping the region along the bisectors between each robot and its neighbors.
 
@@ -48,7 +48,9 @@ def compute_clipped_cells(
 
 
 @inlined_kernel
-def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: NeighborPositions, i: int) -> int:
+def _add_listed_neighbors(
+    workspace: Workspace, points: FloatArray, neighbors: NeighborPositions, i: int
+) -> int:
     """Add the neighbors of robot i to the workspace; return their number.
 
     If there are reports, the neighbors are at the positions that are known to the robot.
@@ -69,7 +71,7 @@ def _add_listed_neighbors(workspace: Workspace, points: Array, neighbors: Neighb
 
 
 @inlined_kernel
-def _add_all_robots(workspace: Workspace, points: Array, i: int) -> int:
+def _add_all_robots(workspace: Workspace, points: FloatArray, i: int) -> int:
     """Add all other robots to the workspace as neighbors of robot i; return their number.
 
     Robot i itself, and any robot at the same position, is left out by `add_neighbor`.

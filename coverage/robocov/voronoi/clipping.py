@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.cell_edges import REGION
 from robocov.observation.region import SIDE_X, SIDE_Y
+from robocov.typing import FloatArray
 
 X = 0
 """Column of a vertex: its offset from the generator in x, m."""
@@ -63,11 +63,11 @@ _SORTED_NEIGHBORS = 6
 class Workspace(NamedTuple):
     """Scratch space for the computation of one cell after another."""
 
-    vertices: Array
+    vertices: FloatArray
     """(k, 4) Vertices of the cell; the columns are `X`, `Y`, `OTHER_CELL` and `_EXCESS`."""
-    new_vertices: Array
+    new_vertices: FloatArray
     """(k, 4) Vertices of the cell after a cut; the columns are the same."""
-    neighbors: Array
+    neighbors: FloatArray
     """(n, 4) Neighbors that may bound the cell; the columns are `DX`, `DY`, `SQUARED_DISTANCE`, `ROBOT`."""
 
 
@@ -103,11 +103,11 @@ class _CutVertices(NamedTuple):
 class CellArrays(NamedTuple):
     """Results for n cells, for density 1."""
 
-    masses: Array
+    masses: FloatArray
     """(n,) Area of each cell, m²."""
-    centroids: Array
+    centroids: FloatArray
     """(n, 2) Centroid of each cell, m."""
-    edges: Array
+    edges: FloatArray
     """(e, 6) Edges of all cells; for the columns, see the constants `EDGE_...`."""
 
 
@@ -136,7 +136,7 @@ def create_workspace(robot_count: int, side_count: int) -> Workspace:
 
 
 @inlined_kernel
-def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int) -> int:
+def add_neighbor(neighbors: FloatArray, count: int, dx: float, dy: float, robot: int) -> int:
     """Append a neighbor to the list of neighbors that may bound a cell.
 
     A neighbor at the position of the generator is left out, because there is no bisector between the two.
@@ -162,7 +162,7 @@ def add_neighbor(neighbors: Array, count: int, dx: float, dy: float, robot: int)
 
 
 @inlined_kernel
-def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int) -> None:
+def write_neighbor(neighbors: FloatArray, row: int, dx: float, dy: float, robot: int) -> None:
     """Write a neighbor to a row of the list of neighbors that may bound a cell.
 
     Parameters
@@ -183,7 +183,9 @@ def write_neighbor(neighbors: Array, row: int, dx: float, dy: float, robot: int)
 
 
 @inlined_kernel
-def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: Array, i: int) -> VertexRange:
+def clip_cell(
+    workspace: Workspace, neighbor_count: int, points: FloatArray, sides: FloatArray, i: int
+) -> VertexRange:
     """Compute the cell of robot i: clip the region along the bisectors between the robot and its neighbors.
 
     Parameters
@@ -233,7 +235,7 @@ def clip_cell(workspace: Workspace, neighbor_count: int, points: Array, sides: A
 
 
 @inlined_kernel
-def _copy_vertices(source: Array, target: Array, count: int) -> None:
+def _copy_vertices(source: FloatArray, target: FloatArray, count: int) -> None:
     """Copy the first `count` vertices."""
     for k in range(count):
         for column in range(_VERTEX_COLUMNS):
@@ -241,7 +243,7 @@ def _copy_vertices(source: Array, target: Array, count: int) -> None:
 
 
 @inlined_kernel
-def _compute_squared_range(vertices: Array, count: int) -> float:
+def _compute_squared_range(vertices: FloatArray, count: int) -> float:
     """Return the square of the largest distance at which a neighbor can cut the cell, m².
 
     The bisector is half as far away from the generator as the neighbor. It can cut the cell only if the
@@ -256,7 +258,7 @@ def _compute_squared_range(vertices: Array, count: int) -> float:
 
 
 @inlined_kernel
-def _move_nearest_to(neighbor_rows: Array, row: int, count: int) -> None:
+def _move_nearest_to(neighbor_rows: FloatArray, row: int, count: int) -> None:
     """Swap the neighbor in a row with the nearest of the neighbors in this and all later rows."""
     nearest = row
     for k in range(row + 1, count):
@@ -270,7 +272,9 @@ def _move_nearest_to(neighbor_rows: Array, row: int, count: int) -> None:
 
 
 @inlined_kernel
-def _cut_polygon(vertices: Array, new_vertices: Array, count: int, neighbor_rows: Array, row: int) -> int:
+def _cut_polygon(
+    vertices: FloatArray, new_vertices: FloatArray, count: int, neighbor_rows: FloatArray, row: int
+) -> int:
     """Cut a convex polygon along the bisector between the generator and the neighbor in a row.
 
     The part that is nearer to the generator is written to `new_vertices`: the vertices beyond the bisector
@@ -313,7 +317,7 @@ def _cut_polygon(vertices: Array, new_vertices: Array, count: int, neighbor_rows
 
 
 @inlined_kernel
-def _find_cut_vertices(vertices: Array, count: int, farthest: int) -> _CutVertices:
+def _find_cut_vertices(vertices: FloatArray, count: int, farthest: int) -> _CutVertices:
     """Return the vertices with a positive excess; `farthest` is one of them.
 
     They are consecutive, because the polygon is convex. If rounding separates some others, these are not cut
@@ -347,7 +351,7 @@ def _get_previous_vertex(k: int, count: int) -> int:
 
 
 @inlined_kernel
-def _write_excess(vertices: Array, count: int, neighbor_rows: Array, row: int) -> None:
+def _write_excess(vertices: FloatArray, count: int, neighbor_rows: FloatArray, row: int) -> None:
     """Write the excess of each vertex over the bisector to a neighbor to the column `_EXCESS`.
 
     The excess of a vertex q is q · d - |d|²/2, where d is the offset of the neighbor from the generator. It
@@ -362,7 +366,7 @@ def _write_excess(vertices: Array, count: int, neighbor_rows: Array, row: int) -
 
 
 @inlined_kernel
-def _find_farthest_vertex(vertices: Array, count: int) -> int:
+def _find_farthest_vertex(vertices: FloatArray, count: int) -> int:
     """Return the vertex farthest beyond the current bisector, or `_NO_VERTEX` if none is beyond it."""
     farthest = _NO_VERTEX
     max_excess = 0.0
@@ -375,7 +379,7 @@ def _find_farthest_vertex(vertices: Array, count: int) -> int:
 
 @inlined_kernel
 def _add_crossing(
-    vertices: Array, new_vertices: Array, new_row: int, inner: int, outer: int, other_cell: float
+    vertices: FloatArray, new_vertices: FloatArray, new_row: int, inner: int, outer: int, other_cell: float
 ) -> None:
     """Add a vertex to `new_vertices` at the point where an edge of the polygon crosses the current bisector.
 
@@ -394,7 +398,12 @@ def _add_crossing(
 
 @inlined_kernel
 def write_cell(
-    workspace: Workspace, vertex_range: VertexRange, points: Array, i: int, cells: CellArrays, edge_count: int
+    workspace: Workspace,
+    vertex_range: VertexRange,
+    points: FloatArray,
+    i: int,
+    cells: CellArrays,
+    edge_count: int,
 ) -> int:
     """Write mass, centroid and edges of the cell of robot i, for density 1.
 

@@ -18,13 +18,10 @@ the cotangents.
 
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
+from robocov.typing import FloatArray, Int32Array, IntArray
 
-Mesh: TypeAlias = NDArray[np.int32]
+Mesh: TypeAlias = Int32Array
 """Corners and twins of the half-edges of a triangulation of n points, (2, 8 n + 4)."""
 
 CORNER = 0
@@ -56,7 +53,7 @@ _MIN_CROSS = 1e-300
 
 
 @kernel
-def update_triangulation(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+def update_triangulation(mesh: Mesh, points: FloatArray, cotangents: FloatArray, stack: IntArray) -> bool:
     """Compute the Delaunay triangulation of points: repair a previous one, or else build it from scratch.
 
     Parameters
@@ -146,7 +143,7 @@ def get_previous_half_edge(h: int) -> int:
 
 
 @kernel
-def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+def _repair(mesh: Mesh, points: FloatArray, cotangents: FloatArray, stack: IntArray) -> bool:
     """Flip all edges that are no longer Delaunay after the points have moved.
 
     Return whether the result is a triangulation, in which all triangles are counter-clockwise.
@@ -165,7 +162,7 @@ def _repair(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bo
 
 
 @kernel
-def _build(mesh: Mesh, points: Array, cotangents: Array, stack: IntArray) -> bool:
+def _build(mesh: Mesh, points: FloatArray, cotangents: FloatArray, stack: IntArray) -> bool:
     """Triangulate from scratch by inserting one point after another; return whether it succeeded.
 
     Each point splits the triangle that contains it into three. Edges that are then no longer Delaunay are
@@ -237,7 +234,7 @@ def _link(mesh: Mesh, h: int, twin: int) -> None:
 
 
 @inlined_kernel
-def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> bool:
+def _compute_all_cotangents(mesh: Mesh, points: FloatArray, cotangents: FloatArray) -> bool:
     """Compute the cotangents in all triangles; return whether all triangles are counter-clockwise."""
     is_ccw = True
     for first_half_edge in range(0, mesh.shape[1], ENTRIES_PER_TRIANGLE):
@@ -246,7 +243,7 @@ def _compute_all_cotangents(mesh: Mesh, points: Array, cotangents: Array) -> boo
 
 
 @inlined_kernel
-def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, first_half_edge: int) -> bool:
+def _compute_cotangents(mesh: Mesh, points: FloatArray, cotangents: FloatArray, first_half_edge: int) -> bool:
     """Compute the cotangents in the triangle of a first half-edge; return whether it is counter-clockwise.
 
     The cotangent of a half-edge is that of the angle opposite to it, at the apex of the triangle. It is
@@ -270,7 +267,7 @@ def _compute_cotangents(mesh: Mesh, points: Array, cotangents: Array, first_half
 
 
 @inlined_kernel
-def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
+def _must_flip(mesh: Mesh, cotangents: FloatArray, h: int) -> bool:
     """Return whether the edge of a half-edge with a twin is not Delaunay, or if its angles are undefined."""
     cotangent = cotangents[h]
     twin_cotangent = cotangents[mesh[TWIN, h]]
@@ -279,7 +276,9 @@ def _must_flip(mesh: Mesh, cotangents: Array, h: int) -> bool:
 
 
 @kernel
-def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, triangle_count: int) -> int:
+def _find_triangle(
+    mesh: Mesh, points: FloatArray, x: float, y: float, start: int, triangle_count: int
+) -> int:
     """Walk from a triangle to the one that contains (x, y); return its first half-edge, or `_FAILED`.
 
     Each step crosses an edge that separates the triangle from the point.
@@ -300,7 +299,7 @@ def _find_triangle(mesh: Mesh, points: Array, x: float, y: float, start: int, tr
 
 
 @inlined_kernel
-def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: float) -> int:
+def _find_edge_to_cross(mesh: Mesh, points: FloatArray, triangle: int, x: float, y: float) -> int:
     """Return a half-edge of a triangle with (x, y) on its right; `_NO_HALF_EDGE` if (x, y) is inside."""
     for h in range(triangle, triangle + 3):
         start = mesh[CORNER, h]
@@ -316,7 +315,12 @@ def _find_edge_to_cross(mesh: Mesh, points: Array, triangle: int, x: float, y: f
 
 @inlined_kernel
 def _flip_from(
-    mesh: Mesh, points: Array, cotangents: Array, stack: IntArray, first_half_edge: int, flip_count: int
+    mesh: Mesh,
+    points: FloatArray,
+    cotangents: FloatArray,
+    stack: IntArray,
+    first_half_edge: int,
+    flip_count: int,
 ) -> tuple[int, bool]:
     r"""Flip the edge of a half-edge if it is not Delaunay, then the edges around it, until all of them are.
 

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.density.cell_edges import REGION, CellEdges
+from robocov.typing import FloatArray
 
 _CHORDS_PER_ARC = 64
 """Number of chords that replace an arc of a disc. An arc spans at most half a turn."""
@@ -20,18 +21,18 @@ _MIN_SQUARED_LENGTH = 1e-300
 class _Arcs(NamedTuple):
     """An arc of a disc for each of e edges. Its length may be zero."""
 
-    start_angles: Array
+    start_angles: FloatArray
     """(e,) Direction of the start of each arc from the generator, rad from +x."""
-    turns: Array
+    turns: FloatArray
     """(e,) Angle that each arc spans, positive counter-clockwise, rad."""
 
 
 class _CutEdges(NamedTuple):
     """Edges cut by discs: an arc, the section of the edge in the disc, and another arc replace each."""
 
-    inner_starts: Array
+    inner_starts: FloatArray
     """(e, 2) Start of the section of each edge in the disc, relative to the generator, m."""
-    inner_ends: Array
+    inner_ends: FloatArray
     """(e, 2) End of this section; the same point if the edge is outside the disc."""
     arcs_before: _Arcs
     """The arcs before these sections."""
@@ -39,7 +40,7 @@ class _CutEdges(NamedTuple):
     """The arcs after these sections."""
 
 
-def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array, Array]:
+def compute_disc_limited_moments(edges: CellEdges, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Compute the area and centroid of the intersection of each cell with a disc around its generator.
 
     Parameters
@@ -79,7 +80,7 @@ def compute_disc_limited_moments(edges: CellEdges, radii: Array) -> tuple[Array,
     return np.where(has_area, areas, 0.0), np.where(has_area[:, None], centroids, 0.0)
 
 
-def _compute_doubled_moments(cut: _CutEdges, edge_radii: Array) -> tuple[Array, Array]:
+def _compute_doubled_moments(cut: _CutEdges, edge_radii: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return twice the area, (e,) m², and twice the first moments, (e, 2) m³, that each edge contributes.
 
     Twice the area of a sector from angle a to angle b is r² (b - a), and twice its first moment about the
@@ -100,7 +101,7 @@ def _compute_doubled_moments(cut: _CutEdges, edge_radii: Array) -> tuple[Array, 
     return doubled_areas, doubled_moments
 
 
-def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
+def build_disc_limited_polygons(edges: CellEdges, radii: FloatArray) -> CellEdges:
     """Build the intersections of cells with discs around their generators, as polygons.
 
     Chords replace the arcs of the discs. A chord spans at most 1/128 of a turn, so that the area of the
@@ -144,7 +145,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: Array) -> CellEdges:
     )
 
 
-def _cut_by_discs(edges: CellEdges, edge_radii: Array) -> _CutEdges:
+def _cut_by_discs(edges: CellEdges, edge_radii: FloatArray) -> _CutEdges:
     """Cut edges by discs around their generators, with a radius for each edge, (e,) m.
 
     The boundary of the intersection of a cell with its disc follows each edge inside the disc. Outside the
@@ -168,7 +169,7 @@ def _cut_by_discs(edges: CellEdges, edge_radii: Array) -> _CutEdges:
     )
 
 
-def _build_arcs(starts: Array, ends: Array) -> _Arcs:
+def _build_arcs(starts: FloatArray, ends: FloatArray) -> _Arcs:
     """Return the arcs from the directions of starts to those of ends, (e, 2) m relative to the generators."""
     start_x, start_y = starts.T
     end_x, end_y = ends.T

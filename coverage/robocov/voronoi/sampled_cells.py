@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 
 @kernel
 def find_own_samples(
-    samples: Array, positions: Array, robots: IntArray, neighbor_positions: Array
+    samples: FloatArray, positions: FloatArray, robots: IntArray, neighbor_positions: FloatArray
 ) -> BoolArray:
     """Find the samples in the cell of each robot: those at least as close to it as to any neighbor.
 
@@ -43,7 +43,9 @@ def find_own_samples(
     return is_own
 
 
-def compute_sample_centroids(is_own: BoolArray, samples: Array, masses: Array, positions: Array) -> Array:
+def compute_sample_centroids(
+    is_own: BoolArray, samples: FloatArray, masses: FloatArray, positions: FloatArray
+) -> FloatArray:
     """Compute the centroids of cells that consist of samples.
 
     Parameters

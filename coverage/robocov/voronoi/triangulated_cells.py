@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import inlined_kernel, kernel
 from robocov.observation.region import SIDE_NORMAL_X, SIDE_NORMAL_Y, SIDE_OFFSET, SIDE_X, SIDE_Y
+from robocov.typing import FloatArray, IntArray
 from robocov.voronoi.clipping import (
     OTHER_CELL,
     CellArrays,
@@ -47,7 +47,7 @@ class Triangulation(NamedTuple):
 
     mesh: Mesh
     """(2, 8 n + 4) Corners and twins of the half-edges."""
-    cotangents: Array
+    cotangents: FloatArray
     """(8 n + 4,) Cotangent of the angle opposite to each half-edge."""
     half_edges: IntArray
     """(n + 3,) A half-edge that starts at each robot and each sentinel."""
@@ -68,7 +68,7 @@ class _Fan(NamedTuple):
 
 
 @kernel
-def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: CellArrays) -> int:
+def compute_triangulated_cells(points: FloatArray, sides: FloatArray, mesh: Mesh, cells: CellArrays) -> int:
     """Compute all cells from a Delaunay triangulation.
 
     If a robot lacks a neighbor in the triangulation, its cell is too large. The cells are therefore correct
@@ -108,7 +108,7 @@ def compute_triangulated_cells(points: Array, sides: Array, mesh: Mesh, cells: C
 
 
 @kernel
-def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> bool:
+def _triangulate(triangulation: Triangulation, points: FloatArray, sides: FloatArray) -> bool:
     """Build the Delaunay triangulation of the robots and three sentinels; return whether it succeeded.
 
     The sentinels are distant points, which form a triangle around all robots and the region. `sides` are the
@@ -137,7 +137,7 @@ def _triangulate(triangulation: Triangulation, points: Array, sides: Array) -> b
 
 
 @inlined_kernel
-def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
+def _place_sentinels(sentinels: FloatArray, x: float, y: float, size: float) -> None:
     """Write the sentinels, a large triangle around the region's center (x, y); see `_MAX_OFFSET_SIZES`."""
     sentinels[0, 0] = x - 8.0 * size
     sentinels[0, 1] = y - 5.0 * size
@@ -148,7 +148,7 @@ def _place_sentinels(sentinels: Array, x: float, y: float, size: float) -> None:
 
 
 @kernel
-def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
+def _compute_center_and_size(sides: FloatArray) -> tuple[float, float, float]:
     """Return the center of the region's bounding box, and the region's size: its width plus its height, m."""
     left = sides[0, SIDE_X]
     right = sides[0, SIDE_X]
@@ -163,7 +163,7 @@ def _compute_center_and_size(sides: Array) -> tuple[float, float, float]:
 
 
 @kernel
-def _compute_region_area(sides: Array) -> float:
+def _compute_region_area(sides: FloatArray) -> float:
     """Return the area of the region, m², by the shoelace formula.
 
     The coordinates of the vertices, at which the sides start, are taken relative to the center of the region,
@@ -182,7 +182,7 @@ def _compute_region_area(sides: Array) -> float:
 
 @inlined_kernel
 def _find_cell(
-    workspace: Workspace, triangulation: Triangulation, points: Array, sides: Array, i: int
+    workspace: Workspace, triangulation: Triangulation, points: FloatArray, sides: FloatArray, i: int
 ) -> VertexRange:
     """Find the cell of robot i from the triangles around it.
 
@@ -202,7 +202,7 @@ def _find_cell(
 
 
 @inlined_kernel
-def _compute_clearance(sides: Array, x: float, y: float) -> float:
+def _compute_clearance(sides: FloatArray, x: float, y: float) -> float:
     """Return the distance of (x, y) from the nearest side of the region, negative outside, m."""
     clearance = np.inf
     for k in range(len(sides)):
@@ -213,7 +213,7 @@ def _compute_clearance(sides: Array, x: float, y: float) -> float:
 
 @inlined_kernel
 def _walk_around(
-    workspace: Workspace, triangulation: Triangulation, points: Array, i: int, first_half_edge: int
+    workspace: Workspace, triangulation: Triangulation, points: FloatArray, i: int, first_half_edge: int
 ) -> _Fan:
     """Write the neighbors and Voronoi vertices of robot i to the workspace, counter-clockwise.
 

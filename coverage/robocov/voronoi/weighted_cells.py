@@ -21,13 +21,13 @@ from functools import cached_property
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.density.base import Density
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
 from robocov.errors import InputError, quote
 from robocov.observation import Cells
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
+from robocov.typing import FloatArray, IntArray
 from robocov.voronoi.arcs import CELL, OTHER_CELL, compute_moments, link_rings, split_into_chords
 from robocov.voronoi.boundary_curves import trace_boundaries
 from robocov.voronoi.bounded_partition import (
@@ -89,8 +89,8 @@ class WeightedCells(Cells):
     (True, 4.0)
     """
 
-    speeds: Array
-    pieces: Array
+    speeds: FloatArray
+    pieces: FloatArray
     region: Region
 
     @cached_property
@@ -110,7 +110,7 @@ class WeightedCells(Cells):
         )
 
     @cached_property
-    def outlines(self) -> tuple[list[Array], IntArray]:
+    def outlines(self) -> tuple[list[FloatArray], IntArray]:
         """The outlines of the cells as polygons, (k, 2) m each, and the index of the cell of each outline.
 
         Chords replace the arcs. An outline runs counter-clockwise around a component of a cell, or clockwise
@@ -127,7 +127,7 @@ class WeightedCells(Cells):
         return outlines, np.array(cells, dtype=np.intp)
 
     @cached_property
-    def polar_moments(self) -> Array:
+    def polar_moments(self) -> FloatArray:
         """Polar moment of each cell about its generator, (n,) m⁴; exact if the density is uniform."""
         if self.density is not None and not self.density.is_uniform:
             return super().polar_moments
@@ -137,12 +137,12 @@ class WeightedCells(Cells):
 
 
 def partition_by_travel_time(
-    generators: Array,
-    speeds: Array,
+    generators: FloatArray,
+    speeds: FloatArray,
     region: Region,
     neighbors: Neighbors | None = None,
     triangulation: Mesh | None = None,
-    reported_positions: Array | None = None,
+    reported_positions: FloatArray | None = None,
     density: Density | None = None,
 ) -> VoronoiPartition | WeightedCells:
     """Compute the cells of points that each robot reaches before all others on a straight line.
@@ -214,7 +214,11 @@ def partition_by_travel_time(
 
 
 def _compute_weighted_cells(
-    points: Array, speeds: Array, region: Region, neighbors: Neighbors, reported_positions: Array | None
+    points: FloatArray,
+    speeds: FloatArray,
+    region: Region,
+    neighbors: Neighbors,
+    reported_positions: FloatArray | None,
 ) -> WeightedCells:
     """Compute the cells of robots whose speeds are not all equal, for density 1.
 
@@ -266,7 +270,7 @@ def _compute_weighted_cells(
     )
 
 
-def _convert_speeds(values: object, robot_count: int) -> Array:
+def _convert_speeds(values: object, robot_count: int) -> FloatArray:
     """Convert speeds to a new array, (n,); raise InputError if they are not positive, finite numbers."""
     try:
         speeds = np.array(values, dtype=np.float64)

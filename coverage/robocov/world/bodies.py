@@ -13,7 +13,7 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
 
 BodyAndDisc: TypeAlias = tuple[pymunk.Body, pymunk.Circle]
@@ -190,14 +190,16 @@ class BodyArrays:
         return ids
 
 
-def _wrap_array(array: Array) -> batch.Buffer:
+def _wrap_array(array: FloatArray) -> batch.Buffer:
     """Return a buffer that reads from and writes to an array."""
     buffer = batch.Buffer()
     buffer.set_float_buf(array)
     return buffer
 
 
-def compute_obstacle_states(moving_obstacles: tuple[MovingObstacle, ...], time: float, dt: float) -> Array:
+def compute_obstacle_states(
+    moving_obstacles: tuple[MovingObstacle, ...], time: float, dt: float
+) -> FloatArray:
     """Compute the displacements and velocities of moving obstacles.
 
     Parameters

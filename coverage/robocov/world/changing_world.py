@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import StartError
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.world.free_positions import find_free_position
 from robocov.world.obstacle_pieces import build_obstacles
 from robocov.world.unicycles import initialize_steering
@@ -63,10 +63,10 @@ class ChangingWorld:
         conditions: Conditions,
         environment: Environment,
         team: Team,
-        positions: Array,
-        velocities: Array | None = None,
+        positions: FloatArray,
+        velocities: FloatArray | None = None,
         *,
-        steering: Array | None = None,
+        steering: FloatArray | None = None,
         time: float = 0.0,
     ) -> None:
         self.team = team
@@ -85,7 +85,7 @@ class ChangingWorld:
         self._build_world()
 
     @property
-    def failed_robots(self) -> Array:
+    def failed_robots(self) -> FloatArray:
         """Center x and y and radius of the robots that have failed, (w, 3) m."""
         return np.column_stack([self.positions, self.team.radius])[self._failed]
 
@@ -106,7 +106,7 @@ class ChangingWorld:
         self._protect_state()  # Pickles do not contain the flags of arrays.
 
     def step(
-        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+        self, forces: FloatArray, dt: float, external_forces: FloatArray | None = None, *, time: float = 0.0
     ) -> None:
         """Move the working robots by `World.step`, then let robots fail and join.
 
@@ -131,7 +131,7 @@ class ChangingWorld:
         self._protect_state()
 
     def _move_working_robots(
-        self, forces: Array, dt: float, external_forces: Array | None, time: float
+        self, forces: FloatArray, dt: float, external_forces: FloatArray | None, time: float
     ) -> None:
         """Move the working robots in their own world. All other robots stay at rest at their positions."""
         self.positions = self.positions.copy()

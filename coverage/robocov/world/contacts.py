@@ -13,8 +13,8 @@ import math
 
 import pymunk
 
-from robocov.arrays import Array, IntArray
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 from robocov.world.bodies import WALLS_ONLY, BodyAndDisc, BodyArrays, build_obstacle_space, build_robot
 from robocov.world.dynamics import compute_clip_factor
 from robocov.world.obstacle_pieces import Obstacles
@@ -58,7 +58,12 @@ class ContactDetector:
     """
 
     def __init__(
-        self, obstacles: Obstacles, team: Team, positions: Array, velocities: Array, team_count: int = 1
+        self,
+        obstacles: Obstacles,
+        team: Team,
+        positions: FloatArray,
+        velocities: FloatArray,
+        team_count: int = 1,
     ) -> None:
         space, moving_bodies = build_obstacle_space(obstacles)
         # This space detects contacts, but does not resolve them. It forgets contacts after a step.
@@ -81,7 +86,7 @@ class ContactDetector:
         self._robot_of_body = {body.id: robot for robot, body in enumerate(robots)}
         self.set_robots(positions, velocities)
 
-    def set_robots(self, positions: Array, velocities: Array) -> None:
+    def set_robots(self, positions: FloatArray, velocities: FloatArray) -> None:
         """Set the states of all robots.
 
         Parameters
@@ -95,7 +100,7 @@ class ContactDetector:
         self._arrays.states[self._robot_rows, 2:] = velocities
         self._arrays.write_states()
 
-    def set_moving_obstacles(self, states: Array) -> None:
+    def set_moving_obstacles(self, states: FloatArray) -> None:
         """Set the states of moving obstacles.
 
         Parameters
@@ -106,7 +111,7 @@ class ContactDetector:
         self._arrays.states[self._moving_rows] = states
         self._arrays.write_states()
 
-    def step(self, net_forces: Array, dt: float) -> Array:
+    def step(self, net_forces: FloatArray, dt: float) -> FloatArray:
         """Move all robots under net forces.
 
         Parameters
@@ -175,12 +180,12 @@ class ContactSolver:
     def move(
         self,
         robots: IntArray,
-        states: Array,
-        net_forces: Array,
-        obstacle_states: Array,
-        max_speed: Array,
+        states: FloatArray,
+        net_forces: FloatArray,
+        obstacle_states: FloatArray,
+        max_speed: FloatArray,
         dt: float,
-    ) -> Array:
+    ) -> FloatArray:
         """Move some robots by one step, and resolve their contacts.
 
         Parameters
@@ -238,7 +243,7 @@ class ContactSolver:
             self._space.remove(*[disc for disc in discs if disc.space is not None])
             self._space.remove(*bodies)
 
-    def _count_substeps(self, robots: IntArray, states: Array, net_forces: Array, dt: float) -> int:
+    def _count_substeps(self, robots: IntArray, states: FloatArray, net_forces: FloatArray, dt: float) -> int:
         """Return the number of substeps that limits the travel in each to `_max_travel`.
 
         It is at most `_MAX_SUBSTEPS`, also if the travel is then longer.

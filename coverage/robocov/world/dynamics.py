@@ -16,23 +16,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.compiled import kernel
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 
 class MotionResponse(NamedTuple):
     """Response of robots to forces during one substep, (n,) each."""
 
-    velocity_loss: Array
+    velocity_loss: FloatArray
     """Fraction of the velocity that viscosity removes, 1 - exp(-nu dt / m)."""
-    velocity_per_force: Array
+    velocity_per_force: FloatArray
     """Velocity gained per unit of the controller's force, m/s/N."""
-    force_per_velocity: Array
+    force_per_velocity: FloatArray
     """Net force needed per change of velocity, m / dt, N/(m/s)."""
-    max_velocity_change: Array
+    max_velocity_change: FloatArray
     """Largest change of velocity, max_acceleration * dt, m/s."""
-    max_speed: Array
+    max_speed: FloatArray
     """Largest speed after the substep, m/s."""
 
 
@@ -90,7 +90,9 @@ def compute_clip_factor(x: float, y: float, limit: float) -> float:
 
 
 @kernel
-def compute_net_forces(forces: Array, velocities: Array, response: MotionResponse, external: Array) -> Array:
+def compute_net_forces(
+    forces: FloatArray, velocities: FloatArray, response: MotionResponse, external: FloatArray
+) -> FloatArray:
     """Compute the net forces that pymunk integrates.
 
     The change of velocity is limited first, then the speed. Limiting the speed does not make the change

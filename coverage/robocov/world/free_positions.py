@@ -4,12 +4,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.environment import Environment, Point, find_nearest_inside
 from robocov.errors import StartError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.potential import compute_spread_directions
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _CLEARANCE_M = 1e-3
 """Gap between a robot and the walls and robots from which it is moved away."""
@@ -19,7 +20,7 @@ _QUADRANT_SEGMENTS = 16
 """Edges per quadrant of the polygons that represent the discs of other robots."""
 
 
-def relocate_robots(environment: Environment, positions: Array, team: Team) -> Array:
+def relocate_robots(environment: Environment, positions: FloatArray, team: Team) -> FloatArray:
     """Move robots that overlap walls or each other, so that all of them fit.
 
     In each round, robots in walls are moved to the nearest positions outside, and the two robots of each
@@ -78,7 +79,7 @@ def _compute_center_areas(environment: Environment, team: Team) -> dict[float, B
 
 
 def _leave_walls(
-    environment: Environment, positions: Array, team: Team, areas: dict[float, BaseGeometry]
+    environment: Environment, positions: FloatArray, team: Team, areas: dict[float, BaseGeometry]
 ) -> None:
     """Move the robots that overlap walls to the nearest positions where they fit, changing the positions."""
     is_in_wall = _compute_wall_distances(environment, positions) < team.radius
@@ -86,18 +87,20 @@ def _leave_walls(
     positions[is_in_wall] = find_nearest_inside(center_areas, positions[is_in_wall])
 
 
-def _compute_directions(positions: Array, first: IntArray, second: IntArray, distances: Array) -> Array:
+def _compute_directions(
+    positions: FloatArray, first: IntArray, second: IntArray, distances: FloatArray
+) -> FloatArray:
     """Return unit vectors from the first robots of pairs to the second ones, (k, 2)."""
     is_same_point = distances == 0.0
     divisors = np.where(is_same_point, 1.0, distances)
-    directions: Array = (positions[second] - positions[first]) / divisors[:, None]
+    directions: FloatArray = (positions[second] - positions[first]) / divisors[:, None]
     # The direction between robots at the same point is undefined. Each such pair gets an arbitrary direction.
     directions[is_same_point] = compute_spread_directions((first + second)[is_same_point])
     return directions
 
 
 def find_free_position(
-    environment: Environment, radius: float, others: Array, point: Point, radii: Array | None = None
+    environment: Environment, radius: float, others: FloatArray, point: Point, radii: FloatArray | None = None
 ) -> Point:
     """Find the position nearest to a point at which one more robot fits.
 
@@ -146,7 +149,7 @@ def find_free_position(
 
 def require_free_starts(
     environment: Environment,
-    positions: Array,
+    positions: FloatArray,
     team: Team,
     tolerance: float,
     is_present: BoolArray | None = None,
@@ -199,7 +202,7 @@ def _compute_center_area(environment: Environment, radius: float) -> BaseGeometr
     return environment.free.buffer(-(radius + _CLEARANCE_M), join_style="round")
 
 
-def _compute_wall_distances(environment: Environment, positions: Array) -> Array:
+def _compute_wall_distances(environment: Environment, positions: FloatArray) -> FloatArray:
     """Return the distances of positions from the nearest wall, (n,) m; -inf inside a wall."""
     points = shapely.points(positions)
     shapely.prepare(environment.free)

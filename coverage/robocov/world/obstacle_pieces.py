@@ -13,8 +13,9 @@ from typing import NamedTuple, TypeAlias
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, freeze
+from robocov.arrays import freeze
 from robocov.environment import Environment, ObstaclePath, Point
+from robocov.typing import FloatArray
 
 Ring: TypeAlias = list[Point]
 """Corners of a convex polygon, counter-clockwise, (x, y) m."""
@@ -22,7 +23,7 @@ Ring: TypeAlias = list[Point]
 FRAME_WIDTH_M = 2.0
 """Thickness of the solid frame around the region."""
 
-_pieces_by_environment: dict[int, tuple[Array, ...]] = {}
+_pieces_by_environment: dict[int, tuple[FloatArray, ...]] = {}
 """Pieces of each static environment that is in use, by the `id` of the environment."""
 
 
@@ -37,7 +38,7 @@ class MovingObstacle(NamedTuple):
         Path along which the obstacle moves.
     """
 
-    pieces: tuple[Array, ...]
+    pieces: tuple[FloatArray, ...]
     path: ObstaclePath
 
 
@@ -55,9 +56,9 @@ class Obstacles:
         Center x, y and radius of robots that have failed.
     """
 
-    walls: tuple[Array, ...]
+    walls: tuple[FloatArray, ...]
     moving_obstacles: tuple[MovingObstacle, ...] = ()
-    failed_robots: Array | None = None
+    failed_robots: FloatArray | None = None
 
     @property
     def max_speed(self) -> float:
@@ -81,7 +82,7 @@ def build_obstacles(environment: Environment) -> Obstacles:
     return Obstacles(build_solid_pieces(environment), build_moving_obstacles(environment))
 
 
-def build_solid_pieces(environment: Environment) -> tuple[Array, ...]:
+def build_solid_pieces(environment: Environment) -> tuple[FloatArray, ...]:
     """Build convex polygons that tile the static obstacles and the surroundings of the map.
 
     The surroundings extend `FRAME_WIDTH_M` beyond the bounding box of the region.
@@ -132,7 +133,7 @@ def build_moving_obstacles(environment: Environment) -> tuple[MovingObstacle, ..
     )
 
 
-def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[Array, ...]:
+def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
     """Split the polygons of a geometry into convex polygons.
 
     Parameters

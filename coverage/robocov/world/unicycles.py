@@ -40,9 +40,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, freeze
+from robocov.arrays import freeze
 from robocov.compiled import kernel
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.world.dynamics import MotionResponse, compute_clip_factor
 
 RESPONSE_TIME_S = 0.2
@@ -55,9 +56,9 @@ rest."""
 class Wheels(NamedTuple):
     """The wheels of a team, (n,) each."""
 
-    track_width: Array
+    track_width: FloatArray
     """Distance between the wheels of each robot, m."""
-    max_turning_rate: Array
+    max_turning_rate: FloatArray
     """Maximum turning rate of each robot, rad/s."""
     is_rolling: BoolArray
     """Whether wheels move each robot. The other robots are points, or are moved by external forces."""
@@ -71,15 +72,15 @@ class DriveCommand(NamedTuple):
     of other robots are unchanged.
     """
 
-    forces: Array
+    forces: FloatArray
     """(n, 2) N, in place of the forces of the controllers."""
-    steering: Array
+    steering: FloatArray
     """(n, 2) rad and rad/s, heading and turning rate after the substep."""
     response: MotionResponse
     """Response of the robots to these forces."""
 
 
-def initialize_steering(team: Team, velocities: Array, steering: Array | None) -> Array | None:
+def initialize_steering(team: Team, velocities: FloatArray, steering: FloatArray | None) -> FloatArray | None:
     """Return the steering of a team at the start of a simulation.
 
     Parameters
@@ -148,9 +149,9 @@ class _WheelLimits(NamedTuple):
 
 @kernel
 def compute_drive_command(
-    forces: Array,
-    velocities: Array,
-    steering: Array,
+    forces: FloatArray,
+    velocities: FloatArray,
+    steering: FloatArray,
     response: MotionResponse,
     wheels: Wheels,
     dt: float,
@@ -231,7 +232,7 @@ def _get_wheel_limits(wheels: Wheels, response: MotionResponse, i: int) -> _Whee
 
 @kernel
 def _compute_point_change(
-    forces: Array, response: MotionResponse, i: int, speed: float, hx: float, hy: float
+    forces: FloatArray, response: MotionResponse, i: int, speed: float, hx: float, hy: float
 ) -> tuple[float, float]:
     """Return the change of velocity in a substep, m/s, of a point robot in place of robot i.
 
@@ -323,8 +324,8 @@ def _approach_motion(motion: _Motion, target: _Motion, limits: _WheelLimits) -> 
 
 @kernel
 def remove_sideways_velocity(
-    velocities: Array, steering: Array, max_speed: Array, is_rolling: BoolArray
-) -> Array:
+    velocities: FloatArray, steering: FloatArray, max_speed: FloatArray, is_rolling: BoolArray
+) -> FloatArray:
     """Remove from unicycles the velocity after a contact that their wheels do not allow.
 
     A unicycle keeps its forward velocity, up to its maximum speed. Sideways and backward velocity is removed.

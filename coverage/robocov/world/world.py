@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, compute_lengths
+from robocov.arrays import compute_lengths
 from robocov.errors import ParameterError
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray
 from robocov.world.bodies import MAX_TEAMS_PER_SPACE, compute_obstacle_states
 from robocov.world.contacts import ContactDetector, ContactSolver
 from robocov.world.dynamics import MotionResponse, compute_net_forces, compute_response
@@ -47,9 +48,9 @@ class _SpeedLimits:
     A robot that is faster than its maximum speed brakes as hard as it can.
     """
 
-    driven: Array
+    driven: FloatArray
     """Without external forces."""
-    pushed: Array
+    pushed: FloatArray
     """With external forces."""
 
 
@@ -121,10 +122,10 @@ class World:
         self,
         obstacles: Obstacles,
         team: Team,
-        positions: Array,
-        velocities: Array | None = None,
+        positions: FloatArray,
+        velocities: FloatArray | None = None,
         *,
-        steering: Array | None = None,
+        steering: FloatArray | None = None,
         runs: int = 1,
     ) -> None:
         lightest = float(team.mass.min())
@@ -157,7 +158,7 @@ class World:
         self._spaces: list[tuple[slice, ContactDetector]] | None = None
         self._contact_solver: ContactSolver | None = None
 
-    def place(self, run: int, positions: Array) -> None:
+    def place(self, run: int, positions: FloatArray) -> None:
         """Move the robots of a run to new positions, at rest and facing along +x.
 
         Parameters
@@ -199,7 +200,7 @@ class World:
         self._protect_state()  # Pickles do not contain the flags of arrays.
 
     def step(
-        self, forces: Array, dt: float, external_forces: Array | None = None, *, time: float = 0.0
+        self, forces: FloatArray, dt: float, external_forces: FloatArray | None = None, *, time: float = 0.0
     ) -> None:
         """Move all robots in a step, under forces, viscosity and limits.
 
@@ -225,7 +226,7 @@ class World:
                 self._move_obstacles(time + k * substep, substep)
             self._run_substep(forces, external, substep)
 
-    def _count_substeps(self, external: Array, dt: float) -> int:
+    def _count_substeps(self, external: FloatArray, dt: float) -> int:
         """Return the number of substeps in a step, so that no robot can cross a thin wall in a substep."""
         max_speed = self._max_team_speed
         if self._may_exceed_max_speed or len(external) > 0:
@@ -235,7 +236,7 @@ class World:
         travel_in_radii = (max_speed + self._obstacles.max_speed) * dt / self._min_radius
         return max(math.ceil(dt / MAX_SUBSTEP_S - _SUBSTEP_COUNT_TOLERANCE), math.ceil(travel_in_radii))
 
-    def _run_substep(self, forces: Array, external: Array, dt: float) -> None:
+    def _run_substep(self, forces: FloatArray, external: FloatArray, dt: float) -> None:
         """Move all robots in a substep: first without contacts, then again those that touch something."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
@@ -272,7 +273,12 @@ class World:
             self._update_spaces()
 
     def _compute_drive_command(
-        self, forces: Array, steering: Array, is_rolling: BoolArray, response: MotionResponse, dt: float
+        self,
+        forces: FloatArray,
+        steering: FloatArray,
+        is_rolling: BoolArray,
+        response: MotionResponse,
+        dt: float,
     ) -> DriveCommand:
         """Compute the motion of the wheels in a substep. Robots that are not rolling do not turn."""
         return compute_drive_command(
@@ -292,7 +298,7 @@ class World:
             self._response_dt = dt
         return self._response
 
-    def _compute_speed_limits(self, external: Array, dt: float) -> _SpeedLimits:
+    def _compute_speed_limits(self, external: FloatArray, dt: float) -> _SpeedLimits:
         """Compute the largest speeds of robots at the end of a substep."""
         speeds = self._compute_speeds()
         driven = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
@@ -301,23 +307,23 @@ class World:
             pushed = np.maximum(driven, speeds + self._compute_external_acceleration(external) * dt)
         return _SpeedLimits(driven, pushed)
 
-    def _find_rolling(self, external: Array) -> BoolArray:
+    def _find_rolling(self, external: FloatArray) -> BoolArray:
         """Return whether each robot is moved by wheels: unicycles on which no external force acts, (n,)."""
         if len(external) > 0:
             return self._is_unicycle & ~external.any(axis=1)
         return self._is_unicycle
 
-    def _compute_external_acceleration(self, external: Array) -> Array:
+    def _compute_external_acceleration(self, external: FloatArray) -> FloatArray:
         """Return the accelerations due to external forces, (n,) m/s²; a single 0 if there are no forces."""
         if len(external) == 0:
             return np.zeros(1)
         return compute_lengths(external) / self.team.mass
 
-    def _compute_speeds(self) -> Array:
+    def _compute_speeds(self) -> FloatArray:
         """Return the speeds of the robots, (n,) m/s."""
         return compute_lengths(self.velocities)
 
-    def _set_state(self, positions: Array, velocities: Array, steering: Array | None) -> None:
+    def _set_state(self, positions: FloatArray, velocities: FloatArray, steering: FloatArray | None) -> None:
         """Set the state of all robots, and make its arrays read-only."""
         self.positions = positions
         self.velocities = velocities
@@ -367,7 +373,7 @@ class World:
         for _, space in self._get_spaces():
             space.set_moving_obstacles(self._obstacle_states)
 
-    def _move_freely(self, net_forces: Array, dt: float) -> Array:
+    def _move_freely(self, net_forces: FloatArray, dt: float) -> FloatArray:
         """Return the states after a substep without contacts, (n, 4): x, y, vx, vy."""
         states = [space.step(net_forces[rows], dt) for rows, space in self._get_spaces()]
         return states[0] if len(states) == 1 else np.concatenate(states)
@@ -379,7 +385,9 @@ class World:
             robots += [rows.start + robot for robot in space.list_touching_robots()]
         return robots
 
-    def _resolve_contacts(self, states: Array, net_forces: Array, max_speed: Array, dt: float) -> bool:
+    def _resolve_contacts(
+        self, states: FloatArray, net_forces: FloatArray, max_speed: FloatArray, dt: float
+    ) -> bool:
         """Change, in place, the states of robots that touch something; return whether there are any."""
         touching_by_run: dict[int, list[int]] = {}
         for robot in self._list_touching_robots():
@@ -399,9 +407,9 @@ class World:
         self,
         run: int,
         touching_robots: list[int],
-        states: Array,
-        net_forces: Array,
-        max_speed: Array,
+        states: FloatArray,
+        net_forces: FloatArray,
+        max_speed: FloatArray,
         dt: float,
     ) -> None:
         """Move the robots in contact again, together with all robots into which they are pushed."""

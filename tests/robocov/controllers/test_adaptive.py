@@ -6,7 +6,6 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.controllers import Adaptive, Lloyd
 from robocov.controllers.adaptive import AdaptiveMemory, Lattice
@@ -19,6 +18,7 @@ from robocov.observation import Decision, Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
 from robocov.simulation import Simulation
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 REGION = SQUARE.region
@@ -33,13 +33,13 @@ class RecordingDensity(Density):
     max_value = 7.0
 
     def __init__(self) -> None:
-        self.evaluated: list[Array] = []
+        self.evaluated: list[FloatArray] = []
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         self.evaluated.append(points.copy())
         return HOT.evaluate(points)
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         raise AssertionError("expected no integrals of the density")
 
 
@@ -48,14 +48,14 @@ class BasisDensity(RecordingDensity):
     """A density that the basis represents exactly."""
 
     lattice: Lattice
-    parameters: Array
+    parameters: FloatArray
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         return self.lattice.evaluate_basis(points) @ self.parameters
 
 
 def build_observations(
-    positions: Array, time: float, density: Density | None, reach: float = np.inf
+    positions: FloatArray, time: float, density: Density | None, reach: float = np.inf
 ) -> Observations:
     n = len(positions)
     neighbors = Neighbors.from_ranges(positions, np.full(n, reach))
@@ -211,12 +211,12 @@ def test_a_copy_continues_with_the_same_messages(estimate: str) -> None:
     np.testing.assert_array_equal(twin.memory.estimates, simulation.memory.estimates)
 
 
-def compute_final_cost(environment: Environment, controller: Controller, starts: Array) -> float:
+def compute_final_cost(environment: Environment, controller: Controller, starts: FloatArray) -> float:
     """Return the locational cost by the density HOT after 15 s."""
     return compute_hot_cost(Simulation(environment, controller, starts).run(15.0).positions[-1])
 
 
-def compute_hot_cost(positions: Array) -> float:
+def compute_hot_cost(positions: FloatArray) -> float:
     """Return the locational cost with f = r² by the density HOT, approximated on a lattice."""
     x, y = np.meshgrid(np.linspace(0.05, 9.95, 100), np.linspace(0.05, 9.95, 100))
     points = np.column_stack([x.ravel(), y.ravel()])

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from robocov.arrays import Array
 from robocov.controllers.density_exchange import (
     MAX_SENT_MEASUREMENTS,
     MeasurementExchange,
@@ -19,6 +18,7 @@ from robocov.controllers.density_exchange import (
 from robocov.environment import Environment
 from robocov.observation import Observations, ReceivedMessage
 from robocov.observation.neighbors import Neighbors
+from robocov.typing import FloatArray
 
 REGION = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10))).region
 POSITIONS = np.array([[1.0, 1.0], [2.0, 1.0], [9.0, 9.0]])
@@ -28,7 +28,7 @@ def observe(
     messages: Sequence[Sequence[ReceivedMessage]] = (),
     *,
     reach: float = np.inf,
-    send_limits: Array | None = None,
+    send_limits: FloatArray | None = None,
     time: float = 0.0,
 ) -> Observations:
     """Return the observations of three robots, two of which are near each other."""

@@ -10,7 +10,6 @@ import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.controllers import GpUcb, Lloyd
 from robocov.controllers.base import Controller
@@ -21,6 +20,7 @@ from robocov.density.base import Density
 from robocov.environment import Environment
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
+from robocov.typing import BoolArray, FloatArray
 
 SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 REGION = SQUARE.region
@@ -31,8 +31,8 @@ SQUARE_COUNT = len(GRID.squares)
 
 
 def compute_posterior_directly(
-    is_measured: BoolArray, values: Array, prior_mean: float
-) -> tuple[Array, Array]:
+    is_measured: BoolArray, values: FloatArray, prior_mean: float
+) -> tuple[FloatArray, FloatArray]:
     """Return mean and variance in all squares by the textbook formula, with a Cholesky factorization."""
     distances = scipy.spatial.distance.cdist(GRID.squares, GRID.squares)
     covariance = np.exp(-0.5 * (distances / 2.0) ** 2)
@@ -44,12 +44,12 @@ def compute_posterior_directly(
     return mean, variance
 
 
-def measure_squares(density: Density, is_measured: BoolArray) -> Array:
+def measure_squares(density: Density, is_measured: BoolArray) -> FloatArray:
     return np.where(is_measured, density.evaluate(GRID.squares), np.nan)
 
 
 def simulate(
-    controller: Controller, density: Density | None, starts: Array, duration: float = 45.0
+    controller: Controller, density: Density | None, starts: FloatArray, duration: float = 45.0
 ) -> Simulation:
     """Return the simulation of a team that does not know the density, unless the controller is Lloyd's."""
     conditions = SENSED if isinstance(controller, GpUcb) else None
@@ -58,7 +58,7 @@ def simulate(
     return simulation
 
 
-def compute_hot_cost(positions: Array, density: Density) -> float:
+def compute_hot_cost(positions: FloatArray, density: Density) -> float:
     """Return the mean squared distance to the nearest robot, weighted by the density, on a lattice."""
     x, y = np.meshgrid(np.arange(0.1, 10.0, 0.2), np.arange(0.1, 10.0, 0.2))
     points = np.column_stack([x.ravel(), y.ravel()])

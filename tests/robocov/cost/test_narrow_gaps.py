@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.density import Uniform
 from robocov.environment import Environment, WallObstacle
@@ -13,6 +12,7 @@ from robocov.environment.obstacle_paths import ObstaclePath
 from robocov.errors import ParameterError
 from robocov.lower_bound import compute_lower_bound
 from robocov.optimum import find_optimum
+from robocov.typing import FloatArray
 
 HALL = ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0))
 CRACKED = Environment("cracked", HALL, (WallObstacle(((7.0, 0.1), (7.0, 6.0)), width=0.2),))
@@ -106,7 +106,7 @@ def test_radius_is_checked(radius: object) -> None:
 
 def test_teams_are_evaluated_like_single_ones() -> None:
     cost = CoverageCost(CRACKED, 16)
-    teams: Array = np.array([[[3.0, 3.0]], [[8.0, 3.0]]])
+    teams: FloatArray = np.array([[[3.0, 3.0]], [[8.0, 3.0]]])
     areas = [result.uncovered_area for result in cost.evaluate_teams(teams)]
     assert areas == [cost(team).uncovered_area for team in teams]
     assert areas == pytest.approx([SMALL_ROOM_M2, 6.9 * 6.0], abs=0.03)

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from shapely import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import Gap, PolygonObstacle, find_narrowest_gap
 from robocov.generator import generate_map
 from robocov.generator.caves import (
@@ -22,6 +21,7 @@ from robocov.generator.caves import (
     extract_area_below_zero,
 )
 from robocov.generator.request import MapRequest
+from robocov.typing import FloatArray
 
 SEEDS = range(10)
 
@@ -125,7 +125,9 @@ def test_a_gap_without_a_part_of_the_core_on_one_side_is_widened() -> None:
 REQUEST = MapRequest(9, 0.4, 0.6, 12.0, 9.0)
 
 
-def extract_area_below(function: Callable[[Array, Array], Array], level: float) -> BaseGeometry:
+def extract_area_below(
+    function: Callable[[FloatArray, FloatArray], FloatArray], level: float
+) -> BaseGeometry:
     points = np.stack(np.meshgrid(*[np.linspace(0.0, 10.0, 101)] * 2), axis=-1)
     return extract_area_below_zero(points, function(points[..., 0], points[..., 1]) - level)
 

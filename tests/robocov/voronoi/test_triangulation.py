@@ -24,7 +24,6 @@ from voronoi_cases import (
     seeds,
 )
 
-from robocov.arrays import Array
 from robocov.compiled import kernel
 from robocov.controllers import IndividualControllerAdapter, Lloyd, OwnView, Rapf
 from robocov.controllers.base import Controller
@@ -32,6 +31,7 @@ from robocov.environment import Environment, PolygonObstacle
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.delaunay import Mesh, update_triangulation
 
@@ -39,11 +39,11 @@ CORNERS = 40.0 * np.array([[np.cos(a), np.sin(a)] for a in 2 * np.pi / 3 * np.ar
 
 
 @kernel
-def update_mesh(mesh: Mesh, points: Array) -> bool:
+def update_mesh(mesh: Mesh, points: FloatArray) -> bool:
     return update_triangulation(mesh, points, np.empty(mesh.shape[1]), np.empty(mesh.shape[1], np.intp))
 
 
-def triangulate(points: Array, previous: Mesh | None = None) -> Mesh:
+def triangulate(points: FloatArray, previous: Mesh | None = None) -> Mesh:
     """Return the triangulation of points and corners, starting from a previous mesh if there is one."""
     if previous is None:
         mesh = np.full((2, 8 * len(points) + 4), -1, np.int32)
@@ -63,7 +63,7 @@ def list_triangles(mesh: Mesh) -> list[tuple[int, int, int]]:
     return sorted(triangles)
 
 
-def assert_delaunay(mesh: Mesh, points: Array) -> None:
+def assert_delaunay(mesh: Mesh, points: FloatArray) -> None:
     """Assert that twin half-edges match and that no circumcircle contains a point, up to rounding."""
     corner, twin = mesh.tolist()
     for h in range(len(corner)):
@@ -163,7 +163,7 @@ def test_cells_do_not_depend_on_the_previous_triangulation(
         points = move_points(points, region, 10.0**exponent, rng)
 
 
-def move_points(points: Array, region: Region, step: float, rng: np.random.Generator) -> Array:
+def move_points(points: FloatArray, region: Region, step: float, rng: np.random.Generator) -> FloatArray:
     """Return the points after one of several motions, none of them far out of the region."""
     middle = points.mean(axis=0)
     line = rng.normal(size=2)
@@ -261,7 +261,7 @@ def test_small_teams_have_no_triangulation() -> None:
 class CentroidController:
     """A controller for one robot that moves to the centroid of its cell."""
 
-    def force(self, own: OwnView) -> Array:
+    def force(self, own: OwnView) -> FloatArray:
         return 2.0 * (own.centroid - own.position)
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, PolygonObstacle, Ring, WallObstacle
+from robocov.typing import FloatArray
 from robocov_app.benchmark.plan_shapes import INNER_WALL_M, build_box, round_points
 
 DOOR_WIDTH_M = 0.9
@@ -140,7 +140,7 @@ def build_outline(parts: Iterable[shapely.Geometry]) -> Ring:
     return round_points(np.asarray(outline.exterior.coords)[:-1])
 
 
-def divide_evenly(start: float, end: float, width: float) -> Array:
+def divide_evenly(start: float, end: float, width: float) -> FloatArray:
     """Divide a range into equal rooms about `width` wide, and return their walls, both ends included."""
     rooms = max(1, round((end - start) / width))
     return np.linspace(start, end, rooms + 1)

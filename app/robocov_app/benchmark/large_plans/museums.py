@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.benchmark.large_plans.drawing import (
     Drawing,
     build_octagon,
@@ -276,7 +276,7 @@ def _draw_rotunda(part: Drawing, radius: float) -> None:
         part.add_wall(*points, thickness=_WALL_M)
 
 
-def _stop_at_door(corner: Array, next_corner: Array) -> Array:
+def _stop_at_door(corner: FloatArray, next_corner: FloatArray) -> FloatArray:
     """Return the point where the wall from a corner ends, at the door in the middle of the side."""
     side = next_corner - corner
     length = float(np.hypot(*side))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, PolygonObstacle
+from robocov.typing import FloatArray
 from robocov_app.benchmark.large_plans.drawing import build_octagon
 from robocov_app.benchmark.plan_shapes import FloorPlan, build_box, round_points
 
@@ -32,12 +32,12 @@ class _Network:
     def __init__(self) -> None:
         self._spaces: list[shapely.Polygon] = []
 
-    def dig(self, points: Sequence[Point] | Sequence[Array] | Array, width: float) -> None:
+    def dig(self, points: Sequence[Point] | Sequence[FloatArray] | FloatArray, width: float) -> None:
         """Add a tunnel of constant width along a polyline, with flat ends."""
         line = shapely.LineString(points)
         self._spaces.append(line.buffer(width / 2.0, cap_style="flat", join_style="mitre"))
 
-    def add_chamber(self, center: Array, radius: float) -> None:
+    def add_chamber(self, center: FloatArray, radius: float) -> None:
         """Add an octagonal chamber."""
         x, y = center.tolist()
         self._spaces.append(shapely.Polygon(build_octagon(x, y, radius)))
@@ -69,13 +69,13 @@ def draw_tunnels(rng: np.random.Generator, layout: int) -> FloorPlan:
     return draw_layout(rng)
 
 
-def _move(point: Array, x: float, y: float) -> Array:
+def _move(point: FloatArray, x: float, y: float) -> FloatArray:
     """Return a point moved by `x` and `y`, m."""
-    moved: Array = point + np.array([x, y])
+    moved: FloatArray = point + np.array([x, y])
     return moved
 
 
-def _bend(rng: np.random.Generator, start: Array, end: Array, amount: float) -> Array:
+def _bend(rng: np.random.Generator, start: FloatArray, end: FloatArray, amount: float) -> FloatArray:
     """Return a line from start to end whose middle is shifted sideways by at most `amount`, m."""
     across = np.array([start[1] - end[1], end[0] - start[0]]) / np.hypot(*(end - start))
     middle = (start + end) / 2.0 + rng.uniform(-amount, amount) * across
@@ -110,7 +110,7 @@ def _draw_pillar_mine(rng: np.random.Generator) -> FloorPlan:
     return network.cut((shaft[0], shaft[1]))
 
 
-def _choose_crossings(rng: np.random.Generator, rows: int, columns: int) -> Array:
+def _choose_crossings(rng: np.random.Generator, rows: int, columns: int) -> FloatArray:
     """Choose the crossings of headings, (rows, columns, 2) m: a skewed grid with random shifts."""
     pitch_x = rng.uniform(6.6, 7.4)
     pitch_y = rng.uniform(6.4, 7.2)
@@ -151,7 +151,9 @@ def _draw_drift_mine(rng: np.random.Generator) -> FloorPlan:
     return network.cut((adit[0], adit[1]))
 
 
-def _dig_cross_cuts(rng: np.random.Generator, network: _Network, lower: Array, upper: Array) -> None:
+def _dig_cross_cuts(
+    rng: np.random.Generator, network: _Network, lower: FloatArray, upper: FloatArray
+) -> None:
     """Dig cross-cuts from the lower drift; those at both ends and three others reach the upper drift."""
     stations = len(lower)
     chosen = rng.choice(np.arange(1, stations - 1), 3, replace=False).tolist()
@@ -169,7 +171,7 @@ def _dig_cross_cuts(rng: np.random.Generator, network: _Network, lower: Array, u
 
 
 def _dig_stope(
-    rng: np.random.Generator, network: _Network, start: Array, end: Array, *, max_radius: float
+    rng: np.random.Generator, network: _Network, start: FloatArray, end: FloatArray, *, max_radius: float
 ) -> None:
     """Dig a bent drift that ends in a chamber."""
     line = _bend(rng, start, end, 1.2)
@@ -201,7 +203,9 @@ def _draw_sewers(rng: np.random.Generator) -> FloorPlan:
     return network.cut((trunk[0, 0], trunk[0, 1]))
 
 
-def _dig_lateral(rng: np.random.Generator, network: _Network, node: Array, side: int, number: int) -> Array:
+def _dig_lateral(
+    rng: np.random.Generator, network: _Network, node: FloatArray, side: int, number: int
+) -> FloatArray:
     """Dig a lateral from a node of the trunk to one side (1 or -1), and return its manhole."""
     # Laterals join the trunk in the direction of its flow; those on both sides are staggered.
     lean = rng.uniform(1.0, 3.0)
@@ -222,7 +226,7 @@ def _dig_lateral(rng: np.random.Generator, network: _Network, node: Array, side:
     return manhole
 
 
-def _connect_manholes(rng: np.random.Generator, network: _Network, manholes: list[Array]) -> None:
+def _connect_manholes(rng: np.random.Generator, network: _Network, manholes: list[FloatArray]) -> None:
     """Connect the manholes on one side of the trunk; one connection ends halfway."""
     unfinished = int(rng.integers(0, len(manholes) - 1))
     for number, (first, second) in enumerate(itertools.pairwise(manholes)):

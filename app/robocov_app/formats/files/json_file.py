@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import Issue, JsonPath, MapError, quote_json, to_one_line
 from robocov.files.strictjson import locate_issues, parse_json
+from robocov.typing import FloatArray
 from robocov_app.formats.files.limits import MAX_TEXT_BYTES, require_vertices
 from robocov_app.formats.files.reading import read_content
 
@@ -55,7 +55,7 @@ class JsonFile:
 
     def parse_points(
         self, value: Any, location: JsonPath, *, min_count: int, min_dimensions: int, max_dimensions: int
-    ) -> Array:
+    ) -> FloatArray:
         """Convert a JSON list of points to a (k, d) array.
 
         The number of coordinates d is that of the longest point; missing coordinates of others are nan.

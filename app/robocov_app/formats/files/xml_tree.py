@@ -10,9 +10,9 @@ from xml.parsers import expat
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError, quote, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.files.limits import MAX_TEXT_BYTES
 from robocov_app.formats.files.numbers import parse_number
 from robocov_app.formats.files.reading import read_content
@@ -70,7 +70,7 @@ class Element:
         """Return the first child with a tag, or None."""
         return next((child for child in self.children if child.tag == tag), None)
 
-    def parse_numbers(self, name: str, count: int | None = None, default: str | None = None) -> Array:
+    def parse_numbers(self, name: str, count: int | None = None, default: str | None = None) -> FloatArray:
         """Return the numbers in an attribute.
 
         Parameters

@@ -16,8 +16,8 @@ import shapely
 from shapely import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.errors import MapError, ParameterError, format_count, quote
+from robocov.typing import FloatArray
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
@@ -186,7 +186,7 @@ def _compute_area(geometry: SourceGeometry, shapes: Shapes) -> MultiPolygon:
     return find_enclosed_area(rings, geometry.rule, CrossingCounter(shapes.source_name)).area
 
 
-def _has_length(line: Array) -> bool:
+def _has_length(line: FloatArray) -> bool:
     return bool((line[1:] != line[:-1]).any())
 
 
@@ -222,7 +222,7 @@ def _add_passages(floor: MultiPolygon, gaps: list[BaseGeometry], shapes: Shapes)
     return to_multipolygon(unite([*floor.geoms, *passages]))
 
 
-def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[Array]:
+def _cut_walls(walls: list[BaseGeometry], gaps: list[BaseGeometry]) -> list[FloatArray]:
     """Return the lines of walls, (k, 2) m each, without duplicates and without their sections in openings."""
     if not walls:
         return []

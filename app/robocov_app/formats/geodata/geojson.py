@@ -23,11 +23,11 @@ from shapely import MultiPolygon
 from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import JsonPath, ParameterError, RobocovError, format_path, quote, to_one_line
 from robocov.files.writing import replace_file
 from robocov.optional_imports import import_optional
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.foreign_map import ForeignMap
@@ -271,7 +271,7 @@ class GeometryCollector:
                 self.shapes.build_polygon(rings, labels, format_path(location), parent_location)
             )
 
-    def _parse_points(self, value: Any, location: JsonPath, min_count: int) -> Array:
+    def _parse_points(self, value: Any, location: JsonPath, min_count: int) -> FloatArray:
         points = self.file.parse_points(
             value, location, min_count=min_count, min_dimensions=2, max_dimensions=4
         )

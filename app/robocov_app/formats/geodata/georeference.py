@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError, quote
 from robocov.mapfile.models import MAX_SIZE_M
 from robocov.optional_imports import import_optional
+from robocov.typing import FloatArray
 from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 from robocov_app.formats.options import get_or_default
@@ -86,11 +86,11 @@ def convert_to_meters(
     return _replace_points(geometries, _join_points(geometries) * meters_per_unit)
 
 
-def _join_points(geometries: Sequence[SourceGeometry]) -> Array:
+def _join_points(geometries: Sequence[SourceGeometry]) -> FloatArray:
     return np.concatenate([ring for geometry in geometries for ring in geometry.rings])
 
 
-def _replace_points(geometries: Sequence[SourceGeometry], points: Array) -> list[SourceGeometry]:
+def _replace_points(geometries: Sequence[SourceGeometry], points: FloatArray) -> list[SourceGeometry]:
     """Replace the points of geometries; the new ones are in the order of `_join_points`."""
     lengths = [len(ring) for geometry in geometries for ring in geometry.rings]
     rings = iter(np.split(points, np.cumsum(lengths)[:-1]))
@@ -115,7 +115,7 @@ def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
     return bool(size_rad * _EARTH_RADIUS_M <= MAX_SIZE_M)
 
 
-def _unwrap_longitudes(points: Array, center: float) -> Array:
+def _unwrap_longitudes(points: FloatArray, center: float) -> FloatArray:
     """Return longitudes and latitudes, with all longitudes within 180 degrees of `center`.
 
     So shapes that cross the antimeridian have no jump there.
@@ -174,7 +174,7 @@ def _import_pyproj(system: str, source_name: str) -> Any:
         raise MapError(f"{source_name}: coordinates in {label}: {error} ({_WAY_OUT})") from None
 
 
-def _transform_to_degrees(pyproj: Any, points: Array, system: str, source_name: str) -> Array:
+def _transform_to_degrees(pyproj: Any, points: FloatArray, system: str, source_name: str) -> FloatArray:
     """Convert points of a reference system to longitude and latitude; inf if that is impossible."""
     try:
         source = pyproj.CRS.from_authority(*system.split(":"))
@@ -195,11 +195,11 @@ class LocalPlane:
         self._longitude = longitude
         self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
 
-    def to_meters(self, coordinates: Array) -> Array:
+    def to_meters(self, coordinates: FloatArray) -> FloatArray:
         """Convert longitudes and latitudes, (n, 2), to meters, rounded so that touching walls still touch."""
         return np.round(np.column_stack(self._project(*coordinates.T)), _DIGITS)
 
-    def to_degrees(self, coordinates: Array) -> Array:
+    def to_degrees(self, coordinates: FloatArray) -> FloatArray:
         """Convert positions in meters, (n, 2), to longitudes and latitudes.
 
         Longitudes are within 180 degrees of the origin's.

@@ -7,8 +7,8 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.errors import MapError
+from robocov.typing import FloatArray
 
 MAX_CROSSINGS = 30_000
 """Maximum number of crossings of all edges of a file. A ring of a few kB can cross itself millions of times,
@@ -24,14 +24,14 @@ _MIN_COUNTED_CROSSINGS = 50
 """Number of counted crossings above which an estimate is reliable enough to end early."""
 
 
-def extract_edges(lines: Iterable[BaseGeometry]) -> Array:
+def extract_edges(lines: Iterable[BaseGeometry]) -> FloatArray:
     """Return the start and end of each edge of lines and rings, (n, 2, 2)."""
     points, line = shapely.get_coordinates(lines, return_index=True)
     is_same_line = line[1:] == line[:-1]
     return np.stack([points[:-1][is_same_line], points[1:][is_same_line]], axis=1)
 
 
-def extract_sides(area: BaseGeometry) -> Array:
+def extract_sides(area: BaseGeometry) -> FloatArray:
     """Return the start and end of each side of polygons, (n, 2, 2)."""
     return extract_edges(shapely.get_rings(shapely.get_parts(area)))
 
@@ -70,7 +70,7 @@ class CrossingCounter:
                 f"{self.source_name}: expected at most {MAX_CROSSINGS} crossings of lines, got {actual}"
             )
 
-    def _estimate(self, edges: Array) -> float:
+    def _estimate(self, edges: FloatArray) -> float:
         """Estimate the number of crossings from a random sample of edges."""
         tree = shapely.STRtree(edges)
         sample = np.random.default_rng(0).permutation(len(edges))[:_MAX_SAMPLED_EDGES]

@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
+from robocov.arrays import concatenate_ranges
 from robocov.environment import MAX_SAGITTA_M
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 CURVE_TOLERANCE_M = MAX_SAGITTA_M
 """Maximum distance between a curve and its approximation, the same as for round obstacles."""
@@ -20,7 +21,9 @@ _MIDPOINT_SAFETY = 0.8
 _MIN_ELLIPSE_POINTS = 8
 
 
-def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS) -> tuple[Array, IntArray]:
+def flatten_beziers(
+    control: FloatArray, tolerance: float, maximum: int = MAX_POINTS
+) -> tuple[FloatArray, IntArray]:
     """Approximate cubic Bézier curves by points.
 
     Parameters
@@ -63,15 +66,15 @@ def flatten_beziers(control: Array, tolerance: float, maximum: int = MAX_POINTS)
 
 
 def flatten_arcs(
-    centers: Array,
-    u: Array,
-    v: Array,
-    starts: Array,
-    sweeps: Array,
+    centers: FloatArray,
+    u: FloatArray,
+    v: FloatArray,
+    starts: FloatArray,
+    sweeps: FloatArray,
     *,
     tolerance: float,
     maximum: int = MAX_POINTS,
-) -> tuple[Array, IntArray]:
+) -> tuple[FloatArray, IntArray]:
     """Approximate elliptic arcs, center + u cos(a) + v sin(a), by points.
 
     Parameters
@@ -109,7 +112,9 @@ def flatten_arcs(
     return centers + np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v, count
 
 
-def flatten_arc(center: Array, u: Array, v: Array, *, start: float, sweep: float, tolerance: float) -> Array:
+def flatten_arc(
+    center: FloatArray, u: FloatArray, v: FloatArray, *, start: float, sweep: float, tolerance: float
+) -> FloatArray:
     """Return the points of an elliptic arc, (k, 2), except for the first one; see `flatten_arcs`."""
     points, _ = flatten_arcs(
         center[None], u[None], v[None], np.array([start]), np.array([sweep]), tolerance=tolerance
@@ -117,7 +122,9 @@ def flatten_arc(center: Array, u: Array, v: Array, *, start: float, sweep: float
     return points
 
 
-def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
+def sample_curve(
+    curve: Callable[[FloatArray], FloatArray], breaks: FloatArray, tolerance: float
+) -> FloatArray:
     """Sample a curve at points so close that the lines between them are within a tolerance.
 
     Parameters
@@ -151,12 +158,12 @@ def sample_curve(curve: Callable[[Array], Array], breaks: Array, tolerance: floa
     return points
 
 
-def _build_fractions(count: IntArray) -> Array:
+def _build_fractions(count: IntArray) -> FloatArray:
     """Return 1/n, 2/n, ..., 1 for each count n, one after the other."""
     return np.asarray((concatenate_ranges(np.zeros_like(count), count) + 1) / count.repeat(count))
 
 
-def _round_counts(count: Array, maximum: int) -> IntArray:
+def _round_counts(count: FloatArray, maximum: int) -> IntArray:
     """Round counts up to integers of at least 1; raise ValueError if their sum exceeds `maximum`."""
     whole = np.ceil(np.clip(count, 1.0, maximum + 1.0))
     if not whole.sum() <= maximum:  # The sum may be nan.

@@ -4,19 +4,19 @@ import math
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Vertices of a square with side 1 around the origin, (4, 2)."""
 
 
-def build_frame(x: float, y: float, turn: float) -> Array:
+def build_frame(x: float, y: float, turn: float) -> FloatArray:
     """Return the (3, 3) matrix of a frame at a position, rotated by the angle `turn`, rad."""
     cos = math.cos(turn)
     sin = math.sin(turn)
     return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
 
 
-def transform_points(matrix: Array, points: Array) -> Array:
+def transform_points(matrix: FloatArray, points: FloatArray) -> FloatArray:
     """Transform points, (k, 2), by a (3, 3) matrix."""
     return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])

@@ -8,8 +8,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import GRID_M
+from robocov.typing import FloatArray
 
 DEFAULT_DIGITS = 6
 """Decimals of coordinates in meters: they are rounded to a micrometer."""
@@ -99,7 +99,7 @@ def round_polygons(geometry: BaseGeometry, digits: int) -> MultiPolygon:
         The largest part first.
     """
 
-    def round_points(points: Array) -> Array:
+    def round_points(points: FloatArray) -> FloatArray:
         return np.round(points, digits) + 0.0  # without negative zeros
 
     rounded = shapely.transform(geometry, round_points)
@@ -121,7 +121,7 @@ def _tidy_polygon(polygon: Polygon, digits: int) -> Polygon:
     return Polygon(outer, holes)
 
 
-def tidy_ring(points: Array, digits: int) -> Array:
+def tidy_ring(points: FloatArray, digits: int) -> FloatArray:
     """Drop redundant vertices of a ring: repeated ones, and those on a straight line.
 
     Parameters

@@ -2,23 +2,23 @@
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 _MIN_CROSS = 1e-200
 """Lines are parallel if the cross product of their directions is smaller."""
 
 
-def compute_cross(first: Array, second: Array) -> Array:
+def compute_cross(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the cross product of each pair of vectors, (k,)."""
     return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
 
 
-def compute_dot(first: Array, second: Array) -> Array:
+def compute_dot(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the dot product of each pair of vectors, (k,)."""
     return np.asarray(np.einsum("kd,kd->k", first, second))
 
 
-def project_onto_lines(points: Array, origins: Array, directions: Array) -> Array:
+def project_onto_lines(points: FloatArray, origins: FloatArray, directions: FloatArray) -> FloatArray:
     """Project each point onto a line of its own.
 
     Parameters
@@ -35,8 +35,11 @@ def project_onto_lines(points: Array, origins: Array, directions: Array) -> Arra
 
 
 def intersect_lines(
-    first_origins: Array, first_directions: Array, second_origins: Array, second_directions: Array
-) -> tuple[Array, Array]:
+    first_origins: FloatArray,
+    first_directions: FloatArray,
+    second_origins: FloatArray,
+    second_directions: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
     """Intersect pairs of infinite lines.
 
     Parameters

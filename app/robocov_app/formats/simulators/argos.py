@@ -15,9 +15,9 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.arrays import Array
 from robocov.errors import quote, to_one_line
 from robocov.mapfile.models import MAX_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.files.xml_tree import Element, read_xml_tree
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
@@ -91,7 +91,7 @@ def _distribute(element: Element, shapes: Shapes) -> None:
         _place(body, point, angles, shapes)
 
 
-def _compute_grid_positions(element: Element, quantity: int) -> Array:
+def _compute_grid_positions(element: Element, quantity: int) -> FloatArray:
     """Return the positions of entities in a grid, (quantity, 3) m, in the order in which ARGoS fills it."""
     layout = element.parse_numbers("layout", count=3).astype(int)
     if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
@@ -101,11 +101,11 @@ def _compute_grid_positions(element: Element, quantity: int) -> Array:
     first = element.parse_numbers("center", count=3) + (layout - 1) * distances / 2
     k = np.arange(quantity)
     steps = np.column_stack([k % columns, k // columns % rows, k // (columns * rows)])
-    positions: Array = first - steps * distances
+    positions: FloatArray = first - steps * distances
     return positions
 
 
-def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> None:
+def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: Shapes) -> None:
     """Add a body as an obstacle or a robot.
 
     Parameters
@@ -137,7 +137,7 @@ def _place(element: Element, position: Array, angles: Array, shapes: Shapes) -> 
         shapes.add_circle(position[:2], radius, labels, location=f"line {element.line}")
 
 
-def _parse_lengths(element: Element, name: str, count: int = 3) -> Array:
+def _parse_lengths(element: Element, name: str, count: int = 3) -> FloatArray:
     """Return the lengths in an attribute, m; the first two must be positive."""
     values = element.parse_numbers(name, count=count)
     lengths = values[:2]

@@ -18,9 +18,9 @@ import shapely
 from scipy.special import ndtr
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array
 from robocov.density import Raster
 from robocov.errors import MapError, format_count, quote
+from robocov.typing import FloatArray
 from robocov_app.formats.files import (
     get_map_name,
     parse_number,
@@ -186,7 +186,7 @@ class _FeatureReader:
 
 def _compute_weights(
     gaussians: list[Gaussian], areas: list[UniformArea], side: float, source_name: str
-) -> Array:
+) -> FloatArray:
     """Compute the weights of the pixels, relative to the largest.
 
     Returns
@@ -205,7 +205,7 @@ def _compute_weights(
     return np.round(weights / highest, _WEIGHT_DIGITS) if highest > 0.0 else weights
 
 
-def _compute_area_weights(areas: list[UniformArea], edges: Array, source_name: str) -> Array:
+def _compute_area_weights(areas: list[UniformArea], edges: FloatArray, source_name: str) -> FloatArray:
     """Compute the highest weight of the polygons at each pixel, (RASTER_SIZE, RASTER_SIZE)."""
     centers = 0.5 * (edges[:-1] + edges[1:])
     weights = np.zeros((len(centers), len(centers)))
@@ -226,7 +226,7 @@ def _compute_area_weights(areas: list[UniformArea], edges: Array, source_name: s
     return weights
 
 
-def _compute_gaussian_masses(gaussian: Gaussian, edges: Array) -> Array:
+def _compute_gaussian_masses(gaussian: Gaussian, edges: FloatArray) -> FloatArray:
     """Compute the mass of a Gaussian in each pixel, (RASTER_SIZE, RASTER_SIZE)."""
     u = (edges - gaussian.x) / gaussian.sigma_x
     v = (edges - gaussian.y) / gaussian.sigma_y

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array
 from robocov.errors import MapError, format_count, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.files import JsonFile, starts_with
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.crossings import CrossingCounter
@@ -61,7 +61,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     )
 
 
-def _parse_vertices(file: JsonFile, value: Any) -> Array:
+def _parse_vertices(file: JsonFile, value: Any) -> FloatArray:
     """Return the vertices of the ring, (k, 2) m."""
     if not isinstance(value, list) or len(value) < 3:
         raise file.build_error(("verts",), value, "a list of at least 3 points [x, y]")

@@ -12,8 +12,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from robocov.arrays import Array
 from robocov.errors import JsonPath
+from robocov.typing import FloatArray
 from robocov_app.formats.files import JsonFile, get_map_name, require_shapes
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.shapes.collection import Shapes
@@ -57,7 +57,7 @@ class _RingParser:
         self.file = file
         self.shapes = Shapes(file.source_name, options)
 
-    def parse_polygons(self) -> list[list[Array]]:
+    def parse_polygons(self) -> list[list[FloatArray]]:
         """Return the polygons in the file, in its units. The nesting of the lists tells the structure."""
         document = self.file.document
         if isinstance(document, dict):
@@ -73,7 +73,7 @@ class _RingParser:
                 return [self._parse_polygon(rings, (k,)) for k, rings in enumerate(document)]
         raise self.file.build_error((), document, "a list of rings [[x, y], ...]")
 
-    def _parse_flat_polygon(self, document: dict[str, Any]) -> list[Array]:
+    def _parse_flat_polygon(self, document: dict[str, Any]) -> list[FloatArray]:
         """Return the rings of an object with ``vertices``, ``holes`` and ``dimensions``."""
         dimensions = document.get("dimensions", 2)
         if type(dimensions) is not int or dimensions not in (2, 3):
@@ -87,16 +87,16 @@ class _RingParser:
         expected = f"growing indices of vertices, from 1 to {len(points) - 1}"
         raise self.file.build_error(("holes",), holes, expected)
 
-    def _parse_polygon(self, value: Any, location: JsonPath) -> list[Array]:
+    def _parse_polygon(self, value: Any, location: JsonPath) -> list[FloatArray]:
         if not isinstance(value, list) or not value:
             raise self.file.build_error(location, value, "a list of rings")
         return [self._parse_ring(ring, (*location, k)) for k, ring in enumerate(value)]
 
-    def _parse_ring(self, value: Any, location: JsonPath) -> Array:
+    def _parse_ring(self, value: Any, location: JsonPath) -> FloatArray:
         points = self.file.parse_points(value, location, min_count=1, min_dimensions=2, max_dimensions=3)
         return self.shapes.drop_heights(points)
 
-    def _parse_flat_ring(self, value: Any, location: JsonPath, dimensions: int) -> Array:
+    def _parse_flat_ring(self, value: Any, location: JsonPath, dimensions: int) -> FloatArray:
         """Return the points of a flat list of coordinates, `dimensions` of them for each point."""
         is_list = isinstance(value, list)
         if not is_list or len(value) % dimensions or len(value) < 3 * dimensions:

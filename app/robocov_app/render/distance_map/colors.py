@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.theme import Theme
 from robocov_app.render.distance_map.pixel_distances import BorderPixels, DistanceField
 
@@ -95,7 +95,7 @@ def build_palette(theme: Theme) -> NDArray[np.uint8]:
 
 
 def compute_color_levels(
-    field: DistanceField, x: Array, y: Array, limit: float, hatch_px: int
+    field: DistanceField, x: FloatArray, y: FloatArray, limit: float, hatch_px: int
 ) -> NDArray[np.uint8]:
     """Compute the palette indices of a grid of points by their distance to the nearest robot.
 
@@ -128,7 +128,7 @@ def compute_color_levels(
     return levels
 
 
-def compute_line_opacities(borders: BorderPixels, zoom: float, width: float) -> Array:
+def compute_line_opacities(borders: BorderPixels, zoom: float, width: float) -> FloatArray:
     """Compute the fraction of each pixel that a line along borders covers.
 
     Parameters

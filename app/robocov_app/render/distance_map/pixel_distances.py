@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, TimeVaryingCost
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.render.distance_map.site_lattice import FieldLattice
 
 _MIN_DISTANCE_GROWTH = 0.05
@@ -46,7 +46,7 @@ class BorderPixels:
     rows: IntArray
     columns: IntArray
     owners: IntArray
-    distances: Array
+    distances: FloatArray
 
     def select_within(self, max_distance: float) -> BorderPixels:
         """Return the pixels within a distance of the border, m."""
@@ -133,13 +133,15 @@ class DistanceField:
         is_free = lengths >= self.result.distances[corner_sites][..., None] - tolerance
         return _Candidates(indices, sites, is_free)
 
-    def _compute_distances(self, sites: IntArray, x: Array, y: Array) -> Array:
+    def _compute_distances(self, sites: IntArray, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the lengths of the paths to sites, m, if each led from its last bend to (x, y) instead."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._lengths_to_bend[sites])
 
-    def _compare_candidates(self, candidates: _Candidates, indices: IntArray, x: Array, y: Array) -> Array:
+    def _compare_candidates(
+        self, candidates: _Candidates, indices: IntArray, x: FloatArray, y: FloatArray
+    ) -> FloatArray:
         """Return the distance of each point along each candidate of its square.
 
         Parameters
@@ -168,7 +170,7 @@ class DistanceField:
             return float("nan")
         return float(reached.max())
 
-    def compute_distances(self, x: Array, y: Array) -> Array:
+    def compute_distances(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Compute the distance to the nearest robot for a grid of points.
 
         Parameters
@@ -196,7 +198,9 @@ class DistanceField:
         distances[point_rows, point_columns] = choices.min(axis=1)
         return distances
 
-    def compute_cells(self, x: Array, y: Array, max_distance: float) -> tuple[IntArray, BorderPixels]:
+    def compute_cells(
+        self, x: FloatArray, y: FloatArray, max_distance: float
+    ) -> tuple[IntArray, BorderPixels]:
         """Compute the nearest robot for a grid of points, and the points near a border between robots.
 
         Parameters
@@ -222,12 +226,14 @@ class DistanceField:
             owners[pixels.rows, pixels.columns] = pixels.owners
         return owners, fine.select_within(max_distance)
 
-    def compute_borders(self, x: Array, y: Array, max_distance: float) -> BorderPixels:
+    def compute_borders(self, x: FloatArray, y: FloatArray, max_distance: float) -> BorderPixels:
         """Compute only the pixels near borders of geodesic cells; see `compute_cells` for the parameters."""
         _, fine = self._evaluate_borders(x, y, max_distance)
         return fine.select_within(max_distance)
 
-    def _evaluate_borders(self, x: Array, y: Array, max_distance: float) -> tuple[BorderPixels, BorderPixels]:
+    def _evaluate_borders(
+        self, x: FloatArray, y: FloatArray, max_distance: float
+    ) -> tuple[BorderPixels, BorderPixels]:
         """Evaluate the pixels of squares with candidates: coarsely in blocks, then finely near borders.
 
         Returns
@@ -254,7 +260,7 @@ class DistanceField:
         fine = self._evaluate_pixels(fine_rows, fine_columns, x, y)
         return _spread_over_pixels(blocks, len(y), len(x)), fine
 
-    def _find_blocks(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
+    def _find_blocks(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray]:
         """Return rows and columns of the blocks of pixels with a corner in a square that has candidates."""
         columns, rows = self.lattice.find_squares(x, y)
         has_candidates = self._border_candidates.indices >= 0
@@ -266,7 +272,9 @@ class DistanceField:
         block_rows, block_columns = np.logical_or.reduce(has_corner).nonzero()
         return block_rows, block_columns
 
-    def _evaluate_pixels(self, rows: IntArray, columns: IntArray, x: Array, y: Array) -> BorderPixels:
+    def _evaluate_pixels(
+        self, rows: IntArray, columns: IntArray, x: FloatArray, y: FloatArray
+    ) -> BorderPixels:
         """Return the nearest robot of pixels, and their distance to the border with the second nearest.
 
         Parameters
@@ -288,7 +296,9 @@ class DistanceField:
         owners, distances = self._compare_owners(indices[has_candidates], x[columns], y[rows])
         return BorderPixels(rows, columns, owners, distances)
 
-    def _compare_owners(self, indices: IntArray, pixel_x: Array, pixel_y: Array) -> tuple[IntArray, Array]:
+    def _compare_owners(
+        self, indices: IntArray, pixel_x: FloatArray, pixel_y: FloatArray
+    ) -> tuple[IntArray, FloatArray]:
         """Return the nearest robot of pixels, and the distance to the border with the second nearest.
 
         Parameters
@@ -326,7 +336,9 @@ class DistanceField:
             border_distances = differences / growth
         return nearest_owners, np.nan_to_num(border_distances, nan=np.inf, posinf=np.inf)
 
-    def _compute_directions(self, sites: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
+    def _compute_directions(
+        self, sites: IntArray, x: FloatArray, y: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return dx and dy of the unit vectors from the last bends of the paths of sites to points."""
         dx = x - self._bend_x[sites]
         dy = y - self._bend_y[sites]
@@ -354,7 +366,7 @@ class DistanceFields:
         self._lattice_cost = cost
         self._lattice = FieldLattice(cost.sites)
 
-    def compute_at(self, positions: Array, time: float = 0.0) -> DistanceField | None:
+    def compute_at(self, positions: FloatArray, time: float = 0.0) -> DistanceField | None:
         """Compute the distance field of robots at given positions.
 
         Parameters
@@ -383,7 +395,7 @@ class DistanceFields:
         return DistanceField(self._lattice, result)
 
 
-def compute_block_middles(coordinates: Array, size: int) -> Array:
+def compute_block_middles(coordinates: FloatArray, size: int) -> FloatArray:
     """Return the middles of blocks of adjacent pixels along an axis.
 
     Parameters
@@ -406,7 +418,7 @@ def _find_rows_with_differences(values: IntArray) -> BoolArray:
     return np.asarray((values[..., 1:] != values[..., :1]).any(axis=-1))
 
 
-def _get_half_index(steps: Array) -> IntArray:
+def _get_half_index(steps: FloatArray) -> IntArray:
     """Return 1 for coordinates, in lattice steps, in the upper half of a square, and 0 in its lower half."""
     return (np.floor(steps - 0.5) - np.floor(steps)).astype(np.intp) + 1
 

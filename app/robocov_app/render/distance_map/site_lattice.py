@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import Sites
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 
 class _Side(NamedTuple):
@@ -76,11 +76,11 @@ class FieldLattice:
         self.is_corner_free: BoolArray = corner_sites >= 0
         self.corner_sites: IntArray = np.where(self.is_corner_free, corner_sites, replacements[..., None])
 
-    def to_steps(self, x: Array, y: Array) -> tuple[Array, Array]:
+    def to_steps(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Convert coordinates, m, to lattice steps from the origin."""
         return (x - self.origin[0]) / self.spacing, (y - self.origin[1]) / self.spacing
 
-    def find_squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
+    def find_squares(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray]:
         """Find the rows and columns of squares that contain coordinates.
 
         Parameters
@@ -96,7 +96,7 @@ class FieldLattice:
         x_steps, y_steps = self.to_steps(x, y)
         return self._find_intervals(x_steps), self._find_intervals(y_steps)
 
-    def _find_intervals(self, steps: Array) -> IntArray:
+    def _find_intervals(self, steps: FloatArray) -> IntArray:
         last = len(self.corner_sites) - 1
         return np.asarray(np.clip(np.floor(steps) + 1, 0, last).astype(np.intp))
 

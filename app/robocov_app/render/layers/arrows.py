@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import ArrowHead, Canvas
@@ -26,7 +26,7 @@ _RESULTANT_WIDTH_PX = 3.0
 _VELOCITY_WIDTH_PX = 1.6
 _MIN_FORCE_N = 1e-300
 
-VectorFunction: TypeAlias = Callable[[Scene, float], Array | None]
+VectorFunction: TypeAlias = Callable[[Scene, float], FloatArray | None]
 """Returns the arrows of a scene at a scale, (n, 2) px with y down; None if it has none."""
 
 
@@ -107,7 +107,7 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
         maximum acceleration.
     """
 
-    def compute_vectors(scene: Scene, scale: float) -> Array | None:
+    def compute_vectors(scene: Scene, scale: float) -> FloatArray | None:
         """Return the arrows of the forces, (n, 2) px with y down; None if there are no such forces."""
         forces = _get_forces(scene, term)
         if forces is None:
@@ -129,7 +129,7 @@ def build_force_layer(term: str, title: str, head: ArrowHead) -> Layer:
     return _build_arrow_layer(f"force_{term}", title, title.lower(), compute_vectors, style)
 
 
-def _get_forces(scene: Scene, term: str) -> Array | None:
+def _get_forces(scene: Scene, term: str) -> FloatArray | None:
     """Return a term of the forces, (n, 2) N; None if the controller has no such term."""
     decision = scene.now.decision
     if term == "resultant":
@@ -142,7 +142,7 @@ def _get_forces(scene: Scene, term: str) -> Array | None:
 def build_velocity_layer() -> Layer:
     """Build the layer of velocities."""
 
-    def compute_vectors(scene: Scene, scale: float) -> Array:
+    def compute_vectors(scene: Scene, scale: float) -> FloatArray:
         fractions = scene.now.velocities / scene.team.max_speed[:, None]
         # Pixels run downwards.
         return np.asarray(fractions * np.array([1.0, -1.0]) * MAX_VELOCITY_ARROW_PX * scale)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.look.colors import Color
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.scene import Scene
@@ -71,7 +71,7 @@ def _find_successors(sizes: IntArray, ends: IntArray) -> IntArray:
     return next_rows
 
 
-def _select_one_direction(edges: Array) -> Array:
+def _select_one_direction(edges: FloatArray) -> FloatArray:
     """Return the edges, (k, 4) px, that go to the right or straight down.
 
     An edge between two cells is in the list in both directions; drawn twice, it would lose its antialiasing.
@@ -81,7 +81,7 @@ def _select_one_direction(edges: Array) -> Array:
     return np.asarray(edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))])
 
 
-def _remove_duplicates(edges: Array) -> Array:
+def _remove_duplicates(edges: FloatArray) -> FloatArray:
     """Return each edge, (k, 4) px, once, regardless of its direction."""
     x1, y1, x2, y2 = edges.T
     is_backward = (x1 > x2) | ((x1 == x2) & (y1 > y2))

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.colors import mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
@@ -64,7 +64,7 @@ def _format_length(length: float) -> str:
     return f"{length:.0f} m"
 
 
-def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) -> pygame.Rect:
+def _place_tag(canvas: Canvas, scene: Scene, corners: FloatArray, text_width: int) -> pygame.Rect:
     """Choose the box of the tag next to the cursor that hides the least of the path and the robots.
 
     Parameters
@@ -95,7 +95,7 @@ def _place_tag(canvas: Canvas, scene: Scene, corners: Array, text_width: int) ->
     return best_box
 
 
-def _compute_hiding_cost(canvas: Canvas, scene: Scene, corners: Array, box: pygame.Rect) -> int:
+def _compute_hiding_cost(canvas: Canvas, scene: Scene, corners: FloatArray, box: pygame.Rect) -> int:
     """Return a cost that counts the sections of the path, (w, 2) px, and the robots that a box would hide."""
     path = limit_pixels(corners).tolist()
     n_sections = sum(bool(box.clipline(start, end)) for start, end in pairwise(path))

@@ -7,8 +7,8 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov.arrays import Array
 from robocov.density import Density
+from robocov.typing import FloatArray
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density_shading import Bounds, color_density, compute_density_fractions
@@ -32,7 +32,7 @@ def draw_density(canvas: Canvas, scene: Scene) -> None:
         draw_density_shading(canvas, density, scene.environment.region.vertices)
 
 
-def draw_density_shading(canvas: Canvas, density: Density, outline: Array) -> None:
+def draw_density_shading(canvas: Canvas, density: Density, outline: FloatArray) -> None:
     """Draw a density within an outline.
 
     The samples do not depend on the clip of the surface, so that parts drawn one by one fit together.
@@ -83,7 +83,9 @@ def _interpolate_fractions(
     return np.asarray(np.rint(interpolate_rows(fine_rows)).astype(np.uint8))
 
 
-def _place_samples(start: int, count: int, step: int) -> tuple[Array, Callable[[Array], Array]]:
+def _place_samples(
+    start: int, count: int, step: int
+) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
     """Place samples at multiples of a step along an axis.
 
     Parameters
@@ -104,7 +106,7 @@ def _place_samples(start: int, count: int, step: int) -> tuple[Array, Callable[[
     weights = (sample_units - before)[:, None]
     indices = before - before[0]
 
-    def interpolate(values: Array) -> Array:
+    def interpolate(values: FloatArray) -> FloatArray:
         low = values[indices]
         high = values[indices + 1]
         return np.asarray(low + weights * (high - low))

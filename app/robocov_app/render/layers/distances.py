@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look import legend
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, LegendEntry
@@ -26,7 +26,7 @@ _HATCH_PX = 5
 """Coarse pixels between the lines that hatch unreachable areas."""
 _MIN_LENGTH_PX = 1e-9
 
-FieldRenderer: TypeAlias = Callable[[Canvas, Scene, DistanceField, Array, Array], pygame.Surface]
+FieldRenderer: TypeAlias = Callable[[Canvas, Scene, DistanceField, FloatArray, FloatArray], pygame.Surface]
 """Renders a field at columns x, (w,) m, and rows y, (h,) m."""
 
 
@@ -70,7 +70,7 @@ class FieldLayer:
         _cover_outside(canvas, scene.environment.region.vertices)
 
 
-def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[Array, Array]:
+def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[FloatArray, FloatArray]:
     """Return the upper left pixel that shows the region, (2,) px, and the one after the lower right."""
     low_x, low_y, high_x, high_y = scene.environment.region.bounds
     corner, end = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
@@ -81,7 +81,7 @@ def _find_visible_pixels(canvas: Canvas, scene: Scene) -> tuple[Array, Array]:
     return corner, end
 
 
-def _cover_outside(canvas: Canvas, vertices: Array) -> None:
+def _cover_outside(canvas: Canvas, vertices: FloatArray) -> None:
     """Cover the outside of a convex outline, (k, 2) m, with the background, one side after the other."""
     corners = canvas.camera.to_pixels(vertices)
     # Long enough for a rectangle on any side to cover the whole surface beyond it.
@@ -95,7 +95,7 @@ def _cover_outside(canvas: Canvas, vertices: Array) -> None:
 
 
 def render_distances(
-    canvas: Canvas, scene: Scene, field: DistanceField, x: Array, y: Array
+    canvas: Canvas, scene: Scene, field: DistanceField, x: FloatArray, y: FloatArray
 ) -> pygame.Surface:
     """Render the distance map at columns x, (w,) m, and rows y, (h,) m, as a `FieldRenderer`."""
     coarse_x = compute_block_middles(x, _COARSE_PX)
@@ -107,7 +107,7 @@ def render_distances(
 
 
 def render_geodesic_cells(
-    canvas: Canvas, scene: Scene, field: DistanceField, x: Array, y: Array
+    canvas: Canvas, scene: Scene, field: DistanceField, x: FloatArray, y: FloatArray
 ) -> pygame.Surface:
     """Render the geodesic cells, or only their borders if the distance map is visible, as a `FieldRenderer`.
 
@@ -137,7 +137,7 @@ def render_geodesic_cells(
     return cells
 
 
-def _render_borders(canvas: Canvas, field: DistanceField, x: Array, y: Array) -> pygame.Surface:
+def _render_borders(canvas: Canvas, field: DistanceField, x: FloatArray, y: FloatArray) -> pygame.Surface:
     """Render the borders of geodesic cells on a transparent surface."""
     borders = field.compute_borders(x, y, _get_border_reach(canvas))
     opacities = compute_line_opacities(borders, canvas.camera.zoom, _BORDER_WIDTH_PX * canvas.scale)

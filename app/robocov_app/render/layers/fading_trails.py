@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import pygame
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.look.colors import Color
 from robocov_app.render.canvas import Canvas, premultiply
 from robocov_app.render.clipping import limit_pixels
@@ -44,7 +44,7 @@ class Pen(NamedTuple):
 
 
 def draw_fading_trails(
-    page: pygame.Surface, canvas: Canvas, trail: Array, times: Array, *, fade: float, pen: Pen
+    page: pygame.Surface, canvas: Canvas, trail: FloatArray, times: FloatArray, *, fade: float, pen: Pen
 ) -> None:
     """Draw the most recent part of trajectories: the older, the more transparent.
 
@@ -83,7 +83,7 @@ def draw_fading_trails(
     sketch.draw_on(page)
 
 
-def _draw_shade(sketch: Sketch, points: Array, tips: Array, opacity: float, pen: Pen) -> Array:
+def _draw_shade(sketch: Sketch, points: FloatArray, tips: FloatArray, opacity: float, pen: Pen) -> FloatArray:
     """Draw the section of each trajectory that has a given shade.
 
     All positions are in pixels of the sketch, which is enlarged by `_SUPERSAMPLING`.
@@ -133,7 +133,7 @@ def _draw_line(
             pygame.draw.circle(large, color, point, width / 2)
 
 
-def _select_corners(points: Array, steps: IntArray, min_distance: float) -> IntArray:
+def _select_corners(points: FloatArray, steps: IntArray, min_distance: float) -> IntArray:
     """Select the rows of trajectories at which they are drawn: few if all robots are slow.
 
     Parameters
@@ -162,7 +162,7 @@ def _select_corners(points: Array, steps: IntArray, min_distance: float) -> IntA
     return np.flatnonzero(is_needed)
 
 
-def _split_at_absences(path: Array) -> list[list[list[float]]]:
+def _split_at_absences(path: FloatArray) -> list[list[list[float]]]:
     """Return the parts of a path, (k, 2), during which its robot is present."""
     is_present = np.isfinite(path[:, 0])
     pieces = np.split(path, np.flatnonzero(np.diff(is_present)) + 1)

@@ -6,8 +6,8 @@ import numpy as np
 import pygame
 from numpy.typing import NDArray
 
-from robocov.arrays import Array, IntArray
 from robocov.planning.discovered_map import PRESUMED_WALL, UNKNOWN, WALL, DiscoveredMap
+from robocov.typing import FloatArray, IntArray
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas, premultiply
@@ -51,7 +51,7 @@ class KnownObstaclesLayer:
         if discovered is not None:
             draw_discovered_map(canvas, discovered)
 
-    def _is_continued(self, canvas: Canvas, scene: Scene, points: Array) -> bool:
+    def _is_continued(self, canvas: Canvas, scene: Scene, points: FloatArray) -> bool:
         """Return whether the page can be continued: it shows the first of the points, (k, 2) m, in this view.
 
         Comparing the last drawn point is enough, since points are only ever appended.
@@ -78,7 +78,7 @@ class KnownObstaclesLayer:
             # The pale obstacles hide parts of the boundary, which is drawn in a lower layer.
             draw_boundary(page, scene)
 
-    def _add_points(self, canvas: Canvas, points: Array, robots: IntArray, selected: int | None) -> None:
+    def _add_points(self, canvas: Canvas, points: FloatArray, robots: IntArray, selected: int | None) -> None:
         """Draw the points, (k, 2) m, that are not on the page yet.
 
         `robots`, (k,), are the numbers of the robots that sensed them. If a robot is selected, only its own

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look import legend
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, PlacedSprites, Sprite
@@ -92,7 +92,7 @@ def build_centroids_legend(scene: Scene) -> list[LegendEntry]:
     return [LegendEntry(name, _build_cross_glyph(name))]
 
 
-def _choose_targets(scene: Scene) -> tuple[str, Array]:
+def _choose_targets(scene: Scene) -> tuple[str, FloatArray]:
     """Return the name of the targets in the legend, and their positions, (n, 2) m.
 
     The targets are the centroids if they equal the goals, otherwise the goals. The name is empty if there are

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.look.colors import mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
@@ -31,7 +31,7 @@ def build_range_layer(kind: Literal["sensing", "communication"], title: str) -> 
     """
     is_dashed = kind == "communication"
 
-    def get_ranges(scene: Scene) -> Array:
+    def get_ranges(scene: Scene) -> FloatArray:
         if kind == "communication":
             return scene.team.communication_range
         return scene.team.sensing_range

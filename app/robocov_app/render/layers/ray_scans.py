@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, premultiply
@@ -49,17 +49,17 @@ class _Scan(NamedTuple):
         Ends of the rays.
     """
 
-    position: Array
-    ends: Array
+    position: FloatArray
+    ends: FloatArray
 
     @property
-    def hits(self) -> Array:
+    def hits(self) -> FloatArray:
         """Ends of the rays that hit an obstacle, (k, 2) px: those shorter than the longest ray."""
         lengths = np.hypot(*(self.ends - self.position).T)
         return np.asarray(self.ends[lengths < lengths.max() * (1.0 - _MAX_RANGE_TOLERANCE)])
 
 
-def draw_dots(canvas: Canvas, centers: Array, radius: float, color: Color) -> None:
+def draw_dots(canvas: Canvas, centers: FloatArray, radius: float, color: Color) -> None:
     """Draw dots; those that coincide after rounding to a quarter of a pixel are drawn once.
 
     Parameters
@@ -101,7 +101,7 @@ def _draw_large_scans(sketch: sprites.Sketch, canvas: Canvas, scans: list[_Scan]
         _Scan((scan.position - corner) * _SUPERSAMPLING, (scan.ends - corner) * _SUPERSAMPLING)
         for scan in scans
     ]
-    outlines: list[Array] = []
+    outlines: list[FloatArray] = []
     for scan in large_scans:
         outlines += clip_polygon(scan.ends)
     for outline in outlines:
@@ -128,7 +128,7 @@ def _draw_rays(large: pygame.Surface, scan: _Scan, canvas: Canvas) -> None:
             pygame.draw.line(large, color, visible_ends[0], visible_ends[1], width)
 
 
-def _choose_ray_starts(n_rays: int) -> Array:
+def _choose_ray_starts(n_rays: int) -> FloatArray:
     """Return the distance from the robot at which each ray starts, px at scale 1."""
     rays = np.arange(n_rays)
     starts = np.full(n_rays, _MIN_RAY_GAP_PX * n_rays / (2 * np.pi))

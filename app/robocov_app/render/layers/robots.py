@@ -4,7 +4,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov.voronoi import VoronoiPartition
 from robocov_app.look import legend
 from robocov_app.look.colors import Color, mix
@@ -58,7 +58,7 @@ _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
 """Positions of the number of a failed robot: right, left, above, below."""
 
 
-def compute_drawn_radii(canvas: Canvas, scene: Scene) -> Array:
+def compute_drawn_radii(canvas: Canvas, scene: Scene) -> FloatArray:
     """Compute the radii at which robots are drawn.
 
     Discs are large enough for readable numbers. In a crowd they are smaller, but never below the true radius.
@@ -78,7 +78,7 @@ def compute_drawn_radii(canvas: Canvas, scene: Scene) -> Array:
 
 # Several layers need the radii in each frame.
 @lru_cache(maxsize=8)
-def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
+def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> FloatArray:
     if scene.snapshot is None:
         return np.empty(0)
     centers = camera.to_pixels(scene.snapshot.positions)
@@ -108,7 +108,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
     canvas.draw_sprites(discs, centers, np.array(indices, dtype=int))
 
 
-def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArray:
+def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: FloatArray) -> IntArray:
     """Return the number on the disc of each robot; 0 in a crowd, or if it would be too small to read."""
     if is_crowd(scene.now.positions, canvas.camera):
         return np.zeros(len(inner_radii), dtype=int)
@@ -118,7 +118,9 @@ def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: Array) -> IntArra
     return np.where(sizes < MIN_NUMBER_SIZE_PX * canvas.scale, 0, numbers)
 
 
-def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, robots: IntArray) -> None:
+def _draw_noses(
+    canvas: Canvas, centers: FloatArray, radii: FloatArray, headings: FloatArray, robots: IntArray
+) -> None:
     """Draw the noses of some robots.
 
     Parameters
@@ -193,7 +195,7 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
 
 
 def _choose_number_position(
-    canvas: Canvas, text: str, *, center: Array, radius: float, centers: Array, radii: Array
+    canvas: Canvas, text: str, *, center: FloatArray, radius: float, centers: FloatArray, radii: FloatArray
 ) -> list[float]:
     """Choose the position of the number of a failed robot, next to its disc.
 

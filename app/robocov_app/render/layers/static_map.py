@@ -7,8 +7,8 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Environment
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color
 from robocov_app.look.legend import MOVING_OBSTACLE, UNKNOWN_OBSTACLE
 from robocov_app.look.lengths import round_down
@@ -96,7 +96,7 @@ def draw_blocked_area(canvas: Canvas, scene: Scene, *, fill: Color, moving_fill:
     fill, moving_fill, edge : Color
         Colors of obstacles at rest, of moving ones and of outlines.
     """
-    outlines: list[Array] = []
+    outlines: list[FloatArray] = []
     # Largest first: a courtyard must be cleared before the obstacles in it are drawn.
     polygons = sorted(scene.environment.blocked.geoms, key=_compute_outer_area, reverse=True)
     for polygon in polygons:
@@ -112,7 +112,7 @@ def draw_blocked_area(canvas: Canvas, scene: Scene, *, fill: Color, moving_fill:
         _draw_moving_obstacle(canvas, scene, obstacle, moving_fill, edge)
 
 
-def _get_corners(canvas: Canvas, ring: shapely.LinearRing) -> Array:
+def _get_corners(canvas: Canvas, ring: shapely.LinearRing) -> FloatArray:
     """Return the corners of a ring, (k, 2) px."""
     return canvas.camera.to_pixels(np.asarray(ring.coords)[:-1])
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look import legend
 from robocov_app.look.colors import Color
 from robocov_app.look.hues import ColorScheme, choose_trail_colors
@@ -101,7 +101,7 @@ class TrajectoriesLayer:
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
 
-    def _count_drawn_rows(self, trail: Array) -> int:
+    def _count_drawn_rows(self, trail: FloatArray) -> int:
         """Return the number of rows of a trail are on the page: those up to the row that was drawn last.
 
         They are fewer than in the last frame if older rows were removed since, and 0 if the trail does not
@@ -117,7 +117,7 @@ class TrajectoriesLayer:
             return 0
         return int(rows[-1]) + 1
 
-    def _start_page(self, canvas: Canvas, trail: Array, key: object) -> None:
+    def _start_page(self, canvas: Canvas, trail: FloatArray, key: object) -> None:
         """Start an empty page, and open paths at the first positions of the trail."""
         self._key = key
         self._page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
@@ -126,10 +126,10 @@ class TrajectoriesLayer:
         self._ended.clear()
         self._start_paths(canvas, trail[0])
 
-    def _start_paths(self, canvas: Canvas, positions: Array) -> None:
+    def _start_paths(self, canvas: Canvas, positions: FloatArray) -> None:
         self._open_paths = [[pixel] for pixel in _to_limited_pixels(canvas, positions).tolist()]
 
-    def _draw_fading_trails(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
+    def _draw_fading_trails(self, canvas: Canvas, scene: Scene, trail: FloatArray, pen: Pen) -> bool:
         """Draw the whole trail on the page if trails fade, and return whether they do."""
         if not scene.trail_fade or scene.trail_time is None:
             return False
@@ -138,7 +138,7 @@ class TrajectoriesLayer:
         self._start_paths(canvas, trail[-1])
         return True
 
-    def _extend_paths(self, rows: Array) -> None:
+    def _extend_paths(self, rows: FloatArray) -> None:
         """Extend the open paths by new positions, (k, n, 2) px; end those of robots that fail."""
         last = np.array([path[-1] for path in self._open_paths])
         has_absent = bool(np.isnan(last).any() or np.isnan(rows).any())
@@ -255,7 +255,7 @@ def _build_key(canvas: Canvas, scene: Scene, pen: Pen, n_robots: int) -> tuple[o
     )
 
 
-def _to_limited_pixels(canvas: Canvas, positions: Array) -> Array:
+def _to_limited_pixels(canvas: Canvas, positions: FloatArray) -> FloatArray:
     """Convert positions, (..., 2) m, to pixels that pygame can draw."""
     return limit_pixels(canvas.camera.to_pixels(positions))
 
@@ -276,7 +276,7 @@ def _sum_areas(boxes: Iterable[pygame.Rect | None]) -> int:
     return sum(box.width * box.height for box in boxes if box is not None)
 
 
-def _are_same_rows(rows: Array, row: Array) -> Array:
+def _are_same_rows(rows: FloatArray, row: FloatArray) -> FloatArray:
     """Return a mask of the rows, (k, n, 2), that equal a given row, (n, 2); nan equals nan."""
     is_same = (rows == row) | (np.isnan(rows) & np.isnan(row))
     return np.asarray(is_same.all(axis=(1, 2)))

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.replication.design.plan import format_start
 from robocov_app.replication.design.study_maps import get_map_kind
 from robocov_app.replication.formatting import format_amount, format_median
 from robocov_app.replication.results.outcomes import PairedComparison
 
 
-def describe_middle_half(gaps: Array) -> str:
+def describe_middle_half(gaps: FloatArray) -> str:
     """Return a sentence with the first and third quartile of gaps, (m,)."""
     low, high = np.quantile(gaps, [0.25, 0.75]).tolist()
     return f"Half of the runs lie between {format_amount(low, '%')} and {format_amount(high, '%')}."
@@ -43,7 +43,7 @@ def _list_ratios(pairs: PairedComparison, kinds: Sequence[str]) -> str:
     return ", ".join(f"{kind} {format_median(ratios)}" for kind, ratios in medians)
 
 
-def compute_positive_fraction(counts: Array) -> float:
+def compute_positive_fraction(counts: FloatArray) -> float:
     """Return the fraction of positive values among the finite counts, (m,); nan without finite counts."""
     finite = counts[np.isfinite(counts)]
     return float((finite > 0).mean()) if len(finite) else float("nan")

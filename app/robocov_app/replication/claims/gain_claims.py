@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.figures.statistics import (
     RESAMPLES,
     bootstrap,
@@ -104,7 +104,7 @@ def judge_gains_every(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     return claim.judge((criterion,), explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
 
 
-def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> Array:
+def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> FloatArray:
     """Return the ratio of RAPF's cost to RPF's with the same potential, (g, m), for each set of RAPF."""
     rows = {(gains["k_rep"], gains["rho_0"]): row for row, gains in enumerate(rpf.gains)}
     matching_rows = [rows[gains["k_rep"], gains["rho_0"]] for gains in rapf.gains]
@@ -112,7 +112,7 @@ def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> Array:
 
 
 def build_variation_criteria(
-    measure: str, rapf: Array, rpf: Array, maps: tuple[str, ...] | list[str], bound: float
+    measure: str, rapf: FloatArray, rpf: FloatArray, maps: tuple[str, ...] | list[str], bound: float
 ) -> tuple[Criterion, Criterion]:
     """Build the criteria that a variation is below a bound for RAPF and above it for RPF.
 
@@ -165,17 +165,17 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     return claim.judge(criteria, explanation, rapf, runs_per_instance=len(rapf.gains) + len(rpf.gains))
 
 
-def compute_variation(grid: GainOutcomes) -> Array:
+def compute_variation(grid: GainOutcomes) -> FloatArray:
     """Return the coefficient of variation of the cost over the sets of gains, for each instance, (m,)."""
     return np.array([compute_coefficient_of_variation(column) for column in grid.excess.T])
 
 
-def compute_worst_by_best(grid: GainOutcomes) -> Array:
+def compute_worst_by_best(grid: GainOutcomes) -> FloatArray:
     """Return the ratio of the cost with the worst gains to that with the best, for each instance, (m,)."""
     return np.asarray(grid.excess.max(axis=0) / grid.excess.min(axis=0))
 
 
-def compute_regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
+def compute_regrets(grid: GainOutcomes) -> tuple[FloatArray, list[str]]:
     """Compute the cost of choosing gains without knowing the map.
 
     For every problem instance, two sets of gains are compared: the best set on *other starts of the same

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import IntArray
+from robocov.typing import IntArray
 from robocov_app.figures.statistics import (
     Interval,
     bootstrap,

@@ -4,8 +4,8 @@ from typing import Literal
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import bootstrap, estimate_fraction
 from robocov_app.replication.claims.claim import LIMITED, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import (
@@ -200,7 +200,7 @@ def judge_gap(
     return claim.judge((criterion,), _explain_gaps(finished, gaps), finished, runs_per_instance=1)
 
 
-def _explain_gaps(outcomes: Outcomes, gaps: Array) -> str:
+def _explain_gaps(outcomes: Outcomes, gaps: FloatArray) -> str:
     """Return sentences on the distribution of gaps, (m,), one for each instance."""
     better_than_reference = ""
     if (gaps < 0).any():

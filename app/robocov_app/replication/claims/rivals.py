@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import IntArray
 from robocov.controllers import get_information, load_controller_class
+from robocov.typing import IntArray
 from robocov_app.figures.statistics import bootstrap_statistic
 from robocov_app.replication.claims.claim import RIVALS, Claim, Criterion, judge_pairs
 from robocov_app.replication.claims.explanations import describe_losses

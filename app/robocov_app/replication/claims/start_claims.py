@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import bootstrap, compute_coefficient_of_variation, group_by
 from robocov_app.replication.claims.claim import Claim, Criterion
 from robocov_app.replication.claims.gain_claims import build_variation_criteria
@@ -79,7 +79,7 @@ def judge_starts_placement(outcomes: Outcomes, gains: GainChoice = "shared") -> 
     return claim.judge(criteria, explanation, finished, runs_per_instance=2)
 
 
-def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[Array, list[str]]:
+def _compute_start_variation(outcomes: Outcomes, key: str) -> tuple[FloatArray, list[str]]:
     """Return the coefficients of variation of a contender's final cost over the starts, and their maps.
 
     There is one coefficient for each map and seed with several starts, (k,).

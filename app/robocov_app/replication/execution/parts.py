@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 import robocov
-from robocov.arrays import Array
 from robocov.controllers import CONTROLLERS
 from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov.record import Record
+from robocov.typing import FloatArray
 from robocov_app.replication.design import studies
 from robocov_app.replication.design.contenders import (
     OURS,
@@ -331,7 +331,7 @@ def _read_density_results(folder: Path, plan: Plan, known: Outcomes, ignored: Ou
         study_map.name: CoverageCost(study_map.environment, plan.lattice)
         for study_map in build_density_maps(plan)
     }
-    values: dict[tuple[str, str], Array] = {}
+    values: dict[tuple[str, str], FloatArray] = {}
     for key, outcomes in (("known", known), ("ignored", ignored)):
         finals = []
         for name, positions in zip(outcomes.maps, _get_placements(outcomes), strict=True):
@@ -351,7 +351,7 @@ def _read_density_results(folder: Path, plan: Plan, known: Outcomes, ignored: Ou
     )
 
 
-def _get_placements(outcomes: Outcomes) -> Array:
+def _get_placements(outcomes: Outcomes) -> FloatArray:
     """Return the final positions of the only contender, (m, n, 2) m."""
     (placements,) = [array for (_, measure), array in outcomes.values.items() if measure == "placement"]
     return placements

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.figures.gains import GainGrid, draw_gain_grid
@@ -150,7 +150,7 @@ def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     return figure
 
 
-def _compute_signed_power(values: Array, exponent: float) -> Array:
+def _compute_signed_power(values: FloatArray, exponent: float) -> FloatArray:
     """Raise the absolute values to a power, but keep the signs."""
     return np.asarray(np.sign(values) * np.abs(values) ** exponent)
 
@@ -191,7 +191,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     return page.figure
 
 
-def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> Array:
+def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> FloatArray:
     """Return the mean gap for each rho_0 (row) and k_rep (column), %; nan for pairs that were not tried."""
     gaps = np.full((len(rho_0), len(k_rep)), np.nan)
     for gains, excess in zip(grid.gains, grid.excess, strict=True):

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Polygon, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from robocov.arrays import Array
 from robocov.locational_cost import Distance, Sensing, compute_locational_costs
 from robocov.locational_cost.best_points import find_best_points
 from robocov.observation.region import Region
+from robocov.typing import FloatArray
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, FigurePage, PageBox, style_axes, to_plot_color
@@ -92,12 +92,12 @@ def _find_optimum(cell: VoronoiPartition, height: float) -> SensorOptimum:
     return _build_optimum(cell, height, position, float(1.0 - at_centroid / best))
 
 
-def _compute_cost(cell: VoronoiPartition, position: Array, height: float) -> float:
+def _compute_cost(cell: VoronoiPartition, position: FloatArray, height: float) -> float:
     offsets = position[None] - cell.generators
     return float(compute_locational_costs(cell.edges, offsets, Sensing(height))[0])
 
 
-def _build_optimum(cell: VoronoiPartition, height: float, position: Array, loss: float) -> SensorOptimum:
+def _build_optimum(cell: VoronoiPartition, height: float, position: FloatArray, loss: float) -> SensorOptimum:
     x, y = position.tolist()
     return SensorOptimum(height, x, y, float(np.hypot(*(position - cell.centroids[0]))), loss)
 
@@ -180,7 +180,7 @@ class _Frame(NamedTuple):
     height: float
 
 
-def _find_frame(points: Array, aspect: float) -> _Frame:
+def _find_frame(points: FloatArray, aspect: float) -> _Frame:
     """Return the frame that is enlarged, with the given aspect ratio.
 
     The frame contains all points, (k, 2) m, and leaves space for labels, most of it on the right.
@@ -218,7 +218,11 @@ def _draw_cell(axes: Axes, cell: VoronoiPartition, frame: _Frame, theme: Theme) 
 
 
 def _draw_path(
-    axes: Axes, path: Sequence[SensorOptimum], labeled: Sequence[SensorOptimum], median: Array, theme: Theme
+    axes: Axes,
+    path: Sequence[SensorOptimum],
+    labeled: Sequence[SensorOptimum],
+    median: FloatArray,
+    theme: Theme,
 ) -> None:
     """Draw the path of the optimum with labeled heights, and the geometric median."""
     line = to_plot_color(theme.final)

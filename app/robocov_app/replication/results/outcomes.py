@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_fraction
 from robocov_app.replication.design.plan import format_start
 
@@ -51,10 +51,10 @@ class Outcomes:
     """
 
     instances: tuple[ProblemInstance, ...]
-    values: Mapping[tuple[str, str], Array]
+    values: Mapping[tuple[str, str], FloatArray]
     share_sides: Mapping[str, float] = field(default_factory=dict)
 
-    def get_values(self, contender: str, measure: str) -> Array:
+    def get_values(self, contender: str, measure: str) -> FloatArray:
         """Return the values of a measure for a contender, (m,); all nan if it did not take part."""
         values = self.values.get((contender, measure))
         return np.full(len(self.instances), np.nan) if values is None else values
@@ -135,11 +135,11 @@ class PairedComparison:
 
     outcomes: Outcomes
     first: str
-    first_values: Array
-    second_values: Array
+    first_values: FloatArray
+    second_values: FloatArray
 
     @cached_property
-    def ratios(self) -> Array:
+    def ratios(self) -> FloatArray:
         """Ratios of the first values to the second ones, (m,)."""
         return self.first_values / self.second_values
 
@@ -171,7 +171,7 @@ def merge_outcomes(parts: Sequence[Outcomes]) -> Outcomes:
     """
     instances = tuple(dict.fromkeys(instance for part in parts for instance in part.instances))
     index = {instance: k for k, instance in enumerate(instances)}
-    values: dict[tuple[str, str], Array] = {}
+    values: dict[tuple[str, str], FloatArray] = {}
     share_sides: dict[str, float] = {}
     for part in parts:
         rows = [index[instance] for instance in part.instances]
@@ -199,7 +199,7 @@ class GainOutcomes:
 
     instances: tuple[ProblemInstance, ...]
     gains: tuple[Mapping[str, Value], ...]
-    excess: Array
+    excess: FloatArray
 
     @property
     def maps(self) -> tuple[str, ...]:
@@ -270,7 +270,7 @@ def compute_mean_until(history: CostHistory, until: float) -> float:
     return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
-def compute_matched_distance(first: Array, second: Array) -> float:
+def compute_matched_distance(first: FloatArray, second: FloatArray) -> float:
     """Compute the mean distance between two placements of interchangeable robots.
 
     Parameters

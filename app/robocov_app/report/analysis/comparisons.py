@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import (
     MIN_BOOTSTRAP_MAPS,
     Interval,
@@ -40,8 +40,8 @@ class MapPairs(NamedTuple):
     """
 
     map_name: str
-    first_distances: Array
-    second_distances: Array
+    first_distances: FloatArray
+    second_distances: FloatArray
     ratio: Interval
 
     @property
@@ -180,7 +180,7 @@ def _index_by_case(group: RunGroup) -> dict[tuple[object, ...], ReportedRun]:
     return {run.case: run for run in group.runs if 0.0 < run.final_distance < np.inf}
 
 
-def _estimate_ratio(runs: Sequence[ReportedRun], ratios: Array) -> Interval:
+def _estimate_ratio(runs: Sequence[ReportedRun], ratios: FloatArray) -> Interval:
     """Estimate the geometric mean of the ratios of runs on one map.
 
     Runs of different teams with the same start and seed are averaged first, because they are not independent.

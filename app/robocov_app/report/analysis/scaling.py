@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.figures.statistics import group_by
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 
@@ -46,7 +46,7 @@ def scale_distance(run: ReportedRun, scales: Scales) -> float:
     return run.final_distance / scale
 
 
-def scale_distances(runs: Iterable[ReportedRun], scales: Scales) -> Array:
+def scale_distances(runs: Iterable[ReportedRun], scales: Scales) -> FloatArray:
     """Return the finite scaled distances of runs, (m,); see `scale_distance`."""
     distances = np.array([scale_distance(run, scales) for run in runs])
     return np.asarray(distances[np.isfinite(distances)])

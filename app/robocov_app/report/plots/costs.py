@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from robocov.arrays import Array
 from robocov.errors import format_count
+from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.curves import DISTANCE
 from robocov_app.figures.final_costs import Sample, plot_final_costs
@@ -57,7 +57,7 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
     return plots
 
 
-def _sample_histories(result: ReportedResult) -> tuple[Array, dict[ReportedRun, Array]]:
+def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[ReportedRun, FloatArray]]:
     """Sample the mean distances of all runs at the same times.
 
     Returned are the times since the start, (T,) s, and the mean distances of each run, (T,) m, which are nan

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
+from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.curves import TIME
 from robocov_app.figures.runs import to_free_area_percent
@@ -40,7 +40,7 @@ class _Metric(NamedTuple):
     title: str
     label: str
     unit: str
-    get_values: Callable[[RunMetrics], Array]
+    get_values: Callable[[RunMetrics], FloatArray]
 
 
 class _MetricCurves(NamedTuple):
@@ -57,10 +57,10 @@ class _MetricCurves(NamedTuple):
     title: str
     label: str
     unit: str
-    curves: list[tuple[Array, Array]]
+    curves: list[tuple[FloatArray, FloatArray]]
 
 
-def _round_to_millimeters(gaps: Array) -> Array:
+def _round_to_millimeters(gaps: FloatArray) -> FloatArray:
     """Round gaps to 1 mm, without negative zeros, because the solver tolerates smaller overlaps."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 

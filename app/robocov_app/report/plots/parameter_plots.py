@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.gains import Value, format_value
+from robocov.typing import FloatArray, IntArray
 from robocov_app.figures.gains import MAX_LEVELS, GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.report.analysis.groups import RunGroup, find_varying_gains, group_by_controller
@@ -252,7 +252,9 @@ def _build_grid_plot(
     return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance}, {span}."))
 
 
-def _compute_cell_medians(distances: Array, row_indices: IntArray, column_indices: IntArray) -> Array:
+def _compute_cell_medians(
+    distances: FloatArray, row_indices: IntArray, column_indices: IntArray
+) -> FloatArray:
     """Return the median of the distances in each cell of a grid; nan for cells without runs.
 
     Parameters
@@ -273,7 +275,9 @@ def _compute_cell_medians(distances: Array, row_indices: IntArray, column_indice
     return medians
 
 
-def _describe_grid(medians: Array, first: _Parameter, second: _Parameter, columns: Array, rows: Array) -> str:
+def _describe_grid(
+    medians: FloatArray, first: _Parameter, second: _Parameter, columns: FloatArray, rows: FloatArray
+) -> str:
     """Describe the lowest median and its gains, and the highest median."""
     row, column = np.unravel_index(int(np.nanargmin(medians)), medians.shape)
     first_text = f"{first.title} {first.format_coordinate(columns[column])}"

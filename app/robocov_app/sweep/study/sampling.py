@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, describe_unknown_name, require_number
+from robocov.typing import FloatArray
 
 Scale: TypeAlias = Literal["linear", "log"]
 SamplingMethod: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
@@ -37,7 +37,7 @@ class Range:
     high: float
     scale: Scale = "linear"
 
-    def interpolate(self, fractions: Array) -> list[float]:
+    def interpolate(self, fractions: FloatArray) -> list[float]:
         """Return the values at fractions of the range.
 
         Parameters
@@ -94,7 +94,7 @@ class Sampling:
         require_number("sampling.samples", self.samples, 1, MAX_SAMPLES, whole=True)
         require_number("sampling.seed", self.seed, 0, MAX_SEED, whole=True)
 
-    def draw_points(self, dimensions: int) -> Array:
+    def draw_points(self, dimensions: int) -> FloatArray:
         """Draw points in the unit cube.
 
         Parameters

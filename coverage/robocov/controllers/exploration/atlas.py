@@ -13,7 +13,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.base import TIME_TOLERANCE_S, BaseController
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.atlas_memory import (
@@ -53,6 +52,7 @@ from robocov.planning.team_placement import MinSavings, compute_node_weights
 from robocov.planning.viewpoint import find_viewpoint
 from robocov.planning.window import Window
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _OWN_NODES = 2500
 """Number of nodes of the lattice on which a robot finds its own goal."""
@@ -329,7 +329,7 @@ class Atlas(BaseController):
 
     def _plan(
         self, seen: Observations, memory: AtlasMemory, robot: int, reports: Sequence[TeammateReport]
-    ) -> tuple[PlannerState, Array | None]:
+    ) -> tuple[PlannerState, FloatArray | None]:
         """Make a plan for a robot. Return its state, and its goal; None if it keeps its present route."""
         team = memory.team
         previous = memory.states[robot]
@@ -432,7 +432,7 @@ class Atlas(BaseController):
         seen: Observations,
         cooperation: Cooperation,
         robot: int,
-    ) -> tuple[PlannerState, Array]:
+    ) -> tuple[PlannerState, FloatArray]:
         """Return the state of a robot after the plan for its team, and the point to which it moves next."""
         position = seen.positions[robot]
         viewpoint = None if previous.motion is None else previous.motion.viewpoint
@@ -480,7 +480,7 @@ class Atlas(BaseController):
         )
 
     def _choose_motion(
-        self, state: PlannerState, path: TraveledPath, own: OwnGoal, position: Array, *, is_agreed: bool
+        self, state: PlannerState, path: TraveledPath, own: OwnGoal, position: FloatArray, *, is_agreed: bool
     ) -> OwnMotion:
         """Return a robot's motion: straight to its own goal, or first to a viewpoint.
 
@@ -513,7 +513,7 @@ class Atlas(BaseController):
 
 
 def _may_skip_plan(
-    previous: PlannerState, robots: IntArray, positions: Array, is_quiet: bool, *, max_move: float
+    previous: PlannerState, robots: IntArray, positions: FloatArray, is_quiet: bool, *, max_move: float
 ) -> bool:
     """Return whether a robot may skip its plan: it is idle, and nothing has changed since its last plan."""
     basis = previous.basis
@@ -529,7 +529,7 @@ def _may_skip_plan(
 
 
 def _extend_path(
-    previous: PlannerState, state: PlannerState, position: Array, time: float, radius: float
+    previous: PlannerState, state: PlannerState, position: FloatArray, time: float, radius: float
 ) -> TraveledPath:
     """Return the path with the move since the last plan. After a change, a new path starts."""
     if previous.basis is None or _has_changed(previous, state, radius):
@@ -547,7 +547,7 @@ def _has_changed(previous: PlannerState, state: PlannerState, radius: float) -> 
     return changed_walls * state.known_map.raster.cell_size > _CHANGED_WALL_RADII * radius
 
 
-def _extend_viewpoint_path(state: PlannerState, position: Array, added_length: float) -> TraveledPath:
+def _extend_viewpoint_path(state: PlannerState, position: FloatArray, added_length: float) -> TraveledPath:
     """Return the path with the last move, in m, as part of the path to a viewpoint, if it led to one."""
     viewpoint = None if state.motion is None else state.motion.viewpoint
     if viewpoint is None:

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.exploration.localization import Estimates
 from robocov.controllers.exploration.scan_exchange import ScanExchange
 from robocov.controllers.exploration.teammates import TeammateReport, Teammates
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class TraveledPath:
     """Length of the whole path, m."""
     viewpoint_length: float = 0.0
     """Length of the parts of the path that led to viewpoints, m."""
-    viewpoints: tuple[Array, ...] = ()
+    viewpoints: tuple[FloatArray, ...] = ()
     """Viewpoints that the robot has reached, (2,) m each."""
 
 
@@ -53,7 +53,7 @@ class PlanBasis:
     """Planner of the robot's own goal and its routes."""
     robots: IntArray
     """(k,) Indices of the robots that it knew of, its own first."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, positions of these robots."""
     is_quiet: bool
     """Whether all others were at rest or out of contact."""
@@ -67,7 +67,7 @@ class TeamGoals:
     """Planner on which the goals were found."""
     robots: IntArray
     """(p,) Indices of the robots with goals in the plan, its own first."""
-    goals: Array
+    goals: FloatArray
     """(p, 2) m, goals of these robots."""
 
 
@@ -75,9 +75,9 @@ class TeamGoals:
 class OwnMotion:
     """Motion of a robot according to its last plan."""
 
-    goal: Array
+    goal: FloatArray
     """(2,) m, its own goal."""
-    viewpoint: Array | None = None
+    viewpoint: FloatArray | None = None
     """(2,) m, the point to which it moves first, to look around. None: it moves straight to its goal."""
     is_idle: bool = False
     """Whether the next plan may be skipped as long as nothing changes."""
@@ -124,7 +124,7 @@ class AtlasMemory:
     """The robots. Each robot knows only its own body and limits."""
     states: tuple[PlannerState, ...]
     """State of each robot."""
-    routes: tuple[Array, ...]
+    routes: tuple[FloatArray, ...]
     """Waypoints of each robot, (w, 2) m. The last one is its goal."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
@@ -132,7 +132,7 @@ class AtlasMemory:
     """The scans that robots with shared maps exchange; None if they share nothing."""
     reports: tuple[Mapping[int, TeammateReport], ...]
     """For each robot, the newest report from each sender that has arrived since the robot's last plan."""
-    returns: Array | None = None
+    returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     estimates: Estimates | None = None
     """Position estimates, if robots know the positions of others only from messages."""

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import BaseController, Information, is_plan_due
 from robocov.controllers.density_exchange import (
     MeasurementExchange,
@@ -23,6 +22,7 @@ from robocov.controllers.square_grid import SquareGrid
 from robocov.observation import Decision, Message, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 NO_SQUARE = -1
@@ -191,7 +191,7 @@ class ExploringLloyd(BaseController):
             plan_time=seen.time,
         )
 
-    def _estimate_masses(self, measurements: Array) -> Array:
+    def _estimate_masses(self, measurements: FloatArray) -> FloatArray:
         """Estimate the mass of each square, (s,), from the measurements of a robot, (s,)."""
         is_known = ~np.isnan(measurements)
         mean = 0.0
@@ -203,7 +203,7 @@ class ExploringLloyd(BaseController):
         return np.maximum(masses, _MIN_RELATIVE_MASS * unknown_mass)
 
 
-def _measure(seen: Observations, memory: ExploringMemory) -> Array:
+def _measure(seen: Observations, memory: ExploringMemory) -> FloatArray:
     """Return the measurements, (n, s), including those that the robots make in this step.
 
     A robot measures φ only at the centers of the squares within its sensing range.
@@ -218,7 +218,7 @@ def _measure(seen: Observations, memory: ExploringMemory) -> Array:
 
 
 def _choose_viewpoint(
-    grid: SquareGrid, is_unknown: BoolArray, *, position: Array, previous: int, sensing_range: float
+    grid: SquareGrid, is_unknown: BoolArray, *, position: FloatArray, previous: int, sensing_range: float
 ) -> int:
     """Choose the square to which a robot moves next, to measure there.
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.exploration.shared_map import (
     Candidates,
     Placement,
@@ -18,6 +17,7 @@ from robocov.controllers.exploration.shared_map import (
 from robocov.controllers.gains import gain
 from robocov.k_median import choose_greedily, improve_sources
 from robocov.planning.discovered_map import FREE, UNKNOWN
+from robocov.typing import FloatArray, IntArray
 
 _INSPECTED_RADIUS_M = 0.5
 """Targets closer than this to an inspected target are not worth a visit."""
@@ -80,7 +80,7 @@ class FrontierMedian(SharedMapController):
             return Placement(goals=goals, is_final=False, inspected_targets=inspected)
         return Placement(goals=self._compute_median(situation), is_final=True, inspected_targets=inspected)
 
-    def _list_inspected_targets(self, situation: Situation) -> Array:
+    def _list_inspected_targets(self, situation: Situation) -> FloatArray:
         """Return the targets that need no further visit, (m, 2) m."""
         previous_plan = situation.previous_plan
         if previous_plan is None:
@@ -96,7 +96,7 @@ class FrontierMedian(SharedMapController):
         is_stuck = np.isfinite(goals[:, 0]) & (progress < _MIN_PROGRESS_M)
         return np.unique(np.vstack([inspected, goals[has_arrived | is_stuck]]), axis=0)
 
-    def _find_targets(self, situation: Situation, inspected: Array) -> Array:
+    def _find_targets(self, situation: Situation, inspected: FloatArray) -> FloatArray:
         """Return positions on the frontiers, (t, 2) m."""
         raster = situation.known_map.raster
         map_window = situation.planner.map_window
@@ -125,7 +125,7 @@ class FrontierMedian(SharedMapController):
         is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
         return np.asarray(np.where(is_long[labels], labels, 0))
 
-    def _compute_path_lengths(self, situation: Situation, targets: Array) -> Array:
+    def _compute_path_lengths(self, situation: Situation, targets: FloatArray) -> FloatArray:
         """Return the path length from each robot to each target, (k, t) m; infinite without a path."""
         planner = situation.planner
         map_window = planner.map_window
@@ -138,7 +138,9 @@ class FrontierMedian(SharedMapController):
             [planner.compute_distances_from(position[None])[target_nodes] for position in situation.positions]
         )
 
-    def _assign_targets(self, situation: Situation, targets: Array, path_lengths: Array) -> Array:
+    def _assign_targets(
+        self, situation: Situation, targets: FloatArray, path_lengths: FloatArray
+    ) -> FloatArray:
         """Return the target of each robot, (k, 2) m, or its position if it has no target.
 
         The pair of a robot and a target with the largest U - β V is assigned first; see `FrontierMedian`.
@@ -164,7 +166,7 @@ class FrontierMedian(SharedMapController):
             utilities -= np.where(is_in_view, 1.0 - distances / situation.sensing_range, 0.0)
         return goals
 
-    def _compute_median(self, situation: Situation) -> Array:
+    def _compute_median(self, situation: Situation) -> FloatArray:
         """Return the final goals of all robots, (k, 2) m."""
         weights = situation.compute_weights(situation.known_map.state == FREE)
         candidates = Candidates.build_for_team(situation, weights)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers.exploration.atlas_memory import JamState
 from robocov.controllers.exploration.staggering import compute_stagger_fraction
+from robocov.typing import FloatArray
 
 _MAX_STUCK_PLANS = 3
 """Number of consecutive plans after which a stuck robot is in a jam."""
@@ -19,8 +19,8 @@ _MAX_EVASION_S = 8.0
 
 
 def plan_evasion(
-    jam: JamState, positions: Array, *, is_stuck: bool, time: float, robot: int
-) -> tuple[JamState, Array | None]:
+    jam: JamState, positions: FloatArray, *, is_stuck: bool, time: float, robot: int
+) -> tuple[JamState, FloatArray | None]:
     """Decide whether a robot moves out of a jam and, if so, where to.
 
     Parameters

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.observation import Observations
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _AVERAGING_S = 2.0
 """Time constant with which position fixes are averaged."""
@@ -44,13 +44,13 @@ _MAX_UNCERTAINTY_FRACTION = 0.75
 class Tracks(NamedTuple):
     """Filter states of the other robots, from their messages. Entry (i, j) is robot i's track of robot j."""
 
-    sent_times: Array
+    sent_times: FloatArray
     """(n, n) s, time at which the newest message was sent; nan for none."""
     counts: IntArray
     """(n, n) Number of messages; 0 if there is no track."""
-    positions: Array
+    positions: FloatArray
     """(n, n, 2) m, filtered position when the newest message was sent."""
-    velocities: Array
+    velocities: FloatArray
     """(n, n, 2) m/s, filtered velocity at that time."""
 
 
@@ -61,9 +61,9 @@ class _Messages(NamedTuple):
     """(m,) Index of the robot that has each message."""
     senders: IntArray
     """(m,) Index of the robot that sent it."""
-    positions: Array
+    positions: FloatArray
     """(m, 2) m, reported position of the sender."""
-    sent_times: Array
+    sent_times: FloatArray
     """(m,) s, time at which each message was sent."""
 
 
@@ -72,13 +72,13 @@ class Estimates(NamedTuple):
 
     time: float
     """Time of the last position fixes, s."""
-    positions: Array
+    positions: FloatArray
     """(n, 2) m, each robot's estimate of its own position."""
-    velocities: Array
+    velocities: FloatArray
     """(n, 2) m/s, velocities of the robots."""
-    fix_counts: Array
+    fix_counts: FloatArray
     """(n,) Number of position fixes since the start, or since the robot was displaced."""
-    variances: Array
+    variances: FloatArray
     """(n,) m², estimated variance of one fix, in x or in y."""
     tracks: Tracks
 
@@ -163,7 +163,9 @@ def estimate_positions(seen: Observations, previous: Estimates, team: Team) -> t
     return estimated, estimates
 
 
-def _filter_own_positions(seen: Observations, previous: Estimates, team: Team) -> tuple[Array, Array, Array]:
+def _filter_own_positions(
+    seen: Observations, previous: Estimates, team: Team
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the positions, the numbers of fixes, and their variances, after one more fix of each robot."""
     dt = seen.time - previous.time
     predicted = previous.positions + 0.5 * dt * (previous.velocities + seen.velocities)
@@ -217,7 +219,11 @@ def assume_closer_neighbors(seen: Observations, estimates: Estimates) -> Observa
 
 @kernel
 def _update_tracks(
-    previous: Tracks, messages: _Messages, sigmas: Array, accelerations: Array, max_speeds: Array
+    previous: Tracks,
+    messages: _Messages,
+    sigmas: FloatArray,
+    accelerations: FloatArray,
+    max_speeds: FloatArray,
 ) -> Tracks:
     """Return the tracks after the newest messages. Messages that the tracks already contain are ignored.
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.driving import (
     Margins,
     avoid_collisions,
@@ -18,6 +17,7 @@ from robocov.controllers.driving import (
 )
 from robocov.observation import Observations
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _WAYPOINT_RADIUS_M = 0.2
 """Distance from a waypoint at which it counts as reached."""
@@ -44,12 +44,12 @@ _MIN_DISTANCE_M = 1e-9
 class RouteProgress(NamedTuple):
     """The routes of the robots, and the waypoint that each robot heads for."""
 
-    routes: Sequence[Array]
+    routes: Sequence[FloatArray]
     """Waypoints of each robot, (w, 2) m. The last one is its goal."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
 
-    def get_waypoints(self) -> Array:
+    def get_waypoints(self) -> FloatArray:
         """Return the waypoint that each robot heads for, (n, 2) m."""
         pairs = zip(self.routes, self.waypoint_indices, strict=True)
         return np.array([route[index] for route, index in pairs])
@@ -67,16 +67,16 @@ class RouteGains(NamedTuple):
 class RouteCommand(NamedTuple):
     """Forces that lead robots along their routes in one step."""
 
-    forces: Array
+    forces: FloatArray
     """(n, 2) N"""
-    goals: Array
+    goals: FloatArray
     """(n, 2) m, ends of the routes."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for now."""
 
 
 def follow_routes(
-    seen: Observations, team: Team, progress: RouteProgress, returns: Array | None, gains: RouteGains
+    seen: Observations, team: Team, progress: RouteProgress, returns: FloatArray | None, gains: RouteGains
 ) -> RouteCommand:
     """Compute the forces that lead robots along their routes, away from walls and other robots.
 
@@ -122,7 +122,7 @@ def _get_last_indices(progress: RouteProgress) -> IntArray:
     return np.array([len(route) - 1 for route in progress.routes])
 
 
-def _advance_waypoints(progress: RouteProgress, positions: Array) -> RouteProgress:
+def _advance_waypoints(progress: RouteProgress, positions: FloatArray) -> RouteProgress:
     """Return the progress after robots that have reached a waypoint head for the next one."""
     is_reached = np.hypot(*(progress.get_waypoints() - positions).T) < _WAYPOINT_RADIUS_M
     has_next = progress.waypoint_indices < _get_last_indices(progress)
@@ -131,7 +131,7 @@ def _advance_waypoints(progress: RouteProgress, positions: Array) -> RouteProgre
 
 def _compute_desired_velocities(
     seen: Observations, team: Team, progress: RouteProgress, k_prop: float
-) -> Array:
+) -> FloatArray:
     """Return the velocities toward the waypoints, (n, 2) m/s; robots slow down only before their goals."""
     offsets = progress.get_waypoints() - seen.positions
     speed_limit = _compute_speed_limits(seen, team)
@@ -141,7 +141,7 @@ def _compute_desired_velocities(
     return np.where(is_last_waypoint[:, None], to_goal, to_waypoint)
 
 
-def _compute_speed_limits(seen: Observations, team: Team) -> Array:
+def _compute_speed_limits(seen: Observations, team: Team) -> FloatArray:
     """Return the speed, (n,) m/s, at which each robot can still stop before the nearest obstacle.
 
     Robots are slow in narrow passages, because obstacles behind a corner come into view late.
@@ -152,7 +152,9 @@ def _compute_speed_limits(seen: Observations, team: Team) -> Array:
     return np.asarray(np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _MIN_SPEED_LIMIT))
 
 
-def _compute_evasion(seen: Observations, team: Team, velocities: Array, separation: Array) -> Array:
+def _compute_evasion(
+    seen: Observations, team: Team, velocities: FloatArray, separation: FloatArray
+) -> FloatArray:
     """Return the sideways velocities, (n, 2) m/s, with which robots pass each other on the left.
 
     They are zero for robots that approach no other robot too fast.

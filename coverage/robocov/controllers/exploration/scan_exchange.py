@@ -23,11 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import BoolArray
 from robocov.controllers.base import TIME_TOLERANCE_S
 from robocov.observation import Message, Observations, Scans
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.scan_log import Inventory, NumberedScan, ScanLog, number_scans
+from robocov.typing import BoolArray
 
 MAX_REPAIRS = 16
 """Maximum number of scans that a robot sends again for each scan that it takes."""

@@ -10,7 +10,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import scipy
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, Information
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
@@ -27,6 +26,7 @@ from robocov.planning.raster import Raster
 from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.window import Window
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 MIN_CELL_SIZE_M = 0.05
 """Side of the cells of maps; cells are larger in very large regions."""
@@ -46,20 +46,20 @@ class Group(NamedTuple):
 
     robots: IntArray
     """(k,) Indices of the robots, ascending."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
-    heard_times: Array
+    heard_times: FloatArray
     """(k,) s, times at which they were last heard."""
 
 
 class Placement(NamedTuple):
     """Goals of a group of robots."""
 
-    goals: Array
+    goals: FloatArray
     """(k, 2) m, in the order of the robots of the group."""
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
-    inspected_targets: Array = np.empty((0, 2))
+    inspected_targets: FloatArray = np.empty((0, 2))
     """(m, 2) m, targets that need no further visit, for a controller that looks at unknown space."""
 
 
@@ -82,9 +82,9 @@ class Plan:
 class Situation(NamedTuple):
     """Situation of a robot that plans for k robots: itself and those that it has heard."""
 
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, known or assumed positions of the robots."""
-    previous_goals: Array
+    previous_goals: FloatArray
     """(k, 2) m, goals of the robots in the last plan; nan for robots without one."""
     previous_plan: Plan | None
     known_map: DiscoveredMap
@@ -93,7 +93,7 @@ class Situation(NamedTuple):
     sensing_range: float
     """Sensing range of the robot that plans, m."""
 
-    def compute_weights(self, is_counted: BoolArray) -> Array:
+    def compute_weights(self, is_counted: BoolArray) -> FloatArray:
         """Compute the weights of the nodes of the planner.
 
         Parameters
@@ -118,13 +118,13 @@ class Situation(NamedTuple):
 class Candidates(NamedTuple):
     """Candidate positions for the goals of a plan, with a table of distances for `robocov.k_median`."""
 
-    positions: Array
+    positions: FloatArray
     """(c, 2) m"""
-    table: Array
+    table: FloatArray
     """(m, c) Weighted distances from the m nodes that count in the cost to the candidates."""
 
     @classmethod
-    def build_at_nodes(cls, situation: Situation, weights: Array, nodes: IntArray) -> Candidates:
+    def build_at_nodes(cls, situation: Situation, weights: FloatArray, nodes: IntArray) -> Candidates:
         """Build a candidate at each of the given nodes whose weight is positive.
 
         Parameters
@@ -146,7 +146,7 @@ class Candidates(NamedTuple):
         return cls(positions=situation.planner.map_window.nodes[nodes], table=np.ascontiguousarray(table))
 
     @classmethod
-    def build_for_team(cls, situation: Situation, weights: Array) -> Candidates:
+    def build_for_team(cls, situation: Situation, weights: FloatArray) -> Candidates:
         """Build candidates at nodes that are spread over the nodes with clearance.
 
         Parameters
@@ -167,7 +167,7 @@ class Candidates(NamedTuple):
         """Compute the coverage cost with a robot at each of the chosen candidates, (k,)."""
         return float(self.table[:, chosen].min(axis=1).sum())
 
-    def find_nearest(self, positions: Array) -> IntArray:
+    def find_nearest(self, positions: FloatArray) -> IntArray:
         """Assign a different candidate to each position so that the sum of squared distances is minimal.
 
         Parameters
@@ -183,7 +183,7 @@ class Candidates(NamedTuple):
         _, candidates = scipy.optimize.linear_sum_assignment(squared_distances)
         return np.asarray(candidates, dtype=np.intp)
 
-    def refine(self, situation: Situation, weights: Array, chosen: IntArray) -> Array:
+    def refine(self, situation: Situation, weights: FloatArray, chosen: IntArray) -> FloatArray:
         """Improve positions at candidates by Lloyd's iteration on all nodes near them.
 
         Parameters
@@ -209,7 +209,7 @@ class Candidates(NamedTuple):
         return fine.positions[run_lloyd(fine.table, fine.find_nearest(positions))]
 
 
-def assign_goals(situation: Situation, goals: Array) -> Array:
+def assign_goals(situation: Situation, goals: FloatArray) -> FloatArray:
     """Assign goals to robots so that the sum of the squared path lengths is minimal.
 
     The assignment stays the same while robots move along straight paths.
@@ -243,13 +243,13 @@ class SharedMapMemory:
     """The scans of each robot, its own and those that have arrived from others, and their map."""
     plans: tuple[Plan | None, ...]
     """The last plan of each robot; None before the first one."""
-    routes: tuple[Array, ...]
+    routes: tuple[FloatArray, ...]
     """Waypoints of each robot, (w, 2) m. The last one is its goal."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     next_plan_time: float = -math.inf
     """Time at which all robots plan next, s."""
-    returns: Array | None = None
+    returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
 
     @property

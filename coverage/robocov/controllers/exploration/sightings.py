@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.density_exchange import HEADER_BYTES
 from robocov.controllers.exploration.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S
 from robocov.observation import Message, Observations
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 SIGHTING_BYTES = 14
 """Size of the last known position of one robot: 2 bytes for its index, 4 for the time, 8 for the position."""
@@ -22,9 +22,9 @@ class SightingReport(NamedTuple):
 
     robots: IntArray
     """(k,) Indices of the robots."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, their last known positions; nan for lost robots."""
-    times: Array
+    times: FloatArray
     """(k,) s, times at which they were there, or were found to be lost."""
 
 
@@ -44,8 +44,8 @@ class Sightings:
         Time at which robot j was there, or was found to be lost; -inf if j is unknown to i.
     """
 
-    positions: Array
-    times: Array
+    positions: FloatArray
+    times: FloatArray
 
     @classmethod
     def build_empty(cls, robot_count: int) -> Sightings:
@@ -105,7 +105,7 @@ class Sightings:
         )
         return Message(content, HEADER_BYTES + SIGHTING_BYTES * len(known))
 
-    def list_pairs(self) -> tuple[IntArray, Array]:
+    def list_pairs(self) -> tuple[IntArray, FloatArray]:
         """List all pairs of a robot and another robot whose position it knows.
 
         Returns

@@ -8,13 +8,13 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.exploration.atlas_memory import PlanBasis, TeamGoals
 from robocov.density import Density
 from robocov.planning.discovered_map import DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.team_placement import MinSavings, TeamSituation, compute_node_weights, place_team
 from robocov.planning.window import Window
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _MIN_TEAM_NODES = 1000
 _MAX_TEAM_NODES = 4000
@@ -52,7 +52,7 @@ class _AgreedPlan(NamedTuple):
     key: tuple[object, ...]
     """The situation, as values that can be compared with those of another situation."""
     density: Density | None
-    goals: Array
+    goals: FloatArray
     """(k, 2) m, in the order of the indices of the robots."""
 
 
@@ -100,7 +100,7 @@ def compute_team_goals(
     return TeamGoals(planner=planner, robots=group, goals=goals)
 
 
-def _build_window(known_map: DiscoveredMap, positions: Array, *, is_whole_team: bool) -> Window:
+def _build_window(known_map: DiscoveredMap, positions: FloatArray, *, is_whole_team: bool) -> Window:
     """Build the window for a whole team, or for a group around its first robot; `positions` are (k, 2) m."""
     if is_whole_team:
         max_nodes = min(_NODES_PER_ROBOT * len(positions), _MAX_TEAM_NODES)
@@ -140,7 +140,7 @@ def _place_agreed_team(
     group: IntArray,
     situation: TeamSituation,
     min_savings: MinSavings,
-) -> Array:
+) -> FloatArray:
     """Return the goals of a team, (k, 2) m, in the plan on which all robots agree.
 
     The plan is computed for the first robot that needs it, and stored for the others. `group` contains the

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.exploration.atlas_memory import TeamGoals, TeamKnowledge
 from robocov.controllers.exploration.shared_map import CERTAIN_RANGE_FRACTION, MAX_SILENCE_S
 from robocov.controllers.exploration.teammates import TeammateReport, Teammates
 from robocov.observation import Observations
 from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 MAX_PLANNING_GROUP = 8
 """Number of robots that a robot with its own map plans for: itself and the nearest others."""
@@ -25,7 +25,7 @@ class OtherRobots(NamedTuple):
 
     robots: IntArray
     """(k,) Indices of the robots."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
     is_fixed: BoolArray
     """(k,) Whether each robot is at rest, out of contact now, or not planned for."""
@@ -88,7 +88,9 @@ def update_knowledge(
     return TeamKnowledge(teammates=teammates, encountered=encountered, loss_times=loss_times)
 
 
-def list_others(teammates: Teammates, position: Array, time: float, *, plans_for_all: bool) -> OtherRobots:
+def list_others(
+    teammates: Teammates, position: FloatArray, time: float, *, plans_for_all: bool
+) -> OtherRobots:
     """List the other robots that a robot knows of, beginning with those that it plans for.
 
     Parameters

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.observation import Observations
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 REST_RADIUS_M = 0.1
 """A robot is at rest while it stays within this distance of one point."""
@@ -33,8 +33,8 @@ class TeammateReport:
     """
 
     robots: IntArray
-    positions: Array
-    heard_times: Array
+    positions: FloatArray
+    heard_times: FloatArray
 
     @property
     def size(self) -> int:
@@ -47,15 +47,15 @@ class Teammates(NamedTuple):
 
     robots: IntArray
     """(k,) Indices of the others, ascending."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
-    heard_times: Array
+    heard_times: FloatArray
     """(k,) s, times at which they were last heard."""
-    heard_distances: Array
+    heard_distances: FloatArray
     """(k,) m, their distances from the robot at these times; infinite if it knows them only from reports."""
-    rest_times: Array
+    rest_times: FloatArray
     """(k,) s, times since which they have been within `REST_RADIUS_M` of `rest_positions`."""
-    rest_positions: Array
+    rest_positions: FloatArray
     """(k, 2) m, positions near which they have been since then."""
 
     @classmethod
@@ -71,7 +71,12 @@ class Teammates(NamedTuple):
         )
 
     def add_observation(
-        self, robots: IntArray, positions: Array, own_position: Array, time: float, is_lost: BoolArray
+        self,
+        robots: IntArray,
+        positions: FloatArray,
+        own_position: FloatArray,
+        time: float,
+        is_lost: BoolArray,
     ) -> Teammates:
         """Return the knowledge after the robots that are heard now are added, and lost ones removed.
 
@@ -138,7 +143,7 @@ class Teammates(NamedTuple):
         -------
         Teammates
         """
-        sources: list[Sequence[Array | IntArray]] = [self]
+        sources: list[Sequence[FloatArray | IntArray]] = [self]
         before_start = -1.0
         for report in reports:
             min_times = [

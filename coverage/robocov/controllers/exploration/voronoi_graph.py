@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 from scipy import ndimage
 
-from robocov.arrays import Array, BoolArray
 from robocov.controllers.exploration.shared_map import (
     Candidates,
     Placement,
@@ -22,6 +21,7 @@ from robocov.k_median import apply_best_swap
 from robocov.planning.team_placement import UNREACHABLE_M
 from robocov.planning.voronoi_roadmap import VoronoiRoadmap
 from robocov.planning.window import Window
+from robocov.typing import BoolArray, FloatArray
 
 MAX_BLOCKS = 150_000
 """Maximum number of square blocks of cells in the coarser map from which the graph is built."""
@@ -111,7 +111,7 @@ class VoronoiGraphCoverage(SharedMapController):
         return Candidates(positions=vertices, table=np.ascontiguousarray((distances * weights).T))
 
 
-def _assign_vertices(situation: Situation, vertices: Array) -> Array:
+def _assign_vertices(situation: Situation, vertices: FloatArray) -> FloatArray:
     """Return the goals of k robots, (k, 2) m, given fewer vertices than robots, (v, 2) m.
 
     One robot moves to each vertex, so that the sum of the squared path lengths is minimal. The other robots

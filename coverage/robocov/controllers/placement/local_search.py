@@ -11,10 +11,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from robocov.arrays import IntArray
 from robocov.controllers.gains import gain
 from robocov.controllers.placement.placement_controller import KnownTeam, PlacementController, PlacementMap
 from robocov.k_median import compute_costs_with_column
+from robocov.typing import IntArray
 
 
 @dataclass(frozen=True)

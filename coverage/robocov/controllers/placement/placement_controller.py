@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from robocov.arrays import Array, IntArray
 from robocov.controllers.base import is_plan_due
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
@@ -23,6 +22,7 @@ from robocov.environment import Environment, find_nearest_inside
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 
 _MAX_LATTICE = 512
 """Maximum number of cells of the lattice along a side of the region."""
@@ -78,7 +78,7 @@ class PlacementMap:
             table *= cost.weights[is_reached][:, None]
         self.table = np.ascontiguousarray(table)
 
-    def find_components(self, positions: Array) -> IntArray:
+    def find_components(self, positions: FloatArray) -> IntArray:
         """Return the component of the configuration space that contains each position.
 
         Parameters
@@ -93,7 +93,7 @@ class PlacementMap:
         _, is_inside = self.planner.paths.snap_to_free_space(positions)
         return np.asarray(is_inside.argmax(axis=1))
 
-    def find_nearest_candidates(self, positions: Array, components: IntArray) -> IntArray:
+    def find_nearest_candidates(self, positions: FloatArray, components: IntArray) -> IntArray:
         """Find the nearest candidate to each position, without using any candidate twice.
 
         Parameters
@@ -115,7 +115,7 @@ class PlacementMap:
                 is_taken[np.where(is_usable, squared_distances, np.inf).argmin()] = True
         return np.flatnonzero(is_taken)
 
-    def assign(self, positions: Array, chosen: IntArray) -> Array:
+    def assign(self, positions: FloatArray, chosen: IntArray) -> FloatArray:
         """Assign candidates to robots so that the sum of the squared path lengths is minimal.
 
         Parameters
@@ -153,11 +153,11 @@ class KnownTeam(NamedTuple):
 
     robots: IntArray
     """(k,) Their indices."""
-    positions: Array
+    positions: FloatArray
     """(k, 2) m, their last known positions, moved into the configuration space."""
     components: IntArray
     """(k,) Index of the component of the configuration space that contains each position."""
-    previous_goals: Array
+    previous_goals: FloatArray
     """(k, 2) m, their goals in the robot's last plan, or their positions if they were not in it."""
 
 
@@ -168,15 +168,15 @@ class PlacementMemory:
     team: Team
     sightings: Sightings
     """The last known positions of others."""
-    goals: Array
+    goals: FloatArray
     """(n, n, 2) m. Entry (i, j) is the goal of robot j in the last plan of robot i; nan for none."""
-    routes: tuple[Array, ...]
+    routes: tuple[FloatArray, ...]
     """Waypoints of each robot, (w, 2) m. The last one is its goal."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     plan_time: float = -math.inf
     """s"""
-    returns: Array | None = None
+    returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
 
 
@@ -258,7 +258,7 @@ class PlacementController(WholeMapController):
         goals = np.full_like(memory.goals, np.nan)
         routes = []
         # Robots with the same knowledge share a plan, which is computed only once.
-        plans: dict[bytes, Array] = {}
+        plans: dict[bytes, FloatArray] = {}
         for robot in range(len(goals)):
             known_positions = sightings.positions[robot].copy()
             known_positions[robot] = seen.positions[robot]
@@ -279,7 +279,9 @@ class PlacementController(WholeMapController):
             plan_time=seen.time,
         )
 
-    def _compute_goals(self, placement_map: PlacementMap, known_positions: Array, previous: Array) -> Array:
+    def _compute_goals(
+        self, placement_map: PlacementMap, known_positions: FloatArray, previous: FloatArray
+    ) -> FloatArray:
         """Return the goals of all robots, (n, 2) m, in the plan of one robot; nan for unknown robots.
 
         Parameters

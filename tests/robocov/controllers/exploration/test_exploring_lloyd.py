@@ -5,7 +5,6 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions, Failure
 from robocov.controllers import Lloyd
 from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd, ExploringMemory
@@ -19,6 +18,7 @@ from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 SQUARE = Environment("square", ((0, 0), (20, 0), (20, 20), (0, 20)))
 PEAK = Gaussians((Gaussian((15.0, 14.0), weight=9.0, sigma=2.0),), floor=0.1)
@@ -31,20 +31,20 @@ class SensedDensity(Density):
     min_value = PEAK.min_value
     max_value = PEAK.max_value
 
-    def __init__(self, positions: Array, sensing_range: float) -> None:
+    def __init__(self, positions: FloatArray, sensing_range: float) -> None:
         self.positions = positions
         self.sensing_range = sensing_range
 
-    def evaluate(self, points: Array) -> Array:
+    def evaluate(self, points: FloatArray) -> FloatArray:
         squared_distances = ((points[:, None] - self.positions) ** 2).sum(axis=2)
         assert (squared_distances.min(axis=1) <= self.sensing_range**2).all()
         return PEAK.evaluate(points)
 
-    def compute_moments(self, edges: CellEdges, origins: Array) -> Array:
+    def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         raise AssertionError("expected no integrals of the density")
 
 
-def build_observations(positions: Array, density: Density | None, time: float = 0.0) -> Observations:
+def build_observations(positions: FloatArray, density: Density | None, time: float = 0.0) -> Observations:
     """Return the observations of robots that do not hear each other."""
     n = len(positions)
     neighbors = Neighbors.from_ranges(positions, np.zeros(n))
@@ -63,7 +63,7 @@ def run(controller: ExploringLloyd | Lloyd, environment: Environment, duration: 
     return simulation
 
 
-def compute_peak_cost(positions: Array) -> float:
+def compute_peak_cost(positions: FloatArray) -> float:
     """Return the mean squared distance to the nearest robot, weighted by PEAK, on a lattice."""
     x, y = np.meshgrid(np.arange(0.25, 20.0, 0.5), np.arange(0.25, 20.0, 0.5))
     points = np.column_stack([x.ravel(), y.ravel()])

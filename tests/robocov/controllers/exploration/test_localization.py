@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Perception
 from robocov.controllers import Atlas
@@ -23,12 +22,15 @@ from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.simulation import Simulation
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 SQUARE = np.array([[-99.0, -99.0], [99.0, -99.0], [99.0, 99.0], [-99.0, 99.0]])
 DT = 0.05
 
 
-def drive_along_paths(paths: Array, conditions: Conditions) -> tuple[Observations, Estimates, list[Array]]:
+def drive_along_paths(
+    paths: FloatArray, conditions: Conditions
+) -> tuple[Observations, Estimates, list[FloatArray]]:
     """Move robots along paths, (t, n, 2) m, and estimate their positions in each step.
 
     Returns
@@ -57,7 +59,7 @@ def drive_along_paths(paths: Array, conditions: Conditions) -> tuple[Observation
     return known, estimates, errors
 
 
-def build_straight_paths(n: int, steps: int, seed: int = 0) -> Array:
+def build_straight_paths(n: int, steps: int, seed: int = 0) -> FloatArray:
     """Return paths of robots that move straight at random constant velocities, (steps, n, 2) m."""
     rng = np.random.default_rng(seed)
     starts = rng.uniform(-20, 20, (n, 2))

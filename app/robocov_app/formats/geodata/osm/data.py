@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import to_one_line
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 
 USED_TAGS = {
@@ -89,7 +89,7 @@ class OsmData:
         self.notes: list[str] = []
         self._node_rows: dict[int, int] = {}
         self._coordinates = array("d")
-        self._points: Array | None = None
+        self._points: FloatArray | None = None
         self._vertices_used = 0
 
     @property
@@ -135,9 +135,9 @@ class OsmData:
         elif element.kind == "relation" and element.tags.get("type") == "multipolygon":
             self.relations[element.id] = element
 
-    def get_point(self, node: OsmElement) -> Array:
+    def get_point(self, node: OsmElement) -> FloatArray:
         """Return the (2,) longitude and latitude of a node."""
-        point: Array = self._get_points()[self._node_rows[node.id]]
+        point: FloatArray = self._get_points()[self._node_rows[node.id]]
         return point
 
     def get_ways(self, element: OsmElement) -> list[OsmElement | None]:
@@ -146,7 +146,7 @@ class OsmData:
             return [self.ways.get(way_id) for way_id in element.members]
         return [element]
 
-    def get_lines(self, element: OsmElement) -> list[Array] | None:
+    def get_lines(self, element: OsmElement) -> list[FloatArray] | None:
         """Return the longitudes and latitudes, (k, 2), of each way of an element; None if a node is missing.
 
         Raises
@@ -167,7 +167,7 @@ class OsmData:
             lines.append(self._get_points()[rows])
         return lines or None
 
-    def _get_points(self) -> Array:
+    def _get_points(self) -> FloatArray:
         """Return the positions of all nodes, (n, 2) degrees."""
         if self._points is None:
             self._points = np.array(self._coordinates).reshape(-1, 2)

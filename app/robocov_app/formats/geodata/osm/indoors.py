@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.geodata.building_floor import DEFAULT_DOOR_WIDTH_M, MAX_FLOORS, FloorElement, Role
 from robocov_app.formats.geodata.georeference import DEGREES, convert_to_meters
 from robocov_app.formats.geodata.osm.data import OsmData, OsmElement
@@ -213,5 +213,5 @@ def _build_opening(door: SourceGeometry) -> SourceGeometry:
         direction = after - middle
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M
-    half: Array = direction * (width / 2 / max(length, _MIN_LENGTH_M))
+    half: FloatArray = direction * (width / 2 / max(length, _MIN_LENGTH_M))
     return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.location)

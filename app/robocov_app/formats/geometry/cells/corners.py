@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.vectors import intersect_lines
 
 _MAX_SHORT_SIDE = 1.5
@@ -37,7 +37,7 @@ def sharpen_corners(plan: Polygon, tolerance: float) -> Polygon:
     return sharp if sharp.is_valid else plan
 
 
-def _sharpen_ring(ring: Array, tolerance: float) -> Array:
+def _sharpen_ring(ring: FloatArray, tolerance: float) -> FloatArray:
     """Restore the cut corners of a ring, (k, 2) m, whose first vertex is not repeated."""
     side = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(*side.T)

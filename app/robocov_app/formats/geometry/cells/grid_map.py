@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from shapely import Polygon
 
-from robocov.arrays import Array, BoolArray
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.formats.files import require_coordinate
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices, outline_cells
@@ -50,7 +50,7 @@ class GridFrame:
     origin: Point = (0.0, 0.0)
     yaw: float = 0.0
 
-    def place(self, points: Array) -> Array:
+    def place(self, points: FloatArray) -> FloatArray:
         """Convert positions in the grid, (n, 2) in cells from its lower left corner, to positions in m."""
         x, y = (points * self.cell).T
         rotated_x = x

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
+from robocov.arrays import concatenate_ranges
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import ParameterError, format_count
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.options import get_or_default
@@ -44,7 +45,7 @@ class _Crossings(NamedTuple):
     """
 
     line: IntArray
-    position: Array
+    position: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +272,7 @@ def _describe_losses(environment: Environment, grid: CellGrid, free: BoolArray) 
     return "; ".join(losses)
 
 
-def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: CellGrid) -> Array:
+def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: CellGrid) -> FloatArray:
     """Return the center of the first cell of each chosen island, (n, 2) m.
 
     `islands` holds the number of the island of each cell, from 1 on; `chosen` holds indices from 0 on.

@@ -3,10 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from robocov.arrays import BoolArray
+from robocov.typing import BoolArray, FloatArray
 
 MAX_STROKE_PIXELS = 200
 """Wider shapes are not strokes. The overlap of the tiles grows with this width."""
@@ -77,7 +76,7 @@ def _open(solid: BoolArray, width: int) -> BoolArray:
     return opened[inner, inner]
 
 
-def _compute_distance(cells: BoolArray) -> NDArray[np.float64]:
+def _compute_distance(cells: BoolArray) -> FloatArray:
     """Return the distance of each cell to the nearest false cell; infinite if there is none."""
     if cells.all():
         return np.full(cells.shape, np.inf)

@@ -13,9 +13,10 @@ import shapely
 from scipy import ndimage
 from shapely import MultiPolygon
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
+from robocov.arrays import concatenate_ranges
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.files import require_vertices
 
 NECK = 1 / 32
@@ -52,7 +53,9 @@ def outline_free_cells(free: BoolArray, cell: Point, origin: Point, source_name:
     return outline_cells(free[::-1], lambda points: points * cell + origin, source_name)
 
 
-def outline_cells(cells: BoolArray, place: Callable[[Array], Array], source_name: str) -> MultiPolygon:
+def outline_cells(
+    cells: BoolArray, place: Callable[[FloatArray], FloatArray], source_name: str
+) -> MultiPolygon:
     """Return the outline of cells on a map.
 
     Parameters
@@ -144,7 +147,7 @@ class _Corners(NamedTuple):
     row: IntArray
     is_west: BoolArray
     is_north: BoolArray
-    neck: Array
+    neck: FloatArray
     is_north_east_free: BoolArray
 
 
@@ -161,7 +164,7 @@ def _pair_vertically(corners: _Corners) -> IntArray:
 
 def _place_necks(
     corners: _Corners, vertex: IntArray, is_leaving_vertically: BoolArray
-) -> tuple[Array, BoolArray]:
+) -> tuple[FloatArray, BoolArray]:
     """Return the points of each vertex: two where its corner is cut off by a neck, otherwise one.
 
     Returns

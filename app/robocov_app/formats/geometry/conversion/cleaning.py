@@ -13,8 +13,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import GRID_M
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 _MIN_HALF_WIDTH_M = 1e-3 * GRID_M
@@ -86,7 +86,7 @@ def remove_slivers(
     return list(np.delete(parts, np.flatnonzero(is_thin)[is_new]))
 
 
-def _select_long(geometry: BaseGeometry, length: float) -> Array:
+def _select_long(geometry: BaseGeometry, length: float) -> FloatArray:
     """Return the polygons of a geometry that are longer than `length`, m, without slivers due to rounding."""
     pieces = np.array(to_multipolygon(geometry).geoms, dtype=object)
     x, y, right, top = shapely.bounds(pieces).reshape(-1, 4).T
@@ -107,7 +107,7 @@ def _open(area: BaseGeometry, width: float) -> BaseGeometry:
     return opened
 
 
-def _grow(pieces: Array) -> Sequence[BaseGeometry]:
+def _grow(pieces: FloatArray) -> Sequence[BaseGeometry]:
     return list(buffer_with_mitres(pieces, _OVERLAP_M))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.crossings import extract_sides
 
 _DIGITS = 9
@@ -51,7 +51,7 @@ def measure_deviation(before: MultiPolygon, after: MultiPolygon) -> Deviation:
     return Deviation(area, round(distance, _DIGITS))
 
 
-def find_moved_walls(before: MultiPolygon, after: MultiPolygon, limit: float) -> Array:
+def find_moved_walls(before: MultiPolygon, after: MultiPolygon, limit: float) -> FloatArray:
     """Find where walls have moved by more than a limit.
 
     Parameters
@@ -71,7 +71,7 @@ def find_moved_walls(before: MultiPolygon, after: MultiPolygon, limit: float) ->
     return np.concatenate(moved)
 
 
-def _measure_distances(first: MultiPolygon, second: MultiPolygon) -> tuple[Array, Array]:
+def _measure_distances(first: MultiPolygon, second: MultiPolygon) -> tuple[FloatArray, FloatArray]:
     """Return points on the walls of an area, and their distances from the walls of another one, m."""
     points = shapely.points(_sample_walls(first))
     walls = STRtree(shapely.linestrings(extract_sides(second)))
@@ -79,7 +79,7 @@ def _measure_distances(first: MultiPolygon, second: MultiPolygon) -> tuple[Array
     return points, distances
 
 
-def _sample_walls(area: MultiPolygon) -> Array:
+def _sample_walls(area: MultiPolygon) -> FloatArray:
     """Return points on the walls of an area, (n, 2) m: its vertices, and points along long edges."""
     vertices = shapely.get_coordinates(area)
     spare = _MAX_SAMPLES - len(vertices)

@@ -7,8 +7,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
+from robocov.typing import BoolArray
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
 from robocov_app.formats.geometry.crossings import extract_sides

@@ -8,7 +8,6 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.environment import (
     MAX_SAGITTA_M,
     CircleObstacle,
@@ -18,6 +17,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.deviation import find_moved_walls, measure_deviation
@@ -173,7 +173,7 @@ def _find_matches(
     return matches
 
 
-def _find_pockets(layout: MapLayout, free_before: MultiPolygon) -> Array:
+def _find_pockets(layout: MapLayout, free_before: MultiPolygon) -> FloatArray:
     """Return the parts of the free space that are due to rounding, or that mostly were solid before."""
     parts = shapely.get_parts(layout.compute_free())
     area = shapely.area(parts)
@@ -185,7 +185,7 @@ def _find_pockets(layout: MapLayout, free_before: MultiPolygon) -> Array:
     return np.asarray(parts[is_pocket])
 
 
-def _get_points(primitive: Primitive) -> Array:
+def _get_points(primitive: Primitive) -> FloatArray:
     """Return the center of a circle, or the vertices of a wall, (n, 2) m."""
     if isinstance(primitive, CircleObstacle):
         return np.array([primitive.center])

@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
-from robocov.arrays import Array
 from robocov.environment import MIN_START_GAP_RADII, DiscStart, PointsStart, StartSpec, UniformStart
 from robocov.errors import MapError, format_count
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.free_parts import MAX_FILE_ROBOTS
 from robocov_app.formats.geometry.crossings import extract_sides
@@ -97,14 +97,14 @@ def find_roomiest_point(
     return (float(point[0]), float(point[1])), best
 
 
-def _limit_squares(free: Polygon, sides: Array) -> int:
+def _limit_squares(free: Polygon, sides: FloatArray) -> int:
     """Return the number of squares to use: fewer if testing their centers takes long."""
     _, low_y, _, high_y = free.bounds
     crossings = count_ray_crossings(sides, np.linspace(low_y, high_y, _MAX_SQUARES))
     return max(min(_MAX_SQUARES, _MAX_SQUARES * _MAX_RAY_CROSSINGS // max(crossings, 1)), 16)
 
 
-def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[Array, float]:
+def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[FloatArray, float]:
     """Cover the bounding box of a polygon with squares; return their centers, (n, 2) m, and their side, m."""
     low_x, low_y, high_x, high_y = free.bounds
     width = high_x - low_x
@@ -158,7 +158,7 @@ def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartS
     return starts
 
 
-def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Array:
+def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> FloatArray:
     """Return the positions of the file's robots where robots fit without touching a wall or each other.
 
     Positions are an (n, 2) array, m. Of two that are too close, the first one in the file is used.

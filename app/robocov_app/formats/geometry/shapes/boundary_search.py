@@ -7,8 +7,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.errors import MapError, quote
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.polygons import to_multipolygon
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
 from robocov_app.formats.geometry.shapes.drawn_shapes import BOUNDARY, ClosedOutline
@@ -173,13 +173,13 @@ def _find_continuation(drawing: Drawing, largest: ClosedOutline) -> set[ClosedOu
     return members
 
 
-def _find_containers(areas: Array, tree: STRtree) -> set[int]:
+def _find_containers(areas: FloatArray, tree: STRtree) -> set[int]:
     """Return the indices of the areas that contain another area."""
     inner, outer = _find_nested_pairs(areas, tree)
     return set(outer[inner != outer].tolist())
 
 
-def _find_nested_pairs(areas: Array, tree: STRtree) -> tuple[Array, Array]:
+def _find_nested_pairs(areas: FloatArray, tree: STRtree) -> tuple[FloatArray, FloatArray]:
     """Find all pairs of an area and a larger one that contains most of it.
 
     Two arrays of indices are returned: of the inner areas, and of the outer areas.

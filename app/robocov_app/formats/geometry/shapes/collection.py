@@ -8,10 +8,10 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.colors import UNPAINTED, ColorKey, Paint, count_colors, name_color
 from robocov_app.formats.foreign_map import ForeignMap, Painted
@@ -119,7 +119,7 @@ class Shapes:
 
     def add_outline(
         self,
-        rings: Sequence[Array],
+        rings: Sequence[FloatArray],
         labels: Sequence[str] = (),
         *,
         rule: Rule = "holes",
@@ -166,7 +166,7 @@ class Shapes:
 
     def add_circle(
         self,
-        center: Array,
+        center: FloatArray,
         radius: float,
         labels: Sequence[str] = (),
         *,
@@ -207,7 +207,7 @@ class Shapes:
             return
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
-    def add_point(self, point: Array, labels: Sequence[str] = (), *, location: str = "") -> None:
+    def add_point(self, point: FloatArray, labels: Sequence[str] = (), *, location: str = "") -> None:
         """Add a point, (2,) m; it becomes a pillar if the option ``pillar`` is given, else it is left out."""
         ((x, y),) = self._check_rings([point[None]], location)[0].tolist()
         if self.options.pillar is None:
@@ -240,7 +240,7 @@ class Shapes:
             ]
 
     def build_polygon(
-        self, rings: Iterable[Array], labels: tuple[str, ...], location: str, parent_location: str = ""
+        self, rings: Iterable[FloatArray], labels: tuple[str, ...], location: str, parent_location: str = ""
     ) -> SourceGeometry:
         """Build a polygon of a format that requires closed rings; open rings are counted as repaired."""
         rings = tuple(rings)
@@ -249,7 +249,7 @@ class Shapes:
             self.repairs.counts["ring", "closed: the last point was not the first"] += unclosed
         return SourceGeometry("polygon", rings, labels, location, parent_location=parent_location)
 
-    def drop_heights(self, points: Array) -> Array:
+    def drop_heights(self, points: FloatArray) -> FloatArray:
         """Return points without their third coordinate, (k, 2); the report mentions dropped coordinates."""
         self.omissions.add_heights(points[:, 2:3])
         return points[:, :2]
@@ -269,7 +269,7 @@ class Shapes:
         self.vertices += number
         files.require_vertices(self.vertices, self.source_name)
 
-    def _check_rings(self, rings: Sequence[Array], location: str) -> list[Array]:
+    def _check_rings(self, rings: Sequence[FloatArray], location: str) -> list[FloatArray]:
         """Count and round the points of rings; raise MapError if a coordinate is out of range."""
         self.count_vertices(sum(map(len, rings)))
         for ring in rings:

@@ -9,8 +9,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import CircleObstacle, WallObstacle
+from robocov.typing import FloatArray
 from robocov_app.formats.colors import Color, Role
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule
 from robocov_app.formats.geometry.shapes.obstacle_names import get_obstacle_name
@@ -42,7 +42,7 @@ class SourceGeometry:
     """
 
     kind: Kind
-    rings: tuple[Array, ...]
+    rings: tuple[FloatArray, ...]
     labels: tuple[str, ...] = ()
     location: str = ""
     rule: Rule = "holes"
@@ -107,9 +107,9 @@ class PenStroke:
         Transform from the pen's units to meters.
     """
 
-    points: Array
+    points: FloatArray
     width: float
-    matrix: Array
+    matrix: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class WallLine:
         See `ClosedOutline`.
     """
 
-    points: Array
+    points: FloatArray
     width: float
     labels: tuple[str, ...] = ()
     cap: Literal["flat", "square", "round"] = "flat"
@@ -153,7 +153,7 @@ class WallLine:
         solid = self._buffer(stroke.points, stroke.width)
         return shapely.transform(solid, lambda points: points @ linear + offset)
 
-    def _buffer(self, points: Array, width: float) -> BaseGeometry:
+    def _buffer(self, points: FloatArray, width: float) -> BaseGeometry:
         area: BaseGeometry = LineString(points).buffer(
             width / 2, cap_style=self.cap, join_style=self.join, mitre_limit=self.mitre_limit
         )

@@ -10,8 +10,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array, BoolArray
 from robocov.environment import GRID_M
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.formats.geometry.crossings import CrossingCounter, extract_edges
 from robocov_app.formats.geometry.polygons import make_valid, to_multipolygon, unite
 
@@ -41,7 +41,7 @@ class EnclosedArea:
 
 
 def find_enclosed_area(
-    rings: Sequence[Array], rule: Rule = "holes", crossings: CrossingCounter | None = None
+    rings: Sequence[FloatArray], rule: Rule = "holes", crossings: CrossingCounter | None = None
 ) -> EnclosedArea:
     """Find the area that rings enclose.
 
@@ -85,13 +85,13 @@ def find_enclosed_area(
     return EnclosedArea(area, invalidity, +lost)
 
 
-def _has_three_points(ring: Array) -> bool:
+def _has_three_points(ring: FloatArray) -> bool:
     """Return whether a ring has at least three different points; ten times as fast as `np.unique`."""
     others = ring[(ring != ring[:1]).any(axis=1)]
     return bool((others != others[:1]).any())
 
 
-def _subtract_holes(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
+def _subtract_holes(rings: Sequence[FloatArray], lost: Counter[str]) -> MultiPolygon:
     """Subtract all other rings from the first one; count in `lost` those that remove no area."""
     areas = [make_valid(Polygon(ring)) for ring in rings]
     # The parts of rings that run along themselves may share an edge.
@@ -126,7 +126,7 @@ def _fill(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
         return to_multipolygon(shapely.union_all(faces, grid_size=GRID_M))
 
 
-def _test_winding(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
+def _test_winding(points: FloatArray, edges: FloatArray, tree: shapely.STRtree, rule: Rule) -> BoolArray:
     """Return a mask of the points, (m, 2), that are inside by a fill rule.
 
     A ray from the point to the right crosses an odd number of edges (evenodd), or crosses upward and downward

@@ -8,8 +8,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import BoolArray
 from robocov.environment import GRID_M
+from robocov.typing import BoolArray
 from robocov_app.formats.colors import MAX_DARK_LUMINANCE, MIN_PALE_LUMINANCE, Color, compute_luminance
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.enclosed_area import find_enclosed_area

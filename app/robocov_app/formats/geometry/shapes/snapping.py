@@ -19,10 +19,10 @@ import shapely
 from shapely import LineString, MultiPolygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
 from robocov.environment import GRID_M
 from robocov.errors import format_count
 from robocov.mapfile.models import MIN_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipolygon, unite
 
 DEFAULT_SNAP_M = 0.01
@@ -112,8 +112,8 @@ class _Gaps(NamedTuple):
     widths : (n,) array, m
     """
 
-    surroundings: Array
-    widths: Array
+    surroundings: FloatArray
+    widths: FloatArray
 
 
 def union_on_grid(areas: Sequence[BaseGeometry]) -> MultiPolygon:
@@ -151,13 +151,13 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
     return result
 
 
-def _are_close(outlines: Array, snap: float) -> bool:
+def _are_close(outlines: FloatArray, snap: float) -> bool:
     """Return whether any two outlines are within the tolerance of each other."""
     first, second = STRtree(outlines).query(outlines, predicate="dwithin", distance=snap)
     return bool((first != second).any())
 
 
-def _find_gaps(parts: Array, tolerance: float) -> _Gaps:
+def _find_gaps(parts: FloatArray, tolerance: float) -> _Gaps:
     """Return the gaps narrower than a tolerance, m, between pairs of polygons."""
     first, second = STRtree(parts).query(parts, predicate="dwithin", distance=tolerance)
     is_ordered = first < second
@@ -189,13 +189,13 @@ def _find_longest(wall: BaseGeometry) -> BaseGeometry:
     return max(lines, key=shapely.length, default=LineString())
 
 
-def _measure_distances(walls: Array, parts: Array, fraction: float) -> Array:
+def _measure_distances(walls: FloatArray, parts: FloatArray, fraction: float) -> FloatArray:
     """Return the distance, (n,) m, from a point on each wall, at a fraction of its length, to its part."""
     points = shapely.line_interpolate_point(walls, fraction, normalized=True)
     return np.asarray(np.nan_to_num(shapely.distance(points, parts)))
 
 
-def _find_narrow(area: MultiPolygon, width: float) -> Array:
+def _find_narrow(area: MultiPolygon, width: float) -> FloatArray:
     """Return the gaps in an area that are narrower than `width`, m."""
     grown = buffer_with_mitres(area, width / 2)
     closed = buffer_with_mitres(grown, -width / 2)

@@ -6,7 +6,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
+from robocov.arrays import concatenate_ranges, find_run_starts
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.geometry.simplification.narrow_gaps import find_closed_gaps
 from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline, ThinParts
 from robocov_app.formats.geometry.simplification.ring_vertices import RingVertices
@@ -47,7 +48,7 @@ class SimplificationCheck:
         outline: OriginalOutline,
         simplified: RingVertices,
         *,
-        allowed: Array,
+        allowed: FloatArray,
         tolerance: float,
         width: float,
         problems: Counter[str],
@@ -136,7 +137,7 @@ class SimplificationCheck:
         has_wrong_area[vertex] = True
         return has_wrong_area & (self.allowed > 0.0)
 
-    def _measure_area_changes(self) -> Array:
+    def _measure_area_changes(self) -> FloatArray:
         """Return the change in area of its ring caused by each side of the simplified outline, (m,) m².
 
         This is the signed area between the side and the run of the outline that it represents. Summed over a
@@ -223,7 +224,7 @@ class SimplificationCheck:
         self.problems["narrow passage"] += len(closed[0])
         return is_near_gap
 
-    def _build_paths(self, first: IntArray, last: IntArray) -> Array:
+    def _build_paths(self, first: IntArray, last: IntArray) -> FloatArray:
         """Return the run of the outline that each simplified side represents, as (m,) linestrings."""
         outline = self.outline
         starts = outline.starts[self.simplified.ring]
@@ -233,7 +234,7 @@ class SimplificationCheck:
         line = np.arange(len(count)).repeat(count)
         return np.asarray(shapely.linestrings(outline.points[index], indices=line))
 
-    def _select_movable_vertices(self, vertices: IntArray, middle: Array) -> IntArray:
+    def _select_movable_vertices(self, vertices: IntArray, middle: FloatArray) -> IntArray:
         """Return the vertices around a gap that may still move; those near its middle if there are any."""
         movable = vertices[self.allowed[vertices] > 0.0]
         distance = np.hypot(*(self.outline.points[movable] - middle).T)

@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, STRtree
 
-from robocov.arrays import Array, IntArray
+from robocov.typing import FloatArray, IntArray
 
 _SIDES_AT_ONCE = 2048
 """Number of sides compared at once, to limit the memory."""
@@ -15,7 +15,7 @@ _PASSABLE = 1 + 1e-6
 """A robot fits through a gap that is wider than the robot by this factor."""
 
 
-def count_ray_crossings(sides: Array, y: Array) -> int:
+def count_ray_crossings(sides: FloatArray, y: FloatArray) -> int:
     """Count how often sides cross horizontal lines.
 
     The count is the cost of deciding which points at these heights are inside the sides.
@@ -33,8 +33,8 @@ def count_ray_crossings(sides: Array, y: Array) -> int:
 
 
 def find_closed_gaps(
-    sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
-) -> tuple[IntArray, Array] | None:
+    sides: FloatArray, paths: FloatArray, free: MultiPolygon, width: float, moved: float
+) -> tuple[IntArray, FloatArray] | None:
     """Find gaps that are now too narrow for a robot, but were wide enough before.
 
     A gap is where two walls face each other across the free space.
@@ -83,7 +83,7 @@ def find_closed_gaps(
     return pairs[is_closed], middles[is_closed]
 
 
-def _find_narrow_pairs(sides: Array, lines: Array, width: float, moved: float) -> IntArray | None:
+def _find_narrow_pairs(sides: FloatArray, lines: FloatArray, width: float, moved: float) -> IntArray | None:
     """Return the pairs of sides, (p, 2), between which a robot does not fit; None if there are too many.
 
     Pairs that were too close before the walls moved are left out.

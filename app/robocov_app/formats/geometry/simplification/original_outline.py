@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.geometry.cells.vectorize import NECK
 from robocov_app.formats.geometry.polygons import buffer_with_mitres
 from robocov_app.formats.geometry.simplification.ring_vertices import RingVertices
@@ -43,7 +43,7 @@ class ThinParts(NamedTuple):
         Pairs of a vertex of the outline and the part that it belongs to.
     """
 
-    areas: Array
+    areas: FloatArray
     vertex: IntArray
     part: IntArray
 
@@ -84,7 +84,7 @@ class OriginalOutline(RingVertices):
         self.is_neck = is_neck
         self.cell = cell
 
-    def simplify_outline(self, tolerance: Array, is_fixed: BoolArray) -> RingVertices:
+    def simplify_outline(self, tolerance: FloatArray, is_fixed: BoolArray) -> RingVertices:
         """Simplify the outline by the algorithm of Douglas and Peucker.
 
         Parameters
@@ -115,7 +115,7 @@ class OriginalOutline(RingVertices):
             return simplified
         return fit_walls(path, kept, simplified, allowed[kept])
 
-    def restore_areas(self, simplified: RingVertices, tolerance: Array) -> RingVertices:
+    def restore_areas(self, simplified: RingVertices, tolerance: FloatArray) -> RingVertices:
         """Restore the original area of the rings of a simplified outline that have lost or gained much of it.
 
         All sides of such a ring move by the same distance, at most half the tolerance. Small round obstacles
@@ -167,7 +167,7 @@ class OriginalOutline(RingVertices):
         """Search tree of the sides of all rings."""
         return STRtree(shapely.linestrings(self.endpoints))
 
-    def limit_movement(self, simplified: RingVertices, tolerance: Array) -> RingVertices:
+    def limit_movement(self, simplified: RingVertices, tolerance: FloatArray) -> RingVertices:
         """Move simplified vertices back to their origin if they are farther from all walls than allowed."""
         vertex = simplified.vertex
         # A source of k + 0.5 is the midpoint of the side after vertex k.

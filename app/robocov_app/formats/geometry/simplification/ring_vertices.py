@@ -5,7 +5,8 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges, find_run_starts
+from robocov.arrays import concatenate_ranges, find_run_starts
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.geometry.vectors import compute_cross
 
 _EXTREME_DIGITS = 6
@@ -36,7 +37,7 @@ class RingVertices:
         Next and previous vertex along the ring.
     """
 
-    def __init__(self, points: Array, starts: IntArray, source: Array) -> None:
+    def __init__(self, points: FloatArray, starts: IntArray, source: FloatArray) -> None:
         self.points = points
         self.starts = starts
         self.source = source
@@ -48,24 +49,24 @@ class RingVertices:
         self.before = np.argsort(self.after)  # the inverse permutation
 
     @cached_property
-    def areas(self) -> Array:
+    def areas(self) -> FloatArray:
         """Signed area of each ring, (r,) m²; positive if counter-clockwise."""
         local = self.points - self.points[self.starts].repeat(self.size, axis=0)
         total = np.append(0.0, np.cumsum(compute_cross(local, local[self.after])))
         return np.asarray((total[self.starts + self.size] - total[self.starts]) / 2)
 
     @cached_property
-    def sides(self) -> Array:
+    def sides(self) -> FloatArray:
         """Vectors from each vertex to the next one, (k, 2) m."""
         return np.asarray(self.points[self.after] - self.points)
 
     @cached_property
-    def lengths(self) -> Array:
+    def lengths(self) -> FloatArray:
         """Lengths of the sides, (k,) m."""
         return np.asarray(np.hypot(*self.sides.T))
 
     @property
-    def endpoints(self) -> Array:
+    def endpoints(self) -> FloatArray:
         """Start and end of each side, (k, 2, 2) m."""
         return np.stack([self.points, self.points[self.after]], axis=1)
 
@@ -85,7 +86,7 @@ class RingVertices:
         return is_extreme
 
     def simplify(
-        self, tolerance: Array, is_fixed: BoolArray, max_tolerance: Array
+        self, tolerance: FloatArray, is_fixed: BoolArray, max_tolerance: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Drop vertices between fixed ones, by the algorithm of Douglas and Peucker.
 

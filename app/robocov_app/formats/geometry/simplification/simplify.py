@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from shapely import MultiPolygon
 
-from robocov.arrays import Array, BoolArray
 from robocov.errors import format_count
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.formats.geometry.simplification.checks import (
     MAX_AREA_CHANGE,
     MAX_OUTLINE_CHANGE,
@@ -128,7 +128,7 @@ def _tighten(
 
     With `whole_walls`, all vertices that share a side of the simplified outline with one of these stay.
     """
-    allowed: Array = check.allowed
+    allowed: FloatArray = check.allowed
     is_wrong |= is_too_far & is_fixed
     is_fixed |= is_too_far
     if whole_walls:

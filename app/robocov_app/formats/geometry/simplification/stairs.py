@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray, concatenate_ranges
+from robocov.arrays import concatenate_ranges
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.formats.geometry.simplification.ring_vertices import RingVertices
 from robocov_app.formats.geometry.vectors import compute_cross, intersect_lines, project_onto_lines
 
@@ -22,7 +23,7 @@ _MIN_SINE = 0.2
 """Two lines are intersected only if the sine of the angle between them is larger."""
 
 
-def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> RingVertices:
+def replace_stairs(outline: RingVertices, cell: float, tolerance: FloatArray) -> RingVertices:
     """Replace the short sides of stairs by their midpoints.
 
     Parameters
@@ -53,7 +54,9 @@ def replace_stairs(outline: RingVertices, cell: float, tolerance: Array) -> Ring
     return RingVertices(with_midpoints[is_kept], starts, source[is_kept])
 
 
-def fit_walls(path: RingVertices, kept: IntArray, simplified: RingVertices, tolerance: Array) -> RingVertices:
+def fit_walls(
+    path: RingVertices, kept: IntArray, simplified: RingVertices, tolerance: FloatArray
+) -> RingVertices:
     """Move simplified sides onto the walls that their stairs represent, and restore cut corners.
 
     A side that represents stairs becomes the least-squares line through their midpoints, and ends where that
@@ -91,15 +94,15 @@ class _StairLines(NamedTuple):
     """A line for each of m sides, as a point on it, m, and a direction; and which sides represent stairs."""
 
     is_stairs: BoolArray
-    origins: Array
-    directions: Array
+    origins: FloatArray
+    directions: FloatArray
 
 
 class _CutCorners(NamedTuple):
     """Mask of the m sides that are cut corners, and the position of each corner, (m, 2) m."""
 
     is_cut: BoolArray
-    positions: Array
+    positions: FloatArray
 
 
 def _fit_stairs(path: RingVertices, kept: IntArray, simplified: RingVertices) -> _StairLines:
@@ -115,7 +118,7 @@ def _fit_stairs(path: RingVertices, kept: IntArray, simplified: RingVertices) ->
     inner = inner[is_midpoint]
     number = np.bincount(side, minlength=len(kept))
 
-    def average(values: Array) -> Array:
+    def average(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(side, values, len(kept)) / np.maximum(number, 1))
 
     # Relative to the first vertex of the side, to avoid cancellation in the squares of large coordinates.
@@ -135,7 +138,7 @@ def _fit_stairs(path: RingVertices, kept: IntArray, simplified: RingVertices) ->
     )
 
 
-def _move_to_stairs(simplified: RingVertices, lines: _StairLines) -> Array:
+def _move_to_stairs(simplified: RingVertices, lines: _StairLines) -> FloatArray:
     """Return the vector, (m, 2) m, from each vertex to the point where the lines before and after it meet."""
     before = simplified.before
     previous_origins = lines.origins[before]
@@ -148,7 +151,7 @@ def _move_to_stairs(simplified: RingVertices, lines: _StairLines) -> Array:
     return np.asarray(np.where(np.abs(sine)[:, None] > _MIN_SINE, meeting, middle) - simplified.points)
 
 
-def _find_cut_corners(simplified: RingVertices, lines: _StairLines, tolerance: Array) -> _CutCorners:
+def _find_cut_corners(simplified: RingVertices, lines: _StairLines, tolerance: FloatArray) -> _CutCorners:
     """Find short sides between two long ones whose lines meet nearby; sides that represent stairs are not."""
     points = simplified.points
     after = simplified.after

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from robocov.arrays import BoolArray
 from robocov.errors import MapError, format_count
+from robocov.typing import BoolArray
 from robocov_app.formats.colors import ROLE_CODES, ROLES, Role, RoleCode
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.geometry.cells.strokes import MAX_STROKE_PIXELS, remove_thin_strokes

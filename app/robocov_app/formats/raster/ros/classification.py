@@ -12,8 +12,8 @@ of a pixel from 0 to 1, or its brightness if `negate` is set. In the mode
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.raster.picture import Brightness
@@ -122,12 +122,12 @@ def classify_raw(picture: Brightness, threshold: float) -> Cells:
     return table[picture.level]
 
 
-def _compute_darkness(max_level: int, negate: bool) -> Array:
+def _compute_darkness(max_level: int, negate: bool) -> FloatArray:
     """Return the darkness, from 0 to 1, of each level from 0 to `max_level`."""
     shade = np.arange(max_level + 1) / max_level
     return shade if negate else 1.0 - shade
 
 
-def _find_blocked_cells(occupancy: Array, threshold: float) -> Cells:
+def _find_blocked_cells(occupancy: FloatArray, threshold: float) -> Cells:
     """Return `BLOCKED` or `FREE` for each occupancy in percent; an occupancy of 0% is always free."""
     return np.where(occupancy >= max(100.0 * threshold, 1.0), BLOCKED, FREE).astype(np.uint8)

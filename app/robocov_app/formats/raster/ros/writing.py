@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from robocov.arrays import BoolArray
 from robocov.environment import Environment
 from robocov.errors import OutputError, quote, to_one_line
 from robocov.files.writing import replace_file
+from robocov.typing import BoolArray, Float32Array
 from robocov_app.formats.geometry.cells.rasterize import (
     CellGrid,
     build_grid,
@@ -95,14 +95,14 @@ def _quote_image_name(path: Path, image: Path) -> str:
     return image.name if _PLAIN_NAME.fullmatch(image.name) else json.dumps(image.name)
 
 
-def _compute_occupancy(environment: Environment, grid: CellGrid, free: BoolArray) -> NDArray[np.float32]:
+def _compute_occupancy(environment: Environment, grid: CellGrid, free: BoolArray) -> Float32Array:
     """Return the solid fraction of each cell.
 
     A cell that is not free counts as fully occupied, because costmaps treat any lower occupancy as free.
     """
     subcells = grid.find_covered_cells(environment.free, _SUBDIVISION)
     subcells = subcells.reshape(grid.rows, _SUBDIVISION, grid.columns, _SUBDIVISION)
-    occupancy: NDArray[np.float32] = 1.0 - subcells.mean(axis=(1, 3), dtype=np.float32)
+    occupancy: Float32Array = 1.0 - subcells.mean(axis=(1, 3), dtype=np.float32)
     occupancy[~free] = 1.0
     return occupancy
 
@@ -114,14 +114,12 @@ def _build_trinary_pixels(free: BoolArray, unknown: BoolArray) -> NDArray[np.uin
     return pixels
 
 
-def _build_raw_pixels(occupancy: NDArray[np.float32], unknown: BoolArray) -> NDArray[np.uint8]:
+def _build_raw_pixels(occupancy: Float32Array, unknown: BoolArray) -> NDArray[np.uint8]:
     """Return the pixels of a map of mode raw, (rows, columns), the bottom row first."""
     return np.where(unknown, 255, np.rint(100.0 * occupancy)).astype(np.uint8)
 
 
-def _build_scale_pixels(
-    occupancy: NDArray[np.float32], unknown: BoolArray, *, has_alpha: bool
-) -> NDArray[np.uint8]:
+def _build_scale_pixels(occupancy: Float32Array, unknown: BoolArray, *, has_alpha: bool) -> NDArray[np.uint8]:
     """Return the pixels of a map in the mode "scale": the darker a pixel, the higher its occupancy.
 
     The shape is (rows, columns), from the bottom row up, or (rows, columns, 2) with an alpha channel, which

@@ -4,12 +4,12 @@ import re
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import quote
+from robocov.typing import FloatArray
 from robocov_app.formats.files.xml_tree import Element
 
 
-def parse_vector(element: Element, x_name: str, y_name: str) -> Array:
+def parse_vector(element: Element, x_name: str, y_name: str) -> FloatArray:
     """Return the numbers in two attributes, (2,); a missing one is 0."""
     return np.array([parse_number(element, x_name), parse_number(element, y_name)])
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.shapes.collection import Shapes
 from robocov_app.formats.raster.tmx.attributes import parse_vector
@@ -30,7 +30,7 @@ class Layer(NamedTuple):
 
     element: Element
     labels: tuple[str, ...]
-    offset: Array
+    offset: FloatArray
     is_solid: bool
 
     @property

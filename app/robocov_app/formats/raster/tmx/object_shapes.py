@@ -5,8 +5,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import CircleObstacle
+from robocov.typing import FloatArray
 from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.frames import build_frame, transform_points
 from robocov_app.formats.raster.tmx.attributes import parse_number, parse_vector
@@ -33,7 +33,7 @@ class ObjectShape(NamedTuple):
     """
 
     kind: Literal["polygon", "line", "point", "circle", ""]
-    points: Array
+    points: FloatArray
 
 
 def parse_object(element: Element) -> ObjectShape:
@@ -75,7 +75,7 @@ def _parse_outline(
     return ObjectShape("polygon", np.asarray(_DISC.exterior.coords)[:-1] * center + center)
 
 
-def _parse_vertices(element: Element, minimum: int) -> Array:
+def _parse_vertices(element: Element, minimum: int) -> FloatArray:
     """Return the vertices of a polygon or polyline, (k, 2) px; raise MapError if there are too few."""
     numbers = element.parse_numbers("points")
     if len(numbers) % 2 or len(numbers) < 2 * minimum:
@@ -83,7 +83,7 @@ def _parse_vertices(element: Element, minimum: int) -> Array:
     return numbers.reshape(-1, 2)
 
 
-def flip_points(points: Array, gid: int, size: Array) -> Array:
+def flip_points(points: FloatArray, gid: int, size: FloatArray) -> FloatArray:
     """Flip points on the picture of a tile as specified by the flags in its global ID.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
 from robocov_app.formats.raster.tmx.grids import Window
@@ -34,21 +34,21 @@ class TileFrame:
         Columns and rows of the tiles of the map.
     """
 
-    tile: Array
+    tile: FloatArray
     pixel: float
     window: Window
 
     @property
-    def lower_left(self) -> Array:
+    def lower_left(self) -> FloatArray:
         """Lower left corner of the tiles, (2,) px."""
         return np.array([self.window.left, self.window.bottom]) * self.tile
 
     @property
-    def upper_left(self) -> Array:
+    def upper_left(self) -> FloatArray:
         """Upper left corner of the tiles, (2,) px."""
         return np.array([self.window.left, self.window.top]) * self.tile
 
-    def to_meters(self, points: Array) -> Array:
+    def to_meters(self, points: FloatArray) -> FloatArray:
         """Convert points, (..., 2), from pixels to meters."""
         return np.asarray((points - self.lower_left) * [self.pixel, -self.pixel])
 

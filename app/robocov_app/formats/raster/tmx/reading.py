@@ -17,8 +17,8 @@ from typing import NoReturn
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError, ParameterError, quote, summarize_names, to_one_line
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.files.xml_tree import read_xml_tree
 from robocov_app.formats.foreign_map import ForeignMap
@@ -83,7 +83,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return shapes.build_foreign_map(path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
 
-def _choose_pixel_size(tile: Array, options: ReadOptions, notes: list[str]) -> float:
+def _choose_pixel_size(tile: FloatArray, options: ReadOptions, notes: list[str]) -> float:
     """Return the side of a pixel, m; `tile` is the width and height of a tile, (2,) px."""
     if options.cell is not None and options.scale is not None:
         raise ParameterError("--cell, --scale: expected one of them, because both say how large a tile is")

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, Element, read_xml_tree
 from robocov_app.formats.geometry.shapes.collection import Shapes
@@ -30,8 +30,8 @@ class Tile(NamedTuple):
     """
 
     parts: list[Element]
-    size: Array
-    offset: Array
+    size: FloatArray
+    offset: FloatArray
 
 
 def read_solid_tiles(root: Element, path: Path, shapes: Shapes) -> dict[int, Tile]:

@@ -7,9 +7,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 
 _TRUE_WORDS = ("true", "yes", "on", "1")
@@ -90,7 +90,7 @@ class Node:
         files.require_length(value, self.location)
         return value
 
-    def parse_numbers(self, default: list[float]) -> Array:
+    def parse_numbers(self, default: list[float]) -> FloatArray:
         """Return the numbers of a list.
 
         Parameters

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from robocov.arrays import BoolArray
 from robocov.errors import MapError, quote, to_one_line
+from robocov.typing import BoolArray
 from robocov_app.formats import files
 from robocov_app.formats.geometry.shapes.collection import Shapes
 from robocov_app.formats.raster.picture import describe_transparency, read_picture

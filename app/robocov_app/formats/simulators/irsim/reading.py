@@ -18,8 +18,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon
 
-from robocov.arrays import Array
 from robocov.errors import format_count, to_one_line
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices, outline_free_cells
@@ -73,7 +73,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     return shapes.build_foreign_map(name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
-def _read_free_space(world: Node, path: Path, shapes: Shapes, corner: Array, size: Array) -> MultiPolygon:
+def _read_free_space(
+    world: Node, path: Path, shapes: Shapes, corner: FloatArray, size: FloatArray
+) -> MultiPolygon:
     """Return the free space of the world without its obstacles: a rectangle, or the light part of a picture.
 
     Parameters
@@ -107,7 +109,7 @@ class _GroupReader:
         Lower left corner of the world, and its width and height.
     """
 
-    def __init__(self, shapes: Shapes, corner: Array, size: Array) -> None:
+    def __init__(self, shapes: Shapes, corner: FloatArray, size: FloatArray) -> None:
         self._shapes = shapes
         self._center = corner + size / 2
         self._radius = float(size.min() / 2 - _CIRCLE_MARGIN_M)
@@ -142,7 +144,7 @@ class _GroupReader:
         obstacles = format_count(self._moving_count, "obstacle")
         return [f"{obstacles} with kinematics treated as fixed at their initial positions"]
 
-    def _add_obstacle(self, group: Node, k: int, frame: Array, labels: tuple[str, ...]) -> None:
+    def _add_obstacle(self, group: Node, k: int, frame: FloatArray, labels: tuple[str, ...]) -> None:
         """Add obstacle k of a group; `frame` is the (3, 3) transform from its frame to meters."""
         if group["unobstructed"].is_true():
             self._shapes.count_omission("obstacle", "that nothing collides with")
@@ -153,7 +155,7 @@ class _GroupReader:
         candidates = group["shape"].list_items(allow_single=True) or [group["shape"]]
         self._shape_reader.add(_get_item(candidates, k), frame, labels)
 
-    def _parse_states(self, group: Node, number: int) -> list[Array] | None:
+    def _parse_states(self, group: Node, number: int) -> list[FloatArray] | None:
         """Return the states [x, y, theta] of a group, or None if they are random.
 
         There may be fewer states than objects: see `_get_item`.
@@ -172,7 +174,7 @@ class _GroupReader:
             states = [group["state"]]
         return [state.parse_numbers([1.0, 1.0, 0.0]) for state in states]
 
-    def _compute_states_on_circle(self, distribution: Node, number: int) -> list[Array]:
+    def _compute_states_on_circle(self, distribution: Node, number: int) -> list[FloatArray]:
         """Return states [x, y, theta] at equal distances on a circle, facing its center."""
         center = distribution["center"].parse_numbers([*self._center.tolist(), 0.0])[:2]
         radius = distribution["radius"].parse_number(self._radius)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
@@ -25,7 +25,7 @@ class ShapeReader:
         self._shapes = shapes
         self._count = 0
 
-    def add(self, shape: Node, frame: Array, labels: tuple[str, ...]) -> None:
+    def add(self, shape: Node, frame: FloatArray, labels: tuple[str, ...]) -> None:
         """Add a shape, or all parts of a compound.
 
         Parameters
@@ -67,14 +67,16 @@ class ShapeReader:
         else:
             shape["name"].raise_error("circle, rectangle, polygon, linestring or compound")
 
-    def _add_circle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
+    def _add_circle(self, shape: Node, frame: FloatArray, labels: tuple[str, ...], shift: FloatArray) -> None:
         """Add a disc; `shift`, (2,) m, moves it within its frame."""
         center = shape["center"].parse_numbers([0.0, 0.0])[:2] + shift
         radius = shape["radius"].parse_length(_DEFAULT_RADIUS_M)
         (center,) = transform_points(frame, center[None])
         self._shapes.add_circle(center, radius, labels, location=_get_location(shape))
 
-    def _add_rectangle(self, shape: Node, frame: Array, labels: tuple[str, ...], shift: Array) -> None:
+    def _add_rectangle(
+        self, shape: Node, frame: FloatArray, labels: tuple[str, ...], shift: FloatArray
+    ) -> None:
         length = shape["length"].parse_length(_DEFAULT_SIDE_M)
         width = shape["width"].parse_length(_DEFAULT_SIDE_M)
         ring = transform_points(frame, UNIT_SQUARE * [length, width] + shift)
@@ -87,7 +89,7 @@ def _get_location(shape: Node) -> str:
     return location
 
 
-def _parse_vertices(shape: Node, frame: Array, *, minimum: int) -> Array:
+def _parse_vertices(shape: Node, frame: FloatArray, *, minimum: int) -> FloatArray:
     """Return the vertices of a polygon or line, (k, 2) m; raise MapError if there are too few."""
     points = [point.parse_numbers([0.0, 0.0])[:2] for point in shape["vertices"].list_items()]
     if len(points) < minimum:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.simulators.stage.tokens import BRACKETS, Token
 
@@ -44,7 +44,7 @@ class Entity:
         """Return the first value of a property as a number; raise MapError for invalid input."""
         return float(self.parse_numbers(name, (default,))[0])
 
-    def parse_numbers(self, name: str, default: tuple[float, ...]) -> Array:
+    def parse_numbers(self, name: str, default: tuple[float, ...]) -> FloatArray:
         """Return the values of a property as numbers.
 
         Parameters

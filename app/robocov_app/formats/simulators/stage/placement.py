@@ -11,8 +11,8 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array
 from robocov.errors import MapError, quote, to_one_line
+from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, build_frame, transform_points
@@ -63,12 +63,12 @@ class _ModelBox:
     size : (2,) array, m
     """
 
-    def __init__(self, frame: Array, size: Array) -> None:
+    def __init__(self, frame: FloatArray, size: FloatArray) -> None:
         self._frame = frame
         self._size = size
         self.polygon = Polygon(self.place(UNIT_SQUARE))
 
-    def place(self, points: Array) -> Array:
+    def place(self, points: FloatArray) -> FloatArray:
         """Convert positions in the unit square around the origin, (k, 2), to positions on the map, m."""
         return np.round(transform_points(self._frame, points * self._size), _DIGITS) + 0.0
 
@@ -105,7 +105,7 @@ class ModelPlacer:
         """Add all models; raise MapError if a value is invalid, or if there are too many."""
         self._place(self._world.root.children, np.eye(3), 0)
 
-    def _place(self, entities: list[Entity], frame: Array, depth: int) -> None:
+    def _place(self, entities: list[Entity], frame: FloatArray, depth: int) -> None:
         """Add models and, recursively, the models in them; `frame` is the (3, 3) transform to meters."""
         for given in entities:
             entity, labels = self._expand_macros(given)
@@ -151,14 +151,14 @@ class ModelPlacer:
         names = [expanded.get_text("name"), *(base.type for base in chain)]
         return expanded, tuple(name for name in names if name)
 
-    def _parse_pose(self, entity: Entity, name: str) -> Array:
+    def _parse_pose(self, entity: Entity, name: str) -> FloatArray:
         """Return the (3, 3) frame of a pose [x y z heading], or [x y heading] as in Stage 2."""
         x, y, third, fourth = entity.parse_numbers(name, (0.0, 0.0, 0.0, 0.0)).tolist()
         heading = third if len(entity.properties.get(name, [])) == 3 else fourth
         meters = self._meters_per_unit
         return build_frame(x * meters, y * meters, heading * self._radians_per_unit)
 
-    def _add_model(self, entity: Entity, frame: Array, labels: tuple[str, ...]) -> None:
+    def _add_model(self, entity: Entity, frame: FloatArray, labels: tuple[str, ...]) -> None:
         """Add the outlines of a model: those in its bitmap, or else its blocks, or else its box."""
         size = entity.parse_numbers("size", (_DEFAULT_SIDE, _DEFAULT_SIDE)) * self._meters_per_unit
         for length in size.tolist():
@@ -170,7 +170,7 @@ class ModelPlacer:
             if blocks:
                 self._shapes.count_omission("block", "next to a bitmap", len(blocks))
             return
-        rings: list[Array] = []
+        rings: list[FloatArray] = []
         if blocks:
             rings = [box.place(ring) for ring in _scale_to_unit_square(blocks)]
             if entity.parse_number("boundary", 0):
@@ -180,7 +180,7 @@ class ModelPlacer:
         for ring in rings:
             self._shapes.add_outline([ring], labels, location=entity.location, kind="block")
 
-    def _add_bitmap(self, entity: Entity, box: _ModelBox, size: Array, labels: tuple[str, ...]) -> None:
+    def _add_bitmap(self, entity: Entity, box: _ModelBox, size: FloatArray, labels: tuple[str, ...]) -> None:
         """Add a model with a bitmap to the floor plans."""
         file = self._find_file(entity.get_text("bitmap"), "image", location=f"{entity.location}: bitmap")
         bitmap = self._bitmaps.read(file)
@@ -189,7 +189,7 @@ class ModelPlacer:
         free = shapely.transform(bitmap.free, box.place)
         self.floorplans.append(Floorplan(box.polygon, free, labels, cell))
 
-    def _parse_blocks(self, entity: Entity) -> list[Array]:
+    def _parse_blocks(self, entity: Entity) -> list[FloatArray]:
         """Return the polygons of all blocks of a model, (k, 2) each."""
         rings = _parse_rings(entity)
         for child in entity.children:
@@ -206,7 +206,7 @@ def _is_solid(entity: Entity) -> bool:
     return is_seen or entity.parse_number("obstacle_return", 1.0) != 0 or "bitmap" in entity.properties
 
 
-def _scale_to_unit_square(rings: list[Array]) -> list[Array]:
+def _scale_to_unit_square(rings: list[FloatArray]) -> list[FloatArray]:
     """Scale rings so that their bounding box becomes the unit square around the origin."""
     points = np.concatenate(rings)
     low = points.min(axis=0)
@@ -215,12 +215,12 @@ def _scale_to_unit_square(rings: list[Array]) -> list[Array]:
     return [(ring - (low + high) / 2) / extent for ring in rings]
 
 
-def _parse_rings(entity: Entity) -> list[Array]:
+def _parse_rings(entity: Entity) -> list[FloatArray]:
     """Return the polygons of a block, or of a model as in Stage 2, (k, 2) each.
 
     Points are properties such as ``point[1] [x y]`` in a block, or ``block[0].point[1] [x y]`` in a model.
     """
-    rings: dict[str, dict[int, Array]] = {}
+    rings: dict[str, dict[int, FloatArray]] = {}
     for name in entity.properties:
         prefix, separator, index = name.removesuffix("]").rpartition("point[")
         if separator and name.endswith("]") and index.isdecimal() and len(index) < 9:

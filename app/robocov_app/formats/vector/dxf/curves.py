@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline
 
-from robocov.arrays import Array
 from robocov.optional_imports import import_optional
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.curves import MAX_POINTS, sample_curve
 
 _MIN_BULGE = 1e-9
 """Edges with a smaller bulge are straight lines."""
 
 
-def to_plane(vectors: Sequence[Any]) -> Array:
+def to_plane(vectors: Sequence[Any]) -> FloatArray:
     """Return the first two coordinates of ezdxf vectors, (k, 2)."""
     return np.array([(vector[0], vector[1]) for vector in vectors], dtype=float).reshape(-1, 2)
 
 
-def flatten_polyline(vertices: Array, bulges: Array, tolerance: float) -> Array:
+def flatten_polyline(vertices: FloatArray, bulges: FloatArray, tolerance: float) -> FloatArray:
     """Approximate a polyline, whose edges may be arcs, by points.
 
     Parameters
@@ -53,8 +53,8 @@ def flatten_polyline(vertices: Array, bulges: Array, tolerance: float) -> Array:
 
 
 def _flatten_bulge(
-    start: Array, end: Array, bulge: float, tolerance: float, max_points: float
-) -> tuple[Array, float]:
+    start: FloatArray, end: FloatArray, bulge: float, tolerance: float, max_points: float
+) -> tuple[FloatArray, float]:
     """Return the points of an arc, (k, 2), from its start to its end, and an estimate of their number.
 
     The estimate is made first; ValueError is raised if it exceeds `max_points`.
@@ -72,7 +72,7 @@ def _flatten_bulge(
     return points, point_count
 
 
-def flatten_spline(entity: Any, tolerance: float) -> Array:
+def flatten_spline(entity: Any, tolerance: float) -> FloatArray:
     """Approximate a rational B-spline by points.
 
     Parameters
@@ -106,7 +106,7 @@ def flatten_spline(entity: Any, tolerance: float) -> Array:
     homogeneous = np.column_stack([control_points, np.ones(len(control_points))])
     curve = BSpline(knots, homogeneous * weights[:, None], spline.degree)
 
-    def compute_points(parameters: Array) -> Array:
+    def compute_points(parameters: FloatArray) -> FloatArray:
         coordinates = curve(parameters)
         return np.asarray(coordinates[:, :2] / coordinates[:, 2:])
 

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import MapError, RobocovError, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
 from robocov_app.formats.vector.dxf.curves import flatten_polyline, flatten_spline, to_plane
@@ -39,7 +39,7 @@ class _Polyline(NamedTuple):
         Position of the vertices along the normal of the plane.
     """
 
-    rows: Array
+    rows: FloatArray
     is_closed: bool
     width: float
     plane: Any
@@ -191,7 +191,7 @@ class EntityReader:
         self._require_near(points)
         self._add_line(points * self._scale, labels, location)
 
-    def _flatten(self, entity: Any) -> Array:
+    def _flatten(self, entity: Any) -> FloatArray:
         """Approximate a circle, arc, ellipse or spline by points, (k, 2) in units of the drawing."""
         kind = entity.dxftype()
         if kind == "ELLIPSE":
@@ -227,7 +227,9 @@ class EntityReader:
         width = max(polyline.width, float(rows[:, 3:].max()))
         self._add_line(points * self._scale, labels, location, width * self._scale)
 
-    def _add_line(self, points: Array, labels: tuple[str, ...], location: str, width: float = 0.0) -> None:
+    def _add_line(
+        self, points: FloatArray, labels: tuple[str, ...], location: str, width: float = 0.0
+    ) -> None:
         """Add a line: as an outline if it is closed and has no width, otherwise as a wall.
 
         Parameters
@@ -252,7 +254,7 @@ class EntityReader:
             width = self._shapes.thickness
         self._shapes.add_line(WallLine(points, width, labels), location=location)
 
-    def _to_meters(self, vectors: Sequence[Any]) -> Array:
+    def _to_meters(self, vectors: Sequence[Any]) -> FloatArray:
         """Convert ezdxf vectors to points, (k, 2) m; third coordinates are counted as left out."""
         heights = np.array([vector[2] if len(vector) > 2 else 0.0 for vector in vectors])
         self._shapes.omissions.add_heights(heights[heights != 0.0])
@@ -264,7 +266,7 @@ class EntityReader:
         self._require_near(np.array([*to_plane([entity.dxf.center]), [radius, radius]]))
         return radius
 
-    def _require_near(self, points: Array) -> None:
+    def _require_near(self, points: FloatArray) -> None:
         """Raise MapError if points of a curve are out of range, because flattening it might never end."""
         if not (np.abs(points) * self._scale <= MAX_COORDINATE_M).all():
             raise MapError(f"{self._shapes.source_name}: a curve beyond {MAX_COORDINATE_M:.0f} m")
@@ -306,5 +308,5 @@ def _parse_polyline(entity: Any) -> _Polyline | None:
     )
 
 
-def _to_rows(rows: Sequence[Any]) -> Array:
+def _to_rows(rows: Sequence[Any]) -> FloatArray:
     return np.array(rows, dtype=float).reshape(-1, 5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.files.xml_tree import Element
 from robocov_app.formats.vector.svg.numbers import parse_length, parse_numbers
 from robocov_app.formats.vector.svg.style import Style, inherit_style, parse_opacity
@@ -58,7 +58,7 @@ class ElementState:
         Opacity of the element and of the groups around it, multiplied.
     """
 
-    matrix: Array
+    matrix: FloatArray
     style: Style
     labels: tuple[str, ...]
     width: float

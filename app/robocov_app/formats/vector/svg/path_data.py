@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, concatenate_ranges
+from robocov.arrays import concatenate_ranges
+from robocov.typing import FloatArray, IntArray
 from robocov_app.formats.geometry.curves import flatten_arcs, flatten_beziers
 from robocov_app.formats.vector.svg.numbers import NUMBER, parse_number
 
@@ -26,7 +27,7 @@ _MIN_HALF_LENGTH = 1e-150
 class Subpath(NamedTuple):
     """Points of a subpath, (k, 2), and whether it is closed."""
 
-    points: Array
+    points: FloatArray
     is_closed: bool
 
 
@@ -123,7 +124,7 @@ class _FlatCurves(NamedTuple):
     """The points of n curves, (k, 2), how many belong to each, and the index of the vertex at each end."""
 
     vertices: IntArray
-    points: Array
+    points: FloatArray
     counts: IntArray
 
 

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.errors import MapError, to_one_line
+from robocov.typing import FloatArray
 from robocov_app.formats.files import get_map_name, require_shapes
 from robocov_app.formats.files.xml_tree import MAX_ELEMENTS, MAX_NESTING, Element, read_xml_tree
 from robocov_app.formats.foreign_map import ForeignMap
@@ -86,7 +86,7 @@ def _require_size(shapes: Shapes) -> None:
         raise MapError(f"{shapes.source_name}: expected at least {_MIN_SIZE_M:g} m, got {got}: {hint}")
 
 
-def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
+def _compute_page(attributes: dict[str, str], scale: float | None) -> tuple[FloatArray, float, float]:
     """Return the matrix from the root's units to meters, and the width and height of its viewport in units.
 
     Raises
@@ -137,7 +137,7 @@ class _DrawingReader:
                 self.sheet.add(element.text)
         self.shape_reader = ShapeReader(shapes, self.sheet, self._elements_by_id)
 
-    def draw(self, matrix: Array, width: float, height: float) -> None:
+    def draw(self, matrix: FloatArray, width: float, height: float) -> None:
         """Add all shapes; the matrix and the size are the result of `_compute_page`."""
         self._require_few_elements()
         style = inherit_style(INHERITED, self.sheet.get_properties(self.root))

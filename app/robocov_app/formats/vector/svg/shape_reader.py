@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.formats.colors import Paint, parse_css_color_on_white
 from robocov_app.formats.files import MAX_VERTICES
 from robocov_app.formats.files.xml_tree import Element
@@ -286,7 +286,7 @@ def _compute_rectangle(element: Element, state: ElementState, tolerance: float) 
         return [Subpath(corners, True)]
     u, v = np.diag([rx, ry])
     inward = np.array([[rx, ry], [-rx, ry], [-rx, -ry], [rx, -ry]])
-    parts: list[Array] = []
+    parts: list[FloatArray] = []
     for k, center in enumerate(corners + inward):
         start = np.pi + k * np.pi / 2
         first = center + u * np.cos(start) + v * np.sin(start)

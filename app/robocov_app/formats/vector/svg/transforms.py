@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.formats.geometry.frames import build_frame
 from robocov_app.formats.vector.svg.numbers import MAX_NUMBER, parse_numbers
 
@@ -17,12 +17,12 @@ _ALIGNMENTS = {"xmin": 0.0, "xmid": 0.5, "xmax": 1.0, "ymin": 0.0, "ymid": 0.5, 
 
 def build_affine(
     *, a: float = 1.0, b: float = 0.0, c: float = 0.0, d: float = 1.0, e: float = 0.0, f: float = 0.0
-) -> Array:
+) -> FloatArray:
     """Return the (3, 3) matrix that transforms (x, y, 1) to (a x + c y + e, b x + d y + f, 1)."""
     return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
 
 
-def compose(outer: Array, inner: Array) -> Array:
+def compose(outer: FloatArray, inner: FloatArray) -> FloatArray:
     """Return the matrix that applies the inner transform first, then the outer one.
 
     Raises
@@ -36,7 +36,7 @@ def compose(outer: Array, inner: Array) -> Array:
     return np.asarray(product)
 
 
-def compute_stretch(matrix: Array) -> tuple[float, float]:
+def compute_stretch(matrix: FloatArray) -> tuple[float, float]:
     """Return the smallest and the largest factor by which a transform stretches lengths.
 
     These are the singular values of its linear part. Computing them with LAPACK for each shape would take as
@@ -48,7 +48,7 @@ def compute_stretch(matrix: Array) -> tuple[float, float]:
     return abs(half_sum - half_difference), half_sum + half_difference
 
 
-def parse_transform(text: str) -> Array:
+def parse_transform(text: str) -> FloatArray:
     """Return the matrix of a ``transform``, whose last function is applied first.
 
     Raises
@@ -73,7 +73,7 @@ def parse_transform(text: str) -> Array:
 
 def fit_view_box(
     box: tuple[float, float, float, float], width: float, height: float, alignment: str = ""
-) -> Array:
+) -> FloatArray:
     """Return the matrix that fits a ``viewBox`` into a viewport (SVG 2, section 8.2).
 
     Parameters
@@ -99,17 +99,17 @@ def fit_view_box(
     return build_affine(a=scale, d=scale, e=left, f=top) @ to_origin
 
 
-def _build_scale(x: float, y: float | None = None) -> Array:
+def _build_scale(x: float, y: float | None = None) -> FloatArray:
     if y is None:
         y = x
     return build_affine(a=x, d=y)
 
 
-def _build_rotation(degrees: float, x: float = 0.0, y: float = 0.0) -> Array:
+def _build_rotation(degrees: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
     return np.asarray(build_frame(x, y, math.radians(degrees)) @ build_affine(e=-x, f=-y))
 
 
-_FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
+_FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., FloatArray]]] = {
     "matrix": ((6,), lambda a, b, c, d, e, f: build_affine(a=a, b=b, c=c, d=d, e=e, f=f)),
     "translate": ((1, 2), lambda x, y=0.0: build_affine(e=x, f=y)),
     "translatex": ((1,), lambda x: build_affine(e=x)),

@@ -10,8 +10,8 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.errors import quote
+from robocov.typing import FloatArray
 from robocov_app.formats.files import MAX_DEPTH
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 from robocov_app.formats.vector.wkt.scanner import Scanner
@@ -222,12 +222,12 @@ class WktParser:
         for _ in self._iterate_items():
             self._add_points(self._parse_points(geometry, minimum=1), geometry)
 
-    def _add_points(self, points: Array, geometry: _Geometry) -> None:
+    def _add_points(self, points: FloatArray, geometry: _Geometry) -> None:
         self._geometries += [
             SourceGeometry("point", (point[None],), location=geometry.location) for point in points
         ]
 
-    def _parse_points(self, geometry: _Geometry, *, minimum: int) -> Array:
+    def _parse_points(self, geometry: _Geometry, *, minimum: int) -> FloatArray:
         """Parse at least `minimum` points in brackets; return their first two coordinates, (k, 2)."""
         scanner = self._scanner
         scanner.skip_space()
