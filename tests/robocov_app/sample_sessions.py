@@ -119,7 +119,10 @@ def add_pillar(environment: Environment = HALL, pillar: CircleObstacle = PILLAR)
     return replace(environment, obstacles=(*environment.obstacles, pillar))
 
 
-def build_presenter(*controllers: ControllerChoice, folder: Path = Path(), **changes) -> Presenter:
+def build_presenter(
+    *controllers: ControllerChoice, folder: Path = Path(), draft_folder: Path | None = None, **changes
+) -> Presenter:
     """Build a presenter of a session in the hall, which is paused at time 0."""
     session = start_session(*controllers, **changes)
-    return Presenter(session, Costs(LATTICE, direct=True), {"cells", "robots"}, folder, "hall")
+    costs = Costs(LATTICE, direct=True)
+    return Presenter(session, costs, {"cells", "robots"}, folder, "hall", draft_folder=draft_folder)

@@ -167,16 +167,21 @@ class Autosaver:
             )
             return self._pending is None and not self._is_writing and not self.problem
 
-    def close(self, *, discard: bool) -> None:
+    def close(self, *, discard: bool) -> bool:
         """Stop saving drafts, and unlock the draft folder.
 
         Parameters
         ----------
         discard : bool
             True to remove the draft. False to keep it, so that it is offered at the next start.
+
+        Returns
+        -------
+        bool
+            Whether there is a draft to recover.
         """
         if self._folder is None:
-            return
+            return False
         with self._changed:
             self._is_closed = True
             if discard:
@@ -185,7 +190,8 @@ class Autosaver:
         self._thread.join()
         with _open_savers_lock:
             _open_savers.remove(self)
-        if discard or not self._has_draft:
+        keeps_draft = self._has_draft and not discard
+        if not keeps_draft:
             with suppress(OSError):
                 (self._folder / _FILE_NAME).unlink()
             # Some systems cannot remove open files, so the lock file is closed first.
@@ -193,6 +199,7 @@ class Autosaver:
             remove_draft(self._folder)
         self._lock.close()
         self._folder = None
+        return keeps_draft
 
     def _create_folder(self, parent: Path) -> Path | None:
         """Create and lock a draft folder; return None and set `problem` if that fails."""
@@ -258,7 +265,7 @@ class Autosaver:
             "format": self._kind,
             "version": 1,
             "path": encoded_path,
-            "when": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "when": datetime.now().astimezone().isoformat(timespec="milliseconds"),
         }
         if draft.build_content is not None:
             record |= draft.build_content()

@@ -11,14 +11,16 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import Driver, open_viewer
-from sample_sessions import advance_session, start_session
+from sample_sessions import HALL, advance_session, start_session
 
 from robocov.errors import InputError, MapError
+from robocov.mapfile import save_map
 from robocov_app.cli import main
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.viewer.lessons import player
 from robocov_app.viewer.lessons.player import BASE_LAYERS, check_lesson, load_lesson
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session
+from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
 
 LAYERS = {layer.name for layer in (*build_standard_layers(), *build_pane_layers())}
@@ -210,6 +212,104 @@ def test_an_own_lesson_can_be_played_again(tmp_path: Path) -> None:
         lesson = driver.window.lesson.player
         assert lesson is not None
         assert lesson.lesson.title == "Two"
+
+
+def test_a_session_before_a_lesson_is_set_aside(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        session = driver.session
+        session.fail_robot(3)
+        driver.press_key("f2")
+        assert driver.viewer.message == "Your session is set aside. It returns when the lesson ends."
+        driver.press_key("escape")
+        assert driver.viewer.message == "The lesson has ended; your session from before is back"
+        assert driver.session is session
+
+
+def test_edits_after_taking_over_from_a_lesson_can_be_recovered(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.viewer.files.draft_folder = tmp_path / "drafts"
+        driver.press_key("f2")
+        driver.press_key("f2")
+        driver.session.fail_robot(3)
+        driver.press_key("f2")
+        hint = "What you have changed is kept: Ctrl+Shift+O opens it."
+        assert driver.viewer.message == hint
+        driver.press_key("f2")
+        driver.session.fail_robot(4)
+        driver.press_key("escape")
+        assert driver.viewer.message.endswith(hint)
+        driver.press_key("ctrl+shift+o")
+        assert driver.session.displayed.numbers == (1, 2, 3, 5, 6)
+        driver.viewer.files.workspace.close()
+
+
+def test_edits_that_a_lesson_asks_for_leave_no_draft(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.viewer.files.draft_folder = tmp_path / "drafts"
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        driver.session.place_robot(1, (1.0, 1.0))
+        driver.run_frames(2)
+        driver.press_key("escape")
+        assert find_recoverable_drafts(tmp_path / "drafts") == ()
+
+
+@pytest.mark.parametrize("is_left", [False, True])
+def test_opening_a_file_ends_the_lesson(tmp_path: Path, is_left: bool) -> None:
+    with open_viewer(tmp_path) as driver:
+        path = tmp_path / "own.robocov"
+        driver.session.fail_robot(3)
+        driver.viewer.files.save_session(path)
+        session = driver.session
+        driver.press_key("f2")
+        if is_left:
+            driver.press_key("f2")
+        driver.post(pygame.DROPFILE, file=str(path))
+        driver.settle()
+        assert driver.window.lesson.player is None
+        opened = driver.session
+        assert opened is not session
+        driver.press_key("escape")
+        assert driver.session is opened
+        driver.press_key("f2")
+        save_map(HALL, tmp_path / "hall.json")
+        driver.post(pygame.DROPFILE, file=str(tmp_path / "hall.json"))
+        driver.settle()
+        assert driver.window.lesson.player is None
+        assert driver.session is opened
+        assert driver.viewer.message.startswith("Map opened")
+
+
+def test_a_file_that_cannot_be_opened_does_not_end_the_lesson(tmp_path: Path) -> None:
+    path = tmp_path / "broken.json"
+    path.write_text("{}")
+    with open_viewer(tmp_path) as driver:
+        driver.press_key("f2")
+        driver.post(pygame.DROPFILE, file=str(path))
+        driver.settle()
+        assert driver.viewer.has_error_message
+        assert driver.window.lesson.player is not None
+
+
+def test_a_lesson_that_is_opened_is_played_by_f2_and_saved_with_its_chapters(tmp_path: Path) -> None:
+    path = write_short_lesson(tmp_path)
+    chapters = json.loads(path.read_text())["lesson"]
+    with open_viewer(tmp_path) as driver:
+        driver.viewer.files.open_file(path)
+        assert driver.viewer.message == f"Session opened: {path}. F2 plays its lesson."
+        driver.session.add_robot((1.0, 1.0))
+        driver.press_key("ctrl+s")
+        assert json.loads(path.read_text())["lesson"] == chapters
+        driver.press_key("f2")
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        assert lesson.lesson.title == "Two"
+
+
+def test_chapters_on_bundled_maps_have_their_names(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.press_key("f2")
+        assert driver.viewer.files.map_name == "rooms"
+        assert driver.viewer.files.title == "Rooms • robocov"
 
 
 def test_an_own_lesson_becomes_a_video(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -11,6 +11,7 @@ from driven_window import open_viewer
 from sample_sessions import advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
+from robocov.mapfile import load_map
 from robocov_app.viewer.session.files.workspace import (
     DRAFT_KIND,
     SessionWorkspace,
@@ -155,3 +156,28 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         assert "robot 2 failed" in driver.viewer.message
         assert driver.session.timeline.head.number == node
         assert driver.session.displayed.numbers == (1, 3)
+
+
+def test_a_session_that_another_one_replaces_can_be_recovered(tmp_path: Path) -> None:
+    viewer = build_presenter(folder=tmp_path, draft_folder=tmp_path / "drafts")
+    other = tmp_path / "other.robocov"
+    viewer.files.save_session(other)
+    viewer.session.fail_robot(2)
+    viewer.files.open_session(other)
+    assert viewer.message.endswith("Your unsaved session is kept: Ctrl+Shift+O opens it.")
+    assert viewer.session.displayed.numbers == (1, 2, 3)
+    viewer.session.fail_robot(3)
+    message = viewer.files.recover()
+    assert viewer.session.displayed.numbers == (1, 3)
+    assert message.endswith("Your unsaved session is kept: Ctrl+Shift+O opens it.")
+    viewer.files.recover()
+    assert viewer.session.displayed.numbers == (1, 2)
+    viewer.files.workspace.close()
+
+
+def test_the_title_is_the_name_of_the_map_for_people(tmp_path: Path) -> None:
+    viewer = build_presenter(environment=load_map("rooms"))
+    viewer.files.map_name = "rooms"
+    assert viewer.files.title == "Rooms • robocov"
+    viewer.files.map_name = "folder/hall-2.json"
+    assert viewer.files.title == "hall-2.json • robocov"

@@ -1,9 +1,10 @@
 """Actions on files: maps, sessions and drafts of the viewer."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from robocov.environment import Environment
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
@@ -20,6 +21,11 @@ from robocov_app.viewer.session.files.workspace import (
 from robocov_app.viewer.session.session import Session
 
 MAX_RECENT_FILES = 9
+_DRAFT_HINT = "Your unsaved session is kept: Ctrl+Shift+O opens it."
+
+
+def _do_nothing() -> None:
+    pass
 
 
 class FileActions:
@@ -42,10 +48,14 @@ class FileActions:
     ----------
     folder : Path
         Folder in which files are saved.
+    draft_folder : Path or None
+        Folder for drafts of unsaved work; None to keep no drafts.
     recent : list of str
         Paths of the sessions used recently, newest first.
     workspace : SessionWorkspace
         File and drafts of the open session.
+    before_opening : callable
+        Called before a session or a map is opened from a file; it ends a lesson.
     """
 
     def __init__(
@@ -59,10 +69,11 @@ class FileActions:
     ) -> None:
         """Start with the open session of the viewer."""
         self.folder = folder
+        self.draft_folder = draft_folder
         self.recent: list[str] = []
         self.workspace = SessionWorkspace(viewer.session, draft_folder, file)
+        self.before_opening: Callable[[], object] = _do_nothing
         self._viewer = viewer
-        self._draft_folder = draft_folder
         self._map_names = {viewer.session.displayed.environment.name: map_name}
 
     @property
@@ -76,13 +87,21 @@ class FileActions:
         self._map_names[self._viewer.session.displayed.environment.name] = name
 
     @property
+    def map_title(self) -> str:
+        """Name of the displayed map for people: the name of its file, or of a bundled map, as in “Rooms”."""
+        path = Path(self.map_name)
+        if path.suffix:
+            return path.name
+        return self._viewer.session.displayed.environment.name
+
+    @property
     def title(self) -> str:
         """Title of the window: the file of the session, or the map while it has none, and the program.
 
         A dot marks a file that lacks the latest edits.
         """
         file = self.workspace.path
-        name = Path(self.map_name).name if file is None else file.name
+        name = self.map_title if file is None else file.name
         if not name:
             return "robocov"
         if file is not None and self.workspace.has_unsaved_edits:
@@ -110,7 +129,11 @@ class FileActions:
         StartError
             If it has no space for the team.
         """
-        self._viewer.session.restart(environment=load_map(name))
+        self._restart_on_map(load_map(name), name)
+
+    def _restart_on_map(self, environment: Environment, name: str) -> None:
+        """Restart on a map with the given bundled name or path."""
+        self._viewer.session.restart(environment=environment)
         self.map_name = name
 
     def open_next_map(self, steps: int) -> None:
@@ -182,38 +205,60 @@ class FileActions:
                 f"{path}: expected a session ({SUFFIX}) or a map (.json). robocov edit imports other formats."
             )
         else:
-            self.open_map(str(path))
+            # A file that cannot be read must not end a lesson.
+            environment = load_map(str(path))
+            self.before_opening()
+            self._restart_on_map(environment, str(path))
             self._viewer.show_message(f"map opened: {path}")
 
     def open_session(self, path: Path) -> None:
         """Open a session file in place of the current session."""
         saved = load_session(path, self._viewer.controllers)
         seconds = self._viewer.session.playback.seek_seconds
-        workspace = SessionWorkspace(Session.open(saved, seconds), self._draft_folder, path)
-        self._replace_workspace(workspace, saved.view)
+        workspace = SessionWorkspace(Session.open(saved, seconds), self.draft_folder, path)
+        keeps_draft = self._replace_workspace(workspace, saved.view)
         self._add_recent(path)
-        self._viewer.show_message(f"session opened: {path}")
+        hints: list[str] = []
+        if saved.lesson is not None:
+            hints.append("F2 plays its lesson.")
+        if keeps_draft:
+            hints.append(_DRAFT_HINT)
+        message = f"session opened: {path}"
+        if hints:
+            message += f". {' '.join(hints)}"
+        self._viewer.show_message(message)
 
     def recover(self, draft: Draft | None = None) -> str:
         """Resume unsaved work of an earlier window, by default the newest; return a message."""
         if draft is None:
-            drafts = find_recoverable_drafts(self._draft_folder)
+            drafts = find_recoverable_drafts(self.draft_folder)
             if not drafts:
                 return "no unsaved work was found"
             draft = drafts[0]
         seconds = self._viewer.session.playback.seek_seconds
-        workspace, view = recover_draft(draft, self._viewer.controllers, self._draft_folder, seconds)
-        self._replace_workspace(workspace, view)
-        return f"recovered: {describe_draft(draft)}"
+        workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seconds)
+        keeps_draft = self._replace_workspace(workspace, view)
+        message = f"recovered: {describe_draft(draft)}"
+        if keeps_draft:
+            message += f". {_DRAFT_HINT}"
+        return message
 
     def _add_recent(self, path: Path) -> None:
         name = str(path.absolute())
         others = [recent for recent in self.recent if recent != name]
         self.recent = [name, *others][:MAX_RECENT_FILES]
 
-    def _replace_workspace(self, workspace: SessionWorkspace, view: Mapping[str, Any]) -> None:
-        """Show the session of another workspace, with the map name and the layers in `view`."""
-        self.workspace.close()
+    def _replace_workspace(self, workspace: SessionWorkspace, view: Mapping[str, Any]) -> bool:
+        """Show the session of another workspace, with the map name and the layers in `view`.
+
+        Returns
+        -------
+        bool
+            Whether the session before it can be recovered from a draft, because it has unsaved edits.
+        """
+        self.before_opening()
+        self.workspace.save_draft(self.view, at_once=True)
+        keeps_draft = self.workspace.close()
         self.workspace = workspace
         self._viewer.inspection.selected = None
         self._viewer.show_session(workspace.session)
@@ -226,3 +271,4 @@ class FileActions:
         layers = view.get("shown")
         if isinstance(layers, list):
             self._viewer.view.layers = set(map(str, layers))
+        return keeps_draft

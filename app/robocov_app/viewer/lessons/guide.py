@@ -29,6 +29,9 @@ COMMANDS_WITHIN_LESSON = frozenset(
         "zoom:out",
         "plot",
         "tour",
+        "open:file",
+        "open",
+        "recover",
     }
 )
 """Commands after which the lesson continues; with any other command, the user takes over."""
@@ -104,13 +107,21 @@ class LessonGuide:
         self.player = LessonPlayer(self._viewer, self._fit_view, saved, is_unattended=self.is_unattended)
 
     def toggle(self) -> None:
-        """Leave the lesson or return to it; if none is open, start the last one, or the first lesson."""
+        """Leave the lesson or return to it; if none is open, start that of the open file or the last one."""
         if self.player is None:
-            self.start(self._path)
+            self.start(self._find_file())
         elif self.player.state is LessonState.LEFT:
             self.player.skip(0)
         else:
             self.player.leave(during_task=True)
+
+    def _find_file(self) -> Path:
+        """Return the file of the open session if it is a lesson, or else that of the last lesson."""
+        file = self._viewer.files.workspace.path
+        is_lesson = self._viewer.session.timeline.document.lesson is not None
+        if is_lesson and file is not None:
+            return file
+        return self._path
 
     def leave(self) -> None:
         """Let the user take over from the lesson."""

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
+from robocov_app.viewer.lessons.session_before import SessionBefore
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.files.maps import find_bundled_name
 from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, QuestionModel, TaskModel
 from robocov_app.viewer.session.files.session_file import SavedSession, load_session
 from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.tools.tool import ViewerTool
 
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # bundled with robocov
 READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
@@ -20,6 +21,7 @@ READING_S_PER_WORD = 0.25
 _CHAPTER_CHANGE_S = 0.5  # real time between two chapters, as a margin of the duration
 MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
 STEPS_PER_SECOND = 60
+_DRAFT_HINT = "What you have changed is kept: Ctrl+Shift+O opens it."
 BASE_LAYERS = frozenset(
     {
         "cells",
@@ -123,18 +125,6 @@ def _is_robot_in_place(condition: ConditionModel, session: Session, robot: int) 
     return condition.outside is not None and not is_within(condition.outside)
 
 
-@dataclass(frozen=True)
-class _ViewerBefore:
-    """State of the viewer before a lesson, which is restored at its end."""
-
-    workspace: SessionWorkspace
-    map_name: str
-    layers: set[str]
-    tool: ViewerTool
-    active_pane: int
-    selected: int | None
-
-
 class LessonPlayer:
     """Plays the chapters of a lesson, and at the end restores the session from before the lesson.
 
@@ -192,16 +182,11 @@ class LessonPlayer:
         self._viewer = viewer
         self._fit_view = fit_view
         self._waited_s = 0.0  # real time since the current state was entered
-        self._workspace = SessionWorkspace(self.session, None)
-        self._before = _ViewerBefore(
-            workspace=viewer.files.workspace,
-            map_name=viewer.files.map_name,
-            layers=viewer.view.layers,
-            tool=viewer.tool,
-            active_pane=viewer.inspection.active_pane,
-            selected=viewer.inspection.selected,
-        )
-        self._start_chapter(0)
+        self._workspace = SessionWorkspace(self.session, viewer.files.draft_folder)
+        self._before = SessionBefore(viewer)
+        self.go_to(0)
+        if self._before.has_work:
+            viewer.show_message("Your session is set aside. It returns when the lesson ends.")
 
     @property
     def chapter(self) -> ChapterModel:
@@ -376,7 +361,7 @@ class LessonPlayer:
         else:
             number = self.number + chapters
         if number <= last:
-            self._start_chapter(max(number, 0))
+            self.go_to(max(number, 0))
         elif self.state is LessonState.CLOSING or self.is_unattended:
             self.end()
         else:
@@ -384,30 +369,34 @@ class LessonPlayer:
             self.session.playback.is_playing = False
             self._enter_state(LessonState.CLOSING)
 
-    def go_to(self, number: int) -> None:
-        """Start a chapter, by its index."""
-        self._start_chapter(number)
-
     def leave(self, *, during_task: bool = False) -> None:
         """Let the user take over; during a task only if `during_task`."""
         if during_task or self.state is not LessonState.TASK:
+            if self.state is not LessonState.LEFT:
+                self._workspace.ignore_edits()
             self._enter_state(LessonState.LEFT)
+
+    def _close_workspace(self) -> bool:
+        """Keep a draft of what the user has edited after taking over; return whether there is one.
+
+        Edits during the lesson, such as those of its tasks, are not kept.
+        """
+        if self.state is LessonState.LEFT:
+            self._workspace.save_draft(self._viewer.files.view, at_once=True)
+        else:
+            self._workspace.ignore_edits()
+        return self._workspace.close()
 
     def end(self) -> None:
         """End the lesson, and restore the session from before it."""
         viewer = self._viewer
-        before = self._before
-        self._workspace.close()
-        viewer.files.workspace = before.workspace
-        viewer.view.layers = before.layers
-        viewer.toolbox.current = before.tool
-        viewer.inspection.active_pane = before.active_pane
-        viewer.show_session(before.workspace.session)
-        viewer.files.map_name = before.map_name
-        viewer.inspection.selected = before.selected
+        keeps_draft = self._close_workspace()
+        self._before.restore()
         message = "the lesson has ended; F2 plays it again"
-        if before.workspace.session.timeline.end_time > 0.0:
+        if self._before.has_work:
             message = "the lesson has ended; your session from before is back"
+        if keeps_draft:
+            message += f". {_DRAFT_HINT}"
         viewer.show_message(message)
         self._fit_view()
         self.is_done = True
@@ -426,25 +415,32 @@ class LessonPlayer:
         self.is_held = False
         self._viewer.revision += 1
 
-    def _start_chapter(self, number: int) -> None:
-        """Show the start of a chapter: its session, layers and selected robot; ask its question."""
+    def go_to(self, number: int) -> None:
+        """Show the start of a chapter, by its index: session, layers and selected robot; ask its question."""
         self.number = number
         self.answer = None
         chapter = self.chapter
         viewer = self._viewer
         session = self.session
+        keeps_draft = False
+        if self.state is LessonState.LEFT:
+            keeps_draft = self._close_workspace()
+            self._workspace = SessionWorkspace(session, viewer.files.draft_folder)
         _go_to_start(session, chapter)
         session.playback.is_playing = chapter.question is None
         session.playback.stop_when_settled = False
         session.playback.clock.speed = chapter.speed
         viewer.files.workspace = self._workspace
         viewer.show_session(session)
-        viewer.files.map_name = session.displayed.environment.name
+        environment = session.displayed.environment
+        viewer.files.map_name = find_bundled_name(environment) or environment.name
         viewer.toolbox.current = viewer.toolbox.hand
         viewer.inspection.active_pane = 0
         viewer.inspection.selected = chapter.robot
         viewer.view.layers = set(BASE_LAYERS | check_layer_names("show", chapter.show))
         viewer.clear_message()
+        if keeps_draft:
+            viewer.show_message(_DRAFT_HINT)
         self._fit_view()
         if chapter.question is None:
             self._enter_state(LessonState.PLAYING)

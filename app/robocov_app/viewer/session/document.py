@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from operator import attrgetter
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session.editing.edits import RemovePane, Restart, SessionEdit, SetController
@@ -20,6 +20,9 @@ from robocov_app.viewer.session.past.states import RunState
 from robocov_app.viewer.session.past.trails import TrailSection
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.scenario import SessionScenario
+
+if TYPE_CHECKING:
+    from robocov_app.viewer.session.files.models import LessonModel
 
 MAX_CACHED_STATES = 160
 """Maximum number of states that a node keeps while another branch is displayed."""
@@ -160,15 +163,20 @@ class SessionDocument:
     ----------
     nodes : list of Node
         The nodes.
+    lesson : LessonModel or None
+        The chapters, if the session is a lesson.
 
     Attributes
     ----------
+    lesson : LessonModel or None
+        The chapters, if the session is a lesson.
     revision : int
         Number of edits that were made since the document was opened.
     """
 
-    def __init__(self, nodes: list[Node]) -> None:
+    def __init__(self, nodes: list[Node], lesson: "LessonModel | None" = None) -> None:
         self.nodes = nodes
+        self.lesson = lesson
         self.revision = 0
 
     @classmethod

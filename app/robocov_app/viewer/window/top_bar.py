@@ -64,7 +64,7 @@ class TopBar(CommandBar):
         """Return the file of the session; without one, the name of the map."""
         files = self._viewer.files
         path = files.workspace.path
-        name = Path(files.map_name).stem if path is None else path.name
+        name = Path(files.map_title).stem if path is None else path.name
         location = "This session has no file yet"
         if path is not None:
             location = self._viewer.shorten_paths(str(path))

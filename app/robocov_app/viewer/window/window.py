@@ -136,6 +136,7 @@ class ViewerWindow(CommandWindow):
         self.canvas.camera.is_animated = not is_unattended
         self.chart = Chart(viewer)
         self.lesson = LessonGuide(viewer, self.canvas.camera.fit, is_unattended=is_unattended)
+        viewer.files.before_opening = self.lesson.end
         titles = {layer.name: layer.title for layer in build_standard_layers()}
         self.share = ShareActions(viewer, lambda: self.remote)
         window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())

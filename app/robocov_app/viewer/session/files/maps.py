@@ -124,6 +124,11 @@ class FileContext:
         return environment
 
 
+def find_bundled_name(environment: Environment) -> str | None:
+    """Return the name under which a map is bundled; None if it is not bundled."""
+    return _build_map_content(environment).get("bundled")
+
+
 @lru_cache(maxsize=8)
 def _build_map_content(environment: Environment) -> dict[str, Any]:
     """Return the representation of a map in session files."""

@@ -59,15 +59,17 @@ class SavedSession:
         The present step.
     view : mapping
         Displayed layers and theme.
-    lesson : LessonModel or None
-        The chapters, if the session is a lesson.
     """
 
     document: SessionDocument
     head: Node
     step: int
     view: Mapping[str, Any] = field(default_factory=dict)
-    lesson: LessonModel | None = None
+
+    @property
+    def lesson(self) -> LessonModel | None:
+        """The chapters, if the session is a lesson."""
+        return self.document.lesson
 
 
 def save_session(
@@ -115,7 +117,7 @@ def build_session_content(
 
     context = FileContext()
     nodes = [_build_node_content(node, context) for node in document.nodes]
-    return {
+    content = {
         "format": FORMAT,
         "version": VERSION,
         "robocov": __version__,
@@ -125,6 +127,9 @@ def build_session_content(
         "step": step,
         "view": dict(view),
     }
+    if document.lesson is not None:
+        content["lesson"] = document.lesson.model_dump(mode="json", exclude_unset=True)
+    return content
 
 
 def _build_node_content(node: Node, context: FileContext) -> dict[str, Any]:
@@ -229,7 +234,7 @@ def parse_session(content: Any, source_name: str, controllers: Collection[str] =
         refuse_value(source_name, ("step",), model.step, expected)
     if model.lesson is not None:
         check_lesson_references(model.lesson, source_name, nodes)
-    return SavedSession(SessionDocument(nodes), head, model.step, model.view, model.lesson)
+    return SavedSession(SessionDocument(nodes, model.lesson), head, model.step, model.view)
 
 
 class _NodeReader:

@@ -120,9 +120,19 @@ class SessionWorkspace:
         self._autosaver.mark_saved(target)
         return target
 
-    def close(self) -> None:
-        """Stop saving drafts. The last draft is kept if there are unsaved edits."""
-        self._autosaver.close(discard=not self.has_unsaved_edits)
+    def ignore_edits(self) -> None:
+        """Treat all edits so far as if they were saved, such as those that a lesson asks for."""
+        self._saved_revision = self.session.timeline.document.revision
+
+    def close(self) -> bool:
+        """Stop saving drafts.
+
+        Returns
+        -------
+        bool
+            Whether a draft can be recovered, because there are unsaved edits.
+        """
+        return self._autosaver.close(discard=not self.has_unsaved_edits)
 
 
 def find_recoverable_drafts(folder: Path | None) -> tuple[autosave.Draft, ...]:
