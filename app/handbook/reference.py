@@ -25,9 +25,9 @@ from robocov.mapfile import build_map_schema, load_map
 from robocov.metrics.run_metrics import COLUMNS
 from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
+from robocov_app.docstrings import parse_attributes
 from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.sweep.study.gains import NO_LIMIT
-from robocov_app.sweep.study.parameters import TEAM_PARAMETERS, UNITS
 from robocov_app.sweep.study.study_file import list_study_keys
 from robocov_app.sweep.table import RESULT_COLUMNS
 from robocov_app.toolkit.commands.command import Command
@@ -66,46 +66,6 @@ OTHER_NAMES = {
     ),
 }
 """Names outside the top level, by heading, that the handbook imports or that public functions return."""
-
-STUDY_MEANINGS = {
-    "maps": 'Names of bundled maps, or paths relative to this file; `"*"` for all bundled maps',
-    "controllers": "Names of controllers, or `mine.py:MyController`",
-    "robots": "Number of robots (default: 6)",
-    "starts": 'Names of starts; `"*"` for all starts of each map (default: the first one)',
-    "seeds": "Seeds of the starting positions and conditions: a list, or 10 for 0 to 9 (default: seed 0)",
-    "duration": "Simulated time, s (default: 60)",
-    "dt": "Control period, s (default: 1/60)",
-    "cost_hz": "Evaluations of the cost per second; 0 for the first and last step only (default: 2)",
-    "record_hz": "Saved samples per second; 0 for the first and last step only (default: 5)",
-    "lattice": "Number of sites along each side of the map at which the cost is computed (default: 64)",
-    "metrics": "Whether the table contains the [metrics](metrics.md) of the record",
-    "max_runs": "Maximum number of runs; larger studies are rejected (default: 100,000)",
-    "team": "Parameters of the robots",
-    "team.kinematics": "`point` or `unicycle`",
-    "team.track_width": "Distance between the wheels of a unicycle, m",
-    "team.turning_rate": "Maximum turning rate of a unicycle, rad/s",
-    "team.group": "Groups of robots, [as in a team file](../teams.md#robots-with-different-properties)",
-    "conditions": "[Conditions](../teams.md#message-loss-and-noise)",
-    "conditions.loss": "Probability that a message is lost",
-    "conditions.delay": "Message latency, s",
-    "conditions.message_rate": "Messages per second that each robot sends (default: one in every step)",
-    "conditions.bandwidth": "Bytes per second that each robot can send (default: unlimited)",
-    "conditions.forget_after": "Time without messages after which a robot is forgotten, s",
-    "conditions.position_noise": "Standard deviation of the localization noise, m",
-    "conditions.sensing_noise": "Standard deviation of the noise of the range sensor, m",
-    "conditions.failure_rate": "Failures per second of each robot",
-    "conditions.fail": "Failures, as in `3@20 5@40`",
-    "conditions.join": "Late robots, as in `6@30:2.5,1`",
-    "conditions.density": "`known`, or `sensed` if robots have to measure the density (default: known)",
-    "gains": "Gains to try; all others have their defaults",
-    "gains.NAME": "Gains of a controller, by its name",
-    "gains.NAME.NAME": 'A gain; `{low = 3, high = 100, scale = "log"}` is a range to sample',
-    "sampling": "Sampling of all gains with a range",
-    "sampling.method": "Method of sampling",
-    "sampling.samples": "Number of samples of each controller's gains",
-    "sampling.seed": "Seed of the samples (default: 0)",
-}
-"""Meanings of the keys of study files. Other parameters of the robots are described by name and unit."""
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -262,21 +222,13 @@ def build_formats_page() -> str:
     text += (
         "\n## Studies\n\n[A sweep](../sweeps.md) reads these keys. A list means that each value is tried. "
     )
-    text += f'"{NO_LIMIT}" means no limit.\n\n'
-    meanings = build_study_meanings()
-    rows = []
-    for key, value in list_study_keys().items():
-        rows.append((f"`{key}`", escape_cell(meanings[key]), escape_cell(value)))
+    text += f'"{NO_LIMIT}" means no limit. '
+    text += "More about [groups of robots](../teams.md#robots-with-different-properties), "
+    text += "[conditions](../teams.md#message-loss-and-noise) and [metrics](metrics.md).\n\n"
+    rows = [
+        (f"`{key.name}`", escape_cell(key.meaning), escape_cell(key.expected)) for key in list_study_keys()
+    ]
     return text + build_table(("key", "meaning", "value"), rows)
-
-
-def build_study_meanings() -> dict[str, str]:
-    """Return the meaning of each key of study files."""
-    meanings = dict(STUDY_MEANINGS)
-    for name in TEAM_PARAMETERS:
-        label = name.replace("max_", "maximum_").replace("_", " ").capitalize()
-        meanings[f"team.{name}"] = f"{label} of the robots, {UNITS[name]}"
-    return meanings
 
 
 def build_schema_tables(title: str, schema: Mapping[str, Any], described: Container[str] = ()) -> str:
@@ -326,20 +278,13 @@ def build_metrics_page() -> str:
     """Build the page with the columns of ``metrics.csv`` and of the table of a sweep."""
     text = "# Metrics\n\n## Along a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
     text += "Python the attributes of [RunMetrics](names.rst).\n\n"
-    meanings = read_attribute_docs(rc.RunMetrics)
+    meanings = parse_attributes(inspect.getdoc(rc.RunMetrics) or "")
     rows = [(f"`{column}`", escape_cell(meanings[name]), f"`{name}`") for name, column in COLUMNS.items()]
     text += build_table(("column", "meaning", "attribute"), rows)
     text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after those of the parameters. "
     text += "Most are also in `summary` of each `run.json`.\n\n"
     rows = [(f"`{column.name}`", column.unit, escape_cell(column.meaning)) for column in RESULT_COLUMNS]
     return text + build_table(("column", "unit", "meaning"), rows)
-
-
-def read_attribute_docs(kind: type) -> dict[str, str]:
-    """Return the descriptions of attributes by name, from the section Attributes of a class docstring."""
-    _, _, section = inspect.getdoc(kind).partition("Attributes\n----------\n")  # type: ignore[union-attr]
-    pattern = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*(?:\n|$))*)", re.M)
-    return {name: " ".join(description.split()) for name, description in pattern.findall(section)}
 
 
 # Python names

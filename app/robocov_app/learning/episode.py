@@ -17,10 +17,10 @@ from robocov.record import Record
 from robocov.scenario import Scenario
 from robocov.simulation import Simulation, SimulationBatch
 from robocov.team import Team
-from robocov.typing import BoolArray, FloatArray
+from robocov.typing import BoolArray, Float32Array, FloatArray
 from robocov_app.learning.actions import check_actions
 from robocov_app.learning.motion import execute_actions
-from robocov_app.learning.observation_layout import Rows, normalize_positions
+from robocov_app.learning.observation_layout import normalize_positions
 from robocov_app.learning.rewards import compute_reference_distance, share_reward
 from robocov_app.learning.task import CoverageTask
 
@@ -91,7 +91,7 @@ class SharedSimulation:
         self._joint_team = Team.concatenate([task.whole_team] * count)
         self._simulation: SimulationBatch | None = None
         self._observed: Observations | None = None
-        self._rows: Rows = np.empty((0, 0, 0), dtype=np.float32)
+        self._rows: Float32Array = np.empty((0, 0, 0), dtype=np.float32)
 
     def start_episode(self, run: int, positions: FloatArray) -> SimulationBatch:
         """Start an episode, and return the simulation of all episodes.
@@ -146,7 +146,7 @@ class SharedSimulation:
             )
         return outcomes
 
-    def build_rows(self) -> Rows:
+    def build_rows(self) -> Float32Array:
         """Return the current observation rows of all episodes, (count, n, size)."""
         assert self._simulation is not None
         observations = self._simulation.observe()
@@ -253,7 +253,7 @@ class Episode:
         """Number of finished actions."""
         return len(self.trail) - 1
 
-    def build_rows(self) -> Rows:
+    def build_rows(self) -> Float32Array:
         """Return the current observations for learners, one row for each robot, (n, size)."""
         if self.shared is not None:
             return self.shared.build_rows()[self._index]
@@ -272,7 +272,7 @@ class Episode:
             return self.simulation.observe_and_decide()
         return Snapshot(self.observe(), Decision(np.zeros_like(self.positions)))
 
-    def build_state(self) -> Rows:
+    def build_state(self) -> Float32Array:
         """Return the normalized positions and velocities of all robots, (4 n,) from -1 to 1.
 
         Each robot has four values: its position from the center of the region's bounding box, divided by the
@@ -280,7 +280,7 @@ class Episode:
         """
         positions = normalize_positions(self.positions, self.environment.region)
         velocities = self.simulation.velocities[self._index] / self.team.max_speed[:, None]
-        rows: Rows = np.clip(np.column_stack([positions, velocities]), -1.0, 1.0).astype(np.float32)
+        rows: Float32Array = np.clip(np.column_stack([positions, velocities]), -1.0, 1.0).astype(np.float32)
         return rows.ravel()
 
     def summarize(self) -> dict[str, float]:

@@ -18,7 +18,6 @@ from robocov_app.learning.actions import check_actions, compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
 from robocov_app.learning.episode import ActionOutcome, SharedRun, SharedSimulation
 from robocov_app.learning.maps import MapSampler
-from robocov_app.learning.observation_layout import Rows
 from robocov_app.learning.task import CoverageTask, change_task
 
 ID = "robocov/Coverage-v0"
@@ -92,7 +91,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Rows, dict[str, Any]]:
+    ) -> tuple[Float32Array, dict[str, Any]]:
         """Start an episode.
 
         Parameters
@@ -114,7 +113,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         info = self._build_info(np.zeros(self.task.robots))
         return self._build_rows(), {**info, "map": self.episode.environment.name}
 
-    def step(self, action: Any) -> tuple[Rows, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Float32Array, float, bool, bool, dict[str, Any]]:
         """Execute the actions of the team.
 
         Parameters
@@ -139,7 +138,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         info = self._build_info(outcome.contact_time)
         return self._build_rows(), reward, is_terminated, is_truncated, info
 
-    def _build_rows(self) -> Rows:
+    def _build_rows(self) -> Float32Array:
         episode = self._get_episode()
         rows = episode.build_rows()
         rows[~episode.working] = 0.0

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TypeAlias
 
 import numpy as np
 
@@ -15,8 +14,6 @@ from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.typing import Float32Array, FloatArray, IntArray
 
-Rows: TypeAlias = Float32Array
-"""(n, size): one row for each robot."""
 MAX_NEIGHBORS = 1000
 """Maximum number of neighbors in a row."""
 _MAX_NEIGHBOR_DIAMETERS = 4.0
@@ -118,7 +115,7 @@ class ObservationLayout:
         return _FIXED_SIZE + _NEIGHBOR_SIZE * self.neighbors + self.rays + self._centroid_size
 
     @property
-    def bounds(self) -> tuple[Rows, Rows]:
+    def bounds(self) -> tuple[Float32Array, Float32Array]:
         """Lowest and highest possible values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
         first_ray = _FIXED_SIZE + _NEIGHBOR_SIZE * self.neighbors
@@ -127,7 +124,7 @@ class ObservationLayout:
         low[first_ray : first_ray + self.rays] = 0.0
         return low, np.ones(self.size, dtype=np.float32)
 
-    def build_rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
+    def build_rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Float32Array:
         """Build the observation rows of all robots.
 
         Parameters

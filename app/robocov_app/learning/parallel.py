@@ -11,16 +11,15 @@ from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
 from robocov.errors import ParameterError, quote
-from robocov.typing import FloatArray
+from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
-from robocov_app.learning.observation_layout import Rows
 from robocov_app.learning.task import CoverageTask
 
 _Value = TypeVar("_Value")
 Flags: TypeAlias = dict[str, bool]
 """One flag for each agent."""
-Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
+Step: TypeAlias = tuple[dict[str, Float32Array], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
 """Observations, rewards, terminations, truncations and infos by agent."""
 
 
@@ -123,7 +122,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[dict[str, Rows], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, Float32Array], dict[str, dict[str, Any]]]:
         """Start an episode.
 
         Parameters
@@ -198,7 +197,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
             checked[robot] = action
         return checked
 
-    def state(self) -> Rows:
+    def state(self) -> Float32Array:
         """Return positions and velocities of all robots, for a central critic; see `Episode.build_state`."""
         return self._get_episode().build_state()
 

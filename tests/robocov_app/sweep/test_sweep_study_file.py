@@ -9,8 +9,13 @@ from swept import HALL, write_controller
 
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, save_map
-from robocov_app.sweep.study.parameters import build_swept_team
-from robocov_app.sweep.study.study_file import read_study
+from robocov_app.sweep.study.parameters import (
+    CONDITIONS,
+    KINEMATIC_DEFAULTS,
+    TEAM_PARAMETERS,
+    build_swept_team,
+)
+from robocov_app.sweep.study.study_file import list_study_keys, read_study
 
 STUDY = """
 maps = ["rooms", "plans/hall.json"]
@@ -443,3 +448,11 @@ def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
     path.write_text("#" * 4_000_001)
     with pytest.raises(InputError, match="expected at most 4 MB of TOML, got more"):
         read_study(path)
+
+
+def test_the_schema_has_every_parameter_that_a_study_may_vary() -> None:
+    names = [key.name for key in list_study_keys()]
+    for name in (*TEAM_PARAMETERS, *KINEMATIC_DEFAULTS):
+        assert f"team.{name}" in names
+    for name in CONDITIONS:
+        assert f"conditions.{name}" in names

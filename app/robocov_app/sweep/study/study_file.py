@@ -15,7 +15,6 @@ from robocov.errors import InputError, JsonPath, describe_unknown_name, format_p
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.sweep.study.gains import NO_LIMIT
-from robocov_app.sweep.study.parameters import CONDITIONS, KINEMATIC_DEFAULTS, TEAM_PARAMETERS
 from robocov_app.sweep.study.sampling import Range, Sampling, SamplingMethod, Scale
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.study.value_paths import require_distinct
@@ -49,10 +48,19 @@ class _TableSchema(NamedTuple):
 
     expected: str
     """Description of the table."""
-    keys: Mapping[str, _ValueSchema | _TableSchema]
-    """Schemas of the accepted keys."""
+    keys: Mapping[str, _Key]
+    """Descriptions of the accepted keys."""
     required: tuple[str, ...] = ()
     """Keys that the table must contain."""
+
+
+class _Key(NamedTuple):
+    """Description of a key of a table."""
+
+    meaning: str
+    """What the value sets, with its unit and its default; Markdown."""
+    schema: _ValueSchema | _TableSchema
+    """Schema of the value."""
 
 
 def _accept(*types: type, words: tuple[str, ...] = ()) -> _Converter:
@@ -91,40 +99,115 @@ _METHOD = _ValueSchema('"sobol", "latin-hypercube" or "halton"', _accept(words=g
 _TEXTS = _accept_list("a string, or a list of strings", _TEXT)
 _TEAM_PARAMETER = _accept_list("a number, or a list of numbers", _NUMBER_OR_NO_LIMIT)
 _CONDITION = _accept_list("a number or a string, or a list of them", _NUMBER_OR_TEXT)
+_RANGE = _TableSchema(
+    "a range {low, high}",
+    {
+        "low": _Key("Minimum", _NUMBER),
+        "high": _Key("Maximum", _NUMBER),
+        "scale": _Key("Scale on which samples are evenly spread (default: linear)", _SCALE),
+    },
+    required=("low", "high"),
+)
 _GAIN = _ValueSchema(
     "a number or a word, a list of them, or a range {low, high}",
     convert=_NUMBER_OR_TEXT.convert,
     item=_NUMBER_OR_TEXT._replace(expected=f'a number, "{NO_LIMIT}" for no limit, or a word'),
-    table=_TableSchema("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, required=("low", "high")),
+    table=_RANGE,
 )
 _GROUPS = _ValueSchema("tables [[team.group]]", item=_ValueSchema("a table", _accept(dict)))
-_TEAM_KEYS = {
-    **dict.fromkeys((*TEAM_PARAMETERS, *KINEMATIC_DEFAULTS), _TEAM_PARAMETER),
-    "kinematics": _TEXTS,
-    "group": _GROUPS,
-}
-_SAMPLING_KEYS = {"method": _METHOD, "samples": _WHOLE_NUMBER, "seed": _WHOLE_NUMBER}
+_SAMPLING = _TableSchema(
+    "a table [sampling]",
+    {
+        "method": _Key("Method of sampling", _METHOD),
+        "samples": _Key("Number of samples of each controller's gains", _WHOLE_NUMBER),
+        "seed": _Key("Seed of the samples (default: 0)", _WHOLE_NUMBER),
+    },
+    required=("method", "samples"),
+)
+_TEAM = _TableSchema(
+    "a table [team]",
+    {
+        "radius": _Key("Radius of the robots, m", _TEAM_PARAMETER),
+        "max_speed": _Key("Maximum speed of the robots, m/s", _TEAM_PARAMETER),
+        "max_acceleration": _Key("Maximum acceleration of the robots, m/s²", _TEAM_PARAMETER),
+        "viscosity": _Key("Viscosity of the robots, N s/m", _TEAM_PARAMETER),
+        "sensing_range": _Key("Sensing range of the robots, m", _TEAM_PARAMETER),
+        "communication_range": _Key("Communication range of the robots, m", _TEAM_PARAMETER),
+        "kinematics": _Key("`point` or `unicycle`", _TEXTS),
+        "track_width": _Key("Distance between the wheels of a unicycle, m", _TEAM_PARAMETER),
+        "turning_rate": _Key("Maximum turning rate of a unicycle, rad/s", _TEAM_PARAMETER),
+        "group": _Key("Groups of robots, as in a team file", _GROUPS),
+    },
+)
+_CONDITIONS = _TableSchema(
+    "a table [conditions]",
+    {
+        "loss": _Key("Probability that a message is lost", _CONDITION),
+        "delay": _Key("Message latency, s", _CONDITION),
+        "message_rate": _Key(
+            "Messages per second that each robot sends (default: one in every step)", _CONDITION
+        ),
+        "bandwidth": _Key("Bytes per second that each robot can send (default: unlimited)", _CONDITION),
+        "forget_after": _Key("Time without messages after which a robot is forgotten, s", _CONDITION),
+        "position_noise": _Key("Standard deviation of the localization noise, m", _CONDITION),
+        "sensing_noise": _Key("Standard deviation of the noise of the range sensor, m", _CONDITION),
+        "failure_rate": _Key("Failures per second of each robot", _CONDITION),
+        "fail": _Key("Failures, as in `3@20 5@40`", _CONDITION),
+        "join": _Key("Late robots, as in `6@30:2.5,1`", _CONDITION),
+        "density": _Key(
+            "`known`, or `sensed` if robots have to measure the density (default: known)", _CONDITION
+        ),
+    },
+)
+_CONTROLLER_GAINS = _TableSchema(
+    "a table of gains",
+    {_ANY_KEY: _Key('A gain; `{low = 3, high = 100, scale = "log"}` is a range to sample', _GAIN)},
+)
+_GAINS = _TableSchema(
+    "tables [gains.NAME]", {_ANY_KEY: _Key("Gains of a controller, by its name", _CONTROLLER_GAINS)}
+)
 _STUDY = _TableSchema(
     "a table",
     {
-        "maps": _accept_list("a list of names of maps, or of paths relative to this file", _TEXT),
-        "controllers": _accept_list("a list of controllers", _TEXT),
-        "robots": _accept_list("a whole number, or a list of whole numbers", _WHOLE_NUMBER),
-        "starts": _TEXTS,
-        "seeds": _accept_list("a number of seeds, or a list of seeds", _WHOLE_NUMBER),
-        "duration": _NUMBER,
-        "dt": _NUMBER,
-        "cost_hz": _NUMBER,
-        "record_hz": _NUMBER,
-        "lattice": _WHOLE_NUMBER,
-        "metrics": _ValueSchema("true or false", _accept(bool)),
-        "max_runs": _WHOLE_NUMBER,
-        "team": _TableSchema("a table [team]", _TEAM_KEYS),
-        "conditions": _TableSchema("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
-        "gains": _TableSchema(
-            "tables [gains.NAME]", {_ANY_KEY: _TableSchema("a table of gains", {_ANY_KEY: _GAIN})}
+        "maps": _Key(
+            'Names of bundled maps, or paths relative to this file; `"*"` for all bundled maps',
+            _accept_list("a list of names of maps, or of paths relative to this file", _TEXT),
         ),
-        "sampling": _TableSchema("a table [sampling]", _SAMPLING_KEYS, required=("method", "samples")),
+        "controllers": _Key(
+            "Names of controllers, or `mine.py:MyController`", _accept_list("a list of controllers", _TEXT)
+        ),
+        "robots": _Key(
+            "Number of robots (default: 6)",
+            _accept_list("a whole number, or a list of whole numbers", _WHOLE_NUMBER),
+        ),
+        "starts": _Key('Names of starts; `"*"` for all starts of each map (default: the first one)', _TEXTS),
+        "seeds": _Key(
+            "Seeds of the starting positions and conditions: a list, or 10 for 0 to 9 (default: seed 0)",
+            _accept_list("a number of seeds, or a list of seeds", _WHOLE_NUMBER),
+        ),
+        "duration": _Key("Simulated time, s (default: 60)", _NUMBER),
+        "dt": _Key("Control period, s (default: 1/60)", _NUMBER),
+        "cost_hz": _Key(
+            "Evaluations of the cost per second; 0 for the first and last step only (default: 2)", _NUMBER
+        ),
+        "record_hz": _Key(
+            "Saved samples per second; 0 for the first and last step only (default: 5)", _NUMBER
+        ),
+        "lattice": _Key(
+            "Number of sites along each side of the map at which the cost is computed (default: 64)",
+            _WHOLE_NUMBER,
+        ),
+        "metrics": _Key(
+            "Whether the table contains the metrics of the record",
+            _ValueSchema("true or false", _accept(bool)),
+        ),
+        "max_runs": _Key(
+            "Maximum number of runs; larger studies are rejected (default: 100,000)", _WHOLE_NUMBER
+        ),
+        "team": _Key("Parameters of the robots", _TEAM),
+        "conditions": _Key("Conditions under which the robots work", _CONDITIONS),
+        "gains": _Key("Gains to try; all others have their defaults", _GAINS),
+        "sampling": _Key("Sampling of all gains with a range", _SAMPLING),
     },
     required=("maps", "controllers"),
 )
@@ -179,24 +262,43 @@ class _SchemaReader:
         for key in schema.required:
             if key not in table:
                 key_path = format_path((*path, key))
-                self.other_issues.append(f"{key_path}: missing, expected {keys[key].expected}")
-        return {key: self.read(table[key], keys[key], (*path, key)) for key in keys if key in table}
+                self.other_issues.append(f"{key_path}: missing, expected {keys[key].schema.expected}")
+        return {key: self.read(table[key], keys[key].schema, (*path, key)) for key in keys if key in table}
 
 
-def list_study_keys() -> dict[str, str]:
-    """Return a description of the value of each key of study files; keys of tables are dotted."""
-    return dict(_list_keys(_STUDY, prefix=""))
+class KeyDescription(NamedTuple):
+    """Description of a key of study files.
+
+    Attributes
+    ----------
+    name : str
+        Name of the key; keys of tables are dotted, such as ``team.radius``.
+    meaning : str
+        What the value sets, with its unit and its default; Markdown.
+    expected : str
+        Accepted values, and whether the key is required.
+    """
+
+    name: str
+    meaning: str
+    expected: str
 
 
-def _list_keys(table: _TableSchema, prefix: str) -> Iterator[tuple[str, str]]:
-    for key, schema in table.keys.items():
+def list_study_keys() -> list[KeyDescription]:
+    """Describe all keys of study files, in the order of the handbook."""
+    return list(_describe_keys(_STUDY, prefix=""))
+
+
+def _describe_keys(table: _TableSchema, prefix: str) -> Iterator[KeyDescription]:
+    """Describe the keys of a table and of the tables inside it."""
+    for key, (meaning, schema) in table.keys.items():
         name = prefix + key.replace(_ANY_KEY, "NAME")
-        description = schema.expected
+        expected = schema.expected
         if key in table.required:
-            description += ", required"
-        yield name, description
+            expected += ", required"
+        yield KeyDescription(name, meaning, expected)
         if isinstance(schema, _TableSchema):
-            yield from _list_keys(schema, f"{name}.")
+            yield from _describe_keys(schema, f"{name}.")
 
 
 def read_study(path: Path | str) -> Study:

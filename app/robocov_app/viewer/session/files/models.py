@@ -5,12 +5,12 @@ Files of early versions have other names for some keys, which are read, but neve
 """
 
 import math
-import re
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field
 
+from robocov_app.docstrings import parse_attributes
 from robocov_app.viewer.session.editing.edits import (
     DragRobot,
     MapEdit,
@@ -23,8 +23,6 @@ from robocov_app.viewer.session.editing.edits import (
 )
 from robocov_app.viewer.session.files.fields import Coordinate, RobotNumber, Step, Text
 
-_ATTRIBUTE = re.compile(r"^(\w+) : [^\n]*\n((?:    [^\n]*(?:\n|$))+)", re.M)
-"""An attribute in a docstring: its name and its description, which is indented."""
 MIN_CHAPTER_SPEED = 0.1
 MAX_CHAPTER_SPEED = 16
 MAX_ANSWERS = 4
@@ -212,10 +210,11 @@ def build_session_schema() -> dict[str, Any]:
 
 def _describe_fields(definition: dict[str, Any]) -> None:
     """Move the descriptions in the section Attributes of a docstring to the fields of its schema."""
-    summary, _, sections = definition.get("description", "").partition("\n\n")
+    docstring = definition.get("description", "")
+    summary, _, _ = docstring.partition("\n\n")
     definition["description"] = summary
     fields = definition.get("properties", {})
-    for name, meaning in _ATTRIBUTE.findall(sections):
+    for name, meaning in parse_attributes(docstring).items():
         if name in fields:
             fields[name].setdefault("description", _format_meaning(meaning))
     if "do" in fields:
@@ -224,7 +223,7 @@ def _describe_fields(definition: dict[str, Any]) -> None:
 
 def _format_meaning(text: str) -> str:
     """Format the description of an attribute for JSON, in which None is called null."""
-    return " ".join(text.split()).removesuffix(".").replace("None", "null")
+    return text.removesuffix(".").replace("None", "null")
 
 
 def _correct_defaults(definition: dict[str, Any]) -> None:
