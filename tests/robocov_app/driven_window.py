@@ -244,6 +244,11 @@ class Driver:
         """Press a button of the panel."""
         self.click(*self.get_widget("button", name).rect.center)
 
+    def add_pane(self) -> None:
+        """Compare with the first controller that is offered."""
+        self.push_button("pane:add")
+        self.press_key("return")
+
     def open_tab(self, tab: str) -> None:
         self.push_button(f"tab:{tab}")
 

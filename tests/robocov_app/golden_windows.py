@@ -16,7 +16,7 @@ MIN_VISIBLE_DIFFERENCE = 60
 
 
 def show_comparison(window) -> None:
-    window.do("pane:add")
+    window.viewer.comparison.add_pane("rpf")
     play_frames(window, 40)
 
 

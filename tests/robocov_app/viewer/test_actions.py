@@ -148,7 +148,7 @@ def prepare(driver: Driver) -> None:
     viewer.attempt(lambda: viewer.files.open_map("square"))
     while len(session.timeline.panes) > 1:
         session.remove_pane(session.timeline.panes[-1])
-    viewer.comparison.add_pane()
+    viewer.comparison.add_pane("rpf")
     for _ in range(90):
         session.playback.step()
     viewer.inspection.selected = 2

@@ -116,16 +116,43 @@ def test_escape_closes_the_help_before_the_lesson(tmp_path: Path) -> None:
 def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.fail_robot(2))
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (1.0, 3.0)))
-    driver.push_button("pane:add")
+    driver.add_pane()
     message = driver.viewer.message
-    assert "Not repeated: robot 2 failed, robot 1 was moved. Ctrl+Z undoes the comparison." in message
+    assert "Not repeated: robot 2 failed, robot 1 was moved. Undo returns to the run before." in message
     driver.press_key("ctrl+z")
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
 
 
-def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
+def test_the_run_before_a_comparison_goes_on_until_a_controller_is_chosen(driver: Driver) -> None:
+    driver.session.playback.is_playing = True
+    driver.run_frames(30)
+    time = driver.session.displayed.time
     driver.push_button("pane:add")
-    assert driver.viewer.message == "All controllers restart from the same starts."
+    assert driver.window.dialogs.current.title == (
+        "Compare RAPF with… All start at 0 s; undo returns to this run."
+    )
+    driver.press_key("escape")
+    assert len(driver.session.timeline.panes) == 1
+    assert driver.session.displayed.time >= time
+    driver.push_button("pane:add")
+    driver.type("lloyd")
+    driver.press_key("return")
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == ["rapf", "lloyd"]
+    driver.press_key("ctrl+z")
+    assert len(driver.session.timeline.panes) == 1
+    assert driver.session.displayed.time >= time
+
+
+def test_controllers_that_are_shown_are_offered_last(driver: Driver) -> None:
+    driver.push_button("pane:add")
+    options = driver.window.dialogs.current.options("")
+    assert options[0].text == "RPF"
+    assert (options[-1].text, options[-1].note) == ("RAPF", "already shown")
+
+
+def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
+    driver.add_pane()
+    assert driver.viewer.message == "All controllers start again at 0 s. Undo returns to the run before."
 
 
 def test_a_curve_in_a_file_has_its_beginning() -> None:

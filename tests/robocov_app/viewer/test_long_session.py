@@ -76,7 +76,8 @@ def test_a_session_is_the_same_after_undo_recovery_loading_and_run(
         driver.viewer.playback.show_time(0.3)  # before the failure
         driver.press_key("b")
         play(driver)
-        driver.press_key("k")  # adds a pane, and restarts
+        driver.press_key("k")
+        driver.press_key("return")  # adds a pane, and restarts
         play(driver)
         compared = summarize(driver.session)
         assert len(driver.session.timeline.document.list_branches()) == 2

@@ -47,7 +47,7 @@ def test_points_that_the_window_does_not_show_stay_off_its_controls(driver: Driv
 
 
 def test_each_controller_of_a_comparison_has_its_place(driver: Driver) -> None:
-    driver.push_button("pane:add")
+    driver.add_pane()
     driver.run_frames(2)
     assert driver.window.map_pictures.draw(PHONE, SCALE) is not None
     boxes = driver.window.map_pictures._pictures[PHONE]._canvas.layout.panes

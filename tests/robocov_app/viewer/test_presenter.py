@@ -227,13 +227,13 @@ def test_branching_continues_from_the_past_only() -> None:
 def test_panes_are_added_with_unused_controllers_and_removed() -> None:
     viewer = build_presenter(RPF)
     for count in (2, 3, 4):
-        run_command(viewer, "pane:add")
+        viewer.comparison.add_pane(viewer.comparison.list_candidates()[0])
         assert len(viewer.session.timeline.panes) == count
         assert viewer.active_pane == count - 1
     names = [pane.controller.name for pane in viewer.session.timeline.panes]
     assert names[0] == "rpf"
     assert len(set(names)) == 4
-    run_command(viewer, "pane:add")
+    viewer.attempt(lambda: viewer.comparison.add_pane("lloyd"))
     assert viewer.has_error_message
     assert "4" in viewer.message
     run_command(viewer, "pane:next")
@@ -312,7 +312,7 @@ def test_undo_of_restarts_restores_the_map_name() -> None:
     viewer = build_presenter()
     run_command(viewer, "more")
     viewer.files.open_map("square")
-    viewer.comparison.add_pane()
+    viewer.comparison.add_pane("rpf")
     assert viewer.files.map_name == "square"
     for description, name in (
         ("RPF compared", "square"),

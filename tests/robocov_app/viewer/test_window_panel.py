@@ -278,7 +278,7 @@ def test_tabs_show_pages_and_check_boxes_toggle_layers(driver: Driver) -> None:
 
 def test_up_to_four_panes_are_added_and_closed(driver: Driver) -> None:
     for count in (2, 3, 4):
-        driver.push_button("pane:add")
+        driver.add_pane()
         assert len(driver.session.timeline.panes) == count
     assert driver.find_widget("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1

@@ -409,6 +409,8 @@ def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(brow
             targets = [button for button in browser.find_all("#more button") if button.is_displayed()]
             assert all(min(button.size.values()) >= 48 for button in targets)
             browser.find("[data-command='pane:add']").click()
+            wait_for_unchanged_picture(browser)
+            browser.press_keys(ENTER)
             browser.wait_until(lambda: browser.find("#undo").is_enabled())
             browser.find("#undo").click()
             browser.wait_until(lambda: not browser.find("#undo").is_enabled())

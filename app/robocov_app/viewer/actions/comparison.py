@@ -28,24 +28,33 @@ class ComparisonActions:
     def __init__(self, viewer: ViewerModel) -> None:
         self._viewer = viewer
 
-    def add_pane(self) -> None:
-        """Restart with one more pane, preferably with a controller that is not shown yet."""
+    def list_candidates(self) -> list[str]:
+        """Return the names of the controllers to compare with: first those that are not shown yet."""
         viewer = self._viewer
-        present = {pane.controller.name for pane in viewer.session.timeline.panes}
-        absent = [name for name in viewer.controllers if name not in present]
-        name = absent[0] if absent else viewer.controllers[0]
+        shown = {pane.controller.name for pane in viewer.session.timeline.panes}
+        return sorted(viewer.controllers, key=lambda name: name in shown)
+
+    def add_pane(self, name: str) -> None:
+        """Restart with one more pane, in which a controller is shown next to the others.
+
+        Raises
+        ------
+        ParameterError
+            If no more panes can be added.
+        """
+        viewer = self._viewer
         session = viewer.session
         events = session.timeline.events
         dropped = [event.text for event in events if event.kind in _KINDS_NOT_REPEATED]
         session.add_pane(ControllerChoice(name))
         viewer.inspection.active_pane = len(session.timeline.panes) - 1
-        message = "all controllers restart from the same starts."
+        message = "all controllers start again at 0 s."
         if dropped:
             listed = ", ".join(dropped[:_MAX_LISTED_EVENTS])
             if len(dropped) > _MAX_LISTED_EVENTS:
                 listed += f" and {len(dropped) - _MAX_LISTED_EVENTS} more"
-            message += f" Not repeated: {listed}. Ctrl+Z undoes the comparison."
-        viewer.show_message(message)
+            message += f" Not repeated: {listed}."
+        viewer.show_message(f"{message} Undo returns to the run before.")
 
     def remove_pane(self) -> None:
         """Remove the active pane."""

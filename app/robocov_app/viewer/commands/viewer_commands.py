@@ -159,7 +159,6 @@ def _list_compare_commands(viewer: Presenter) -> list[Command]:
     controller_argument = Argument("controller", list_values=lambda: viewer.controllers)
     group = CommandGroup("Compare")
     group.add("controller:next", "Next controller in this pane", comparison.choose_next_controller, "o")
-    group.add("pane:add", "Compare with one more controller", comparison.add_pane, "k")
     group.add("pane:remove", "Remove this pane", comparison.remove_pane, "shift+k")
     group.add("pane:next", "Next pane", comparison.activate_next_pane, "`")
     group.add("controller", "Controller", comparison.use_controller, argument=controller_argument)

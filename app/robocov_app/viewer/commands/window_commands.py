@@ -30,6 +30,8 @@ class ViewerWindowActions(WindowActions):
         Opens the dialog that opens a session or a map.
     list_branches : callable
         Opens the dialog that lists and enters branches.
+    compare : callable
+        Opens the dialog that adds a controller to the comparison.
     toggle_layer_menu : callable
         Opens or closes the menu of all layers.
     focus_next, focus_previous : callable
@@ -47,6 +49,7 @@ class ViewerWindowActions(WindowActions):
     save_run: Action
     open_file: Action
     list_branches: Action
+    compare: Action
     toggle_layer_menu: Action
     focus_next: Action
     focus_previous: Action
@@ -63,6 +66,7 @@ def list_window_commands(
         *_list_view_commands(canvas, chart, actions),
         *_list_file_commands(actions),
         *_list_share_commands(share, actions),
+        *_list_compare_commands(actions),
         *_list_help_commands(actions),
     ]
 
@@ -109,6 +113,12 @@ def _list_share_commands(share: ShareActions, actions: ViewerWindowActions) -> l
     group.add("share:python", "Copy as Python", share.copy_python)
     group.add("share:copy", "Save a copy to send", share.save_copy)
     group.add("share:link", "Copy link", share.copy_link)
+    return group.commands
+
+
+def _list_compare_commands(actions: ViewerWindowActions) -> list[Command]:
+    group = CommandGroup("Compare")
+    group.add("pane:add", "Compare with another controller, from 0 s", actions.compare, "k")
     return group.commands
 
 

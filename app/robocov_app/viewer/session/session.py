@@ -7,7 +7,6 @@ from typing import Any, Self
 import numpy as np
 
 from robocov.environment import Environment, Point
-from robocov.errors import ParameterError
 from robocov_app.viewer.session.displayed import DisplayedState
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.editing.edits import (
@@ -39,7 +38,7 @@ from robocov_app.viewer.session.save_points import (
 )
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
-from robocov_app.viewer.session.setup.scenario import MAX_PANES, SessionScenario
+from robocov_app.viewer.session.setup.scenario import SessionScenario, require_space_for_pane
 from robocov_app.viewer.session.timeline import Timeline
 
 MIN_PUSH_M = 5e-3
@@ -327,8 +326,7 @@ class Session:
 
     def add_pane(self, controller: ControllerChoice) -> None:
         """Restart with an additional controller side by side with the others."""
-        if len(self.timeline.panes) >= MAX_PANES:
-            raise ParameterError(f"expected at most {MAX_PANES} controllers side by side")
+        require_space_for_pane(len(self.timeline.panes))
         self.restart(controllers=(*self.timeline.scenario.controllers, controller))
 
     def remove_pane(self, pane: Pane) -> None:

@@ -15,9 +15,11 @@ from robocov_app.toolkit.dialogs import (
     create_list_choice,
     create_recovery_question,
 )
+from robocov_app.viewer.panel.panel import label_controllers
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
+from robocov_app.viewer.session.setup.scenario import require_space_for_pane
 
 _START_HINT = "Press Play, or Space, to let the robots move."
 
@@ -55,6 +57,32 @@ def build_branch_dialog(viewer: Presenter) -> Choice:
         viewer.playback.go_to_node(int(str(option.value)))
 
     return create_list_choice("Branches", list_options, enter)
+
+
+def build_comparison_dialog(viewer: Presenter) -> Choice:
+    """Return the dialog that adds a controller to the comparison.
+
+    Raises
+    ------
+    ParameterError
+        If no more controllers fit next to each other.
+    """
+    panes = viewer.session.timeline.panes
+    require_space_for_pane(len(panes))
+    choices = [viewer.session.displayed.get_setup(pane).controller for pane in panes]
+    shown_labels = {choice.name: choice.label for choice in choices}
+    labels = label_controllers(viewer.controllers, shown_labels)
+    options: list[Option] = []
+    for name in viewer.comparison.list_candidates():
+        note = "already shown" if name in shown_labels else ""
+        options.append(Option(labels[name], note, value=name))
+
+    def add(option: Option) -> None:
+        viewer.comparison.add_pane(str(option.value))
+
+    others = " and ".join(choice.label for choice in choices)
+    title = f"Compare {others} with… All start at 0 s; undo returns to this run."
+    return create_list_choice(title, lambda: options, add)
 
 
 def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:

@@ -35,7 +35,7 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.sharing.share import ShareActions
 from robocov_app.viewer.window.arrangement import Arrangement
-from robocov_app.viewer.window.dialogs import build_branch_dialog, build_file_dialog
+from robocov_app.viewer.window.dialogs import build_branch_dialog, build_comparison_dialog, build_file_dialog
 from robocov_app.viewer.window.map_picture import MapPictures, PictureSources
 from robocov_app.viewer.window.menus import WindowMenus
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
@@ -185,6 +185,7 @@ class ViewerWindow(CommandWindow):
             save_run=lambda: self.run_saver.save(viewer.session, viewer.files.folder, viewer.files.map_name),
             open_file=lambda: self.dialogs.ask(build_file_dialog(viewer)),
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(viewer)),
+            compare=lambda: self.dialogs.ask(build_comparison_dialog(viewer)),
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
             toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),

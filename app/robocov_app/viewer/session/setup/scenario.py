@@ -43,6 +43,12 @@ _CONDITIONS = convert_field(
 )
 
 
+def require_space_for_pane(count: int) -> None:
+    """Raise a ParameterError if no pane can be added to `count` others."""
+    if count >= MAX_PANES:
+        raise ParameterError(f"expected at most {MAX_PANES} controllers side by side")
+
+
 @dataclass(frozen=True, eq=False)
 class SessionScenario:
     """Initial conditions of the panes of a session: one `robocov.Scenario` for each controller.
