@@ -48,6 +48,13 @@ def test_run_prints_only_json_on_request(tmp_path: Path, capsys: pytest.CaptureF
     assert summary["interrupted"] is False
 
 
+def test_a_run_without_figures_saves_its_numbers(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    options = "--duration 0.2 --lattice 16 --no-figures --out"
+    assert main(["run", "square", *options.split(), str(out)]) == 0
+    assert {file.name for file in out.iterdir()} == {".robocov.json", "run.json", "record.npz", "cost.csv"}
+
+
 @pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):

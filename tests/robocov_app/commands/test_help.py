@@ -39,3 +39,13 @@ def test_the_overview_is_at_most_80_columns_wide(capsys: pytest.CaptureFixture[s
     main(["--help"])
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if len(line) > 80] == []
+
+
+def test_without_a_command_a_terminal_shows_five_first_commands(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main([]) == 2
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 5
+    assert all(line.startswith("robocov ") for line in lines)

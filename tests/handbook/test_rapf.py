@@ -1,19 +1,18 @@
-"""The page on RAPF states the defaults of the package and prints what its code prints."""
+"""The page on RAPF states the default gains, and prints what its code prints."""
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import pytest
+from markdown_pages import find_code_blocks, read_handbook_page
 
 import robocov as rc
-from robocov_app.commands.handbook import find_page_sources
 
-PAGE = (find_page_sources() / "rapf.md").read_text(encoding="utf-8")
+PAGE = read_handbook_page("rapf")
 
 
-def test_the_table_has_the_default_gains_and_limits() -> None:
+def test_the_table_contains_the_default_gains_and_limits() -> None:
     rapf = rc.Rapf()
     rpf = rc.Rpf()
     team = rc.Team.homogeneous(1)
@@ -28,8 +27,8 @@ def test_the_table_has_the_default_gains_and_limits() -> None:
         assert row in PAGE
 
 
-def test_the_example_prints_the_forces_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
-    code, printed = re.findall(r"```(?:python|text)\n(.*?)```", PAGE, re.S)
+def test_the_code_prints_the_forces_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    example, output = find_code_blocks(PAGE)
     names: dict[str, Any] = {}
-    exec(code, names)
-    assert capsys.readouterr().out == printed
+    exec(example.code, names)
+    assert capsys.readouterr().out == output.code

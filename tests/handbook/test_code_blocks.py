@@ -1,0 +1,145 @@
+"""The code and the commands of the README and the handbook run, page by page."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fuzz_seeds import IMDF, build_imdf_zip
+from markdown_pages import (
+    INDEX_DESCRIPTION,
+    README,
+    CodeBlock,
+    find_code,
+    find_code_blocks,
+    list_commands,
+    list_handbook_pages,
+    read_handbook_page,
+)
+from swept import DirectExecutor
+
+from robocov.errors import InputError
+from robocov_app.benchmark import suite
+from robocov_app.cli import COMMANDS, main
+from robocov_app.terminal.arguments import parse_options
+
+PAGES = [README, INDEX_DESCRIPTION, *list_handbook_pages()]
+WINDOW_COMMANDS = {"demo", "edit", "handbook"}
+"""Commands that open a window or a browser: their arguments are only parsed."""
+SHORT_RUN = ("--duration", "1", "--lattice", "16")
+ADDED_OPTIONS = {"run": SHORT_RUN, "compare": SHORT_RUN}
+"""Options that make a command faster."""
+REPLACEMENTS = {
+    ", duration=60)": ", duration=2)",
+    "run(60.0)": "run(20.0)",
+    "several, 60.0": "several, 1.0",
+    "--study full": "--study quick",
+    "seeds = 10 ": "seeds = 1 ",
+    "duration = 60.0": "duration = 0.5",
+    "samples = 8": "samples = 1",
+    "--count 20": "--count 2",
+    "[0.1, 0.3, 1.0]": "[0.1]",
+    "lattice=128": "lattice=32",
+}
+"""Parts of the code that would make its run long, and what stands in their places in the test."""
+
+
+@pytest.fixture(autouse=True)
+def working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder, sweeps in this process, and tracks of the benchmark of half a second."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
+    for name in suite.QUICK_TRACKS:
+        track = replace(suite.TRACKS[name], duration=0.5, maps=suite.TRACKS[name].maps[:1])
+        monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
+    return tmp_path
+
+
+def check_arguments(words: Sequence[str]) -> None:
+    """Parse the arguments of a command without running it."""
+    name, *arguments = words
+    module = import_module(f"robocov_app.commands.{COMMANDS[name].module}")
+    parse_options(module.Arguments, name, arguments)
+
+
+def make_files_of_other_pages(page: Path) -> None:
+    """Make the files that a page expects from the reader's earlier steps."""
+    text = page.read_text(encoding="utf-8")
+    makes_first_run = page.stem in ("README", "package", "first-run")
+    if "first-run" in text and not makes_first_run:
+        command = "run rooms --duration 25 --no-figures --out first-run"
+        assert main(command.split()) == 0
+    if page.stem == "python":
+        Path("study.toml").write_text('maps = ["square"]\ncontrollers = ["rapf"]\nduration = 0.5\n')
+        assert main(["sweep", "study.toml", "--out", "study"]) == 0
+    elif page.stem == "benchmark":
+        controller = find_code(read_handbook_page("own-controller"), "python", "# mine.py\n")
+        Path("mine.py").write_text(controller)
+    elif page.stem == "maps":
+        Path("museum.zip").write_bytes(build_imdf_zip(IMDF))
+
+
+def find_file_name(block: CodeBlock) -> str | None:
+    """Return the name of the file that a block shows; None if it shows none.
+
+    The first line may be a comment with the name. A JSON or TOML file has the name that the text mentioned
+    last.
+    """
+    comment = re.match(r"# ([\w.-]+)\n", block.code)
+    if comment is not None:
+        return comment[1]
+    if block.language not in ("json", "toml"):
+        return None
+    mentioned_names = re.findall(r"`([\w-]+\.(?:json|toml|robocov))`", block.preceding_text)
+    return mentioned_names[-1] if mentioned_names else "map.json"
+
+
+def run_commands(code: str) -> None:
+    """Run the commands in a block of shell code."""
+    for command in list_commands(code):
+        _, *words = shlex.split(command)
+        name = words[0]
+        if name in WINDOW_COMMANDS:
+            check_arguments(words)
+        else:
+            assert main([*words, *ADDED_OPTIONS.get(name, ())]) == 0, command
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_blocks_of_a_page_run_one_after_the_other(page: Path) -> None:
+    make_files_of_other_pages(page)
+    names: dict[str, Any] = {}
+    for block in find_code_blocks(page.read_text(encoding="utf-8")):
+        code = block.code
+        for long_part, short_part in REPLACEMENTS.items():
+            code = code.replace(long_part, short_part)
+        file_name = find_file_name(block)
+        if file_name is not None:
+            Path(file_name).write_text(code)
+        elif block.language == "python":
+            exec(code, names)
+        elif block.language == "sh":
+            run_commands(code)
+        else:
+            assert block.language in ("text", "bibtex")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_arguments_of_commands_in_sentences_are_valid(page: Path) -> None:
+    text = page.read_text(encoding="utf-8").replace("\n", " ")
+    for command in re.findall(r"`robocov ([a-z]+ [^`…|]*)`", text):
+        words = shlex.split(command)
+        if words[0] not in COMMANDS or ">" in words:
+            continue
+        try:
+            check_arguments(words)
+        except InputError as error:
+            # Files of the sentence's own do not exist here.
+            assert "no such file" in str(error), command
