@@ -81,6 +81,6 @@ class MapFrames:
 
 def _draw_picture(pictures: MapDrawing, size: MapSize) -> Surface:
     """Draw the map in a size, or what covers it, for the page that controls the window."""
-    if size.shows_cover and pictures.is_covered:
+    if size.is_controlling and pictures.is_covered:
         return pictures.draw_cover((size.width, size.height), size.scale)
-    return pictures.draw((size.width, size.height), size.scale)
+    return pictures.draw((size.width, size.height), size.scale, is_controlling=size.is_controlling)

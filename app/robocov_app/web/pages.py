@@ -44,14 +44,14 @@ class MapSize(NamedTuple):
     width, height : int, px
     scale : float
         Size of texts and symbols.
-    shows_cover : bool
-        Whether the page shows a dialog that covers the map, because its user controls the window.
+    is_controlling : bool
+        Whether the page controls the window. It shows buttons, and a dialog that covers the map.
     """
 
     width: int
     height: int
     scale: float
-    shows_cover: bool = False
+    is_controlling: bool = False
 
 
 class TooManyPagesError(RobocovError):
@@ -282,7 +282,7 @@ class Pages:
             if not _needs_own_picture(page.settings, window):
                 continue
             if page is self.controlling:
-                page.map_size = _compute_map_size(page.settings)._replace(shows_cover=True)
+                page.map_size = _compute_map_size(page.settings)._replace(is_controlling=True)
             else:
                 page.map_size = _choose_map_size(page.settings, sizes)
 

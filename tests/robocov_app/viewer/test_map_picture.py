@@ -11,7 +11,7 @@ SCALE = 1.5
 
 
 def test_a_phone_gets_the_map_in_its_own_size(driver: Driver) -> None:
-    picture = driver.window.map_pictures.draw(PHONE, SCALE)
+    picture = driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True)
     assert picture is not None
     assert picture.get_size() == PHONE
     width = driver.window.screen.get_width()
@@ -24,8 +24,8 @@ def test_pixels_of_the_map_have_pixels_of_the_window(driver: Driver, notches: in
     x, y = driver.find_robot_pixel(2)
     if notches:
         driver.turn_wheel(x, y, notches)
-    driver.window.map_pictures.draw(PHONE, SCALE)
-    picture = driver.window.map_pictures._pictures[PHONE]
+    driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True)
+    picture = driver.window.map_pictures._pictures[PHONE, True]
     position = get_position(driver, 2).tolist()
     pixel = picture._canvas.to_pixel(position)
     assert 0 <= pixel[0] < PHONE[0]
@@ -37,9 +37,9 @@ def test_pixels_of_the_map_have_pixels_of_the_window(driver: Driver, notches: in
 
 def test_points_that_the_window_does_not_show_stay_off_its_controls(driver: Driver) -> None:
     driver.turn_wheel(*driver.find_robot_pixel(2), 8)
-    driver.window.map_pictures.draw(PHONE, SCALE)
+    driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True)
     left, top, width, height = driver.window.layout.panes[0]
-    arena = pygame.Rect(driver.window.map_pictures._pictures[PHONE]._canvas.layout.arena)
+    arena = pygame.Rect(driver.window.map_pictures._pictures[PHONE, True]._canvas.layout.arena)
     for pixel in (arena.topleft, (arena.right - 1, arena.bottom - 1)):
         x, y = driver.window.map_pictures.find_window_pixel(PHONE, pixel)
         assert left <= x < left + width
@@ -49,8 +49,8 @@ def test_points_that_the_window_does_not_show_stay_off_its_controls(driver: Driv
 def test_each_controller_of_a_comparison_has_its_place(driver: Driver) -> None:
     driver.add_pane()
     driver.run_frames(2)
-    assert driver.window.map_pictures.draw(PHONE, SCALE) is not None
-    boxes = driver.window.map_pictures._pictures[PHONE]._canvas.layout.panes
+    assert driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True) is not None
+    boxes = driver.window.map_pictures._pictures[PHONE, True]._canvas.layout.panes
     assert len(boxes) == 2
     assert boxes[1].top >= boxes[0].top + boxes[0].height, "one above the other on an upright screen"
 
@@ -63,15 +63,26 @@ def test_a_lesson_is_read_and_done_in_a_picture(driver: Driver) -> None:
     pictures = driver.window.map_pictures
     for name, number in (("next", 1), ("next", 2), ("back", 1)):
         driver.settle()
-        assert pictures.draw(PHONE, SCALE) is not None
-        areas = pictures._pictures[PHONE]._lesson_areas
+        assert pictures.draw(PHONE, SCALE, is_controlling=True) is not None
+        areas = pictures._pictures[PHONE, True]._lesson_areas
         box = next(area.box for area in areas if area.name == name)
-        assert box.height >= 48 * pictures._pictures[PHONE]._canvas.layout.scale
+        assert box.height >= 48 * pictures._pictures[PHONE, True]._canvas.layout.scale
         driver.click(*pictures.find_window_pixel(PHONE, box.center))
         assert player.number == number
-    text = pygame.Rect(pictures._pictures[PHONE]._canvas.layout.panel)
+    text = pygame.Rect(pictures._pictures[PHONE, True]._canvas.layout.panel)
     driver.click(*pictures.find_window_pixel(PHONE, (text.left + 3, text.top + 3)))
     assert driver.window.lesson.shown is player, "a tap on the text does not leave the lesson"
+
+
+def test_the_lesson_of_a_page_that_watches_has_no_buttons(driver: Driver) -> None:
+    driver.press_key("f2")
+    driver.settle()
+    pictures = driver.window.map_pictures
+    controlling = pictures.draw(PHONE, SCALE, is_controlling=True)
+    watching = pictures.draw(PHONE, SCALE, is_controlling=False)
+    assert pictures._pictures[PHONE, True]._lesson_areas
+    assert not pictures._pictures[PHONE, False]._lesson_areas
+    assert pygame.image.tobytes(controlling, "RGB") != pygame.image.tobytes(watching, "RGB")
 
 
 def test_a_finger_on_the_time_slider_of_a_picture_moves_that_of_the_window(driver: Driver) -> None:
@@ -79,8 +90,8 @@ def test_a_finger_on_the_time_slider_of_a_picture_moves_that_of_the_window(drive
         driver.session.playback.step()
     driver.settle()
     pictures = driver.window.map_pictures
-    pictures.draw(PHONE, SCALE)
-    chart = pictures._pictures[PHONE]._chart
+    pictures.draw(PHONE, SCALE, is_controlling=True)
+    chart = pictures._pictures[PHONE, True]._chart
     time = 0.5 * driver.session.timeline.end_time
     slider = pygame.Rect(chart.layout.time_slider)
     driver.click(*pictures.find_window_pixel(PHONE, (chart.to_column(time), slider.centery)))
@@ -90,9 +101,9 @@ def test_a_finger_on_the_time_slider_of_a_picture_moves_that_of_the_window(drive
 def test_a_message_is_shown_in_a_picture(driver: Driver) -> None:
     pictures = driver.window.map_pictures
     driver.viewer.clear_message()
-    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB")
+    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB")
     driver.viewer.show_message("robot 2 failed")
-    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB") != before
+    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB") != before
 
 
 @pytest.mark.parametrize("command", ["help", "palette", "share", "layers"])
@@ -100,12 +111,12 @@ def test_a_picture_shows_the_map_while_something_covers_it_in_the_window(
     driver: Driver, command: str
 ) -> None:
     pictures = driver.window.map_pictures
-    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB")
+    before = pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB")
     assert not driver.window.controls.is_covered
     driver.window.do(command)
     driver.run_frames(2)
     assert driver.window.controls.is_covered
-    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE), "RGB") == before
+    assert pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB") == before
     driver.window.do("cancel")
     driver.run_frames(2)
 

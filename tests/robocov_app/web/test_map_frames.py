@@ -33,7 +33,7 @@ class FakeWindow:
     def set_appearance(self, appearance):
         self.is_motion_reduced = appearance.is_motion_reduced
 
-    def draw(self, size, scale):
+    def draw(self, size, scale, *, is_controlling):
         return fill_picture(size, (self.shade, 0, 0))
 
     def draw_cover(self, size, scale):
@@ -114,7 +114,7 @@ def test_a_controlling_phone_shows_the_dialog_alone(display, window, teacher, vi
     with open_display(headless=True):
         connect_projector_and_phone(display, window, teacher, viewer)
         teacher.pass_control(2)
-        run_window_until(display, window, lambda: any(size.shows_cover for size in maps.frames))
+        run_window_until(display, window, lambda: any(size.is_controlling for size in maps.frames))
         change_window(display, window, 7)
         receive_frames_until(viewer, lambda picture: picture[0, 0] == 7 << 16)
         change_window(display, window, 9, is_covered=True)

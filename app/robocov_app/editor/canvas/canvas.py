@@ -110,9 +110,13 @@ class EditorCanvas:
         self.layout = layout
         self.theme = theme
         self._set_camera(self.camera.with_view(self._compute_view_box()))
-        is_fitted = self._fitted == (self.camera.center, self.camera.zoom)
-        if is_fitted:
+        if self.is_fitted:
             self.fit()
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the view shows the whole map, and will do so in a window of another size."""
+        return self._fitted == (self.camera.center, self.camera.zoom)
 
     def _compute_view_box(self) -> tuple[float, float, float, float]:
         """Return the box between legend and status strip: left, top, width, height in the arena, px."""
@@ -159,6 +163,17 @@ class EditorCanvas:
         self._fitted = None
         if bounds is None:
             self._fitted = (self.camera.center, self.camera.zoom)
+
+    def follow(self, other: "EditorCanvas") -> None:
+        """Show the section of the map that another canvas shows, with its team."""
+        self.team = other.team
+        if other.is_fitted:
+            self.fit()
+            return
+        width, height = self.camera.view[2:]
+        other_width, other_height = other.camera.view[2:]
+        zoom = other.camera.zoom * min(width / other_width, height / other_height)
+        self._set_camera(replace(self.camera, center=other.camera.center, zoom=zoom))
 
     def show_problem(self, problem: Problem | None) -> None:
         """Center the view on a problem unless it is well inside the view."""

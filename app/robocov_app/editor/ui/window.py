@@ -1,6 +1,7 @@
 """The window of the editor, which handles events and draws frames."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from robocov_app.editor.ui.field_focus import FieldFocus
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.importing.dialog import ImportDialog
 from robocov_app.editor.ui.map_facts import list_status
+from robocov_app.editor.ui.map_picture import EditorMapPicture
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.editor.ui.play_mode.mode import PlayMode
 from robocov_app.editor.ui.pointer import EditorPointer
@@ -40,6 +42,7 @@ from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import build_layout
+from robocov_app.toolkit.window.map_pictures import MapPictures
 from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 
@@ -119,6 +122,7 @@ class EditorWindow(CommandWindow):
 
     panel: EditorPanel
     pointer: EditorPointer
+    map_pictures: MapPictures
 
     def __init__(
         self,
@@ -143,6 +147,7 @@ class EditorWindow(CommandWindow):
         self.team_preview = TeamPreview(editor, self.canvas)
         self.field_focus = FieldFocus(editor, self.panel, self._arrange)
         editor.snapper.waits_for_targets = waits_for_workers
+        self.map_pictures = MapPictures(self, lambda: EditorMapPicture(editor, self.canvas))
         self._layout_key: tuple[object, ...] | None = None
         self._arrange()
         self.canvas.fit()
@@ -172,7 +177,8 @@ class EditorWindow(CommandWindow):
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        return read_window_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
+        controls = read_window_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
+        return replace(controls, is_covered=self.map_pictures.is_covered)
 
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state of the document after an unexpected error."""

@@ -42,7 +42,6 @@ def read_window_controls(
         kind="editor",
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
-        is_covered=editor.dialogs.is_open,
         map_box=_find_map_box(editor, layout),
     )
 

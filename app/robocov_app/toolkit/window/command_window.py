@@ -190,6 +190,12 @@ class CommandWindow(BaseWindow):
         elif not self.dialogs.handle_event(event):
             self._handle_below_dialogs(event)
 
+    def find_cover(self) -> pygame.Rect | None:
+        """Return the box of the dialog, menu or help page that covers the map; None if nothing does."""
+        if self.dialogs.is_open:
+            return self.dialogs.box or self.screen.get_rect()
+        return self.screen.get_rect() if self.is_help_open else None
+
     def handle_quit(self) -> None:
         """React when the user closes the window."""
         self.closed = True

@@ -95,7 +95,7 @@ class MapDrawing(Protocol):
     def is_covered(self) -> bool:
         """Whether a dialog, a menu or the help page covers the map in the window."""
 
-    def draw(self, size: tuple[int, int], scale: float) -> Surface:
+    def draw(self, size: tuple[int, int], scale: float, *, is_controlling: bool) -> Surface:
         """Draw the map.
 
         Parameters
@@ -103,6 +103,8 @@ class MapDrawing(Protocol):
         size : (width, height), px
         scale : float
             Size of texts and symbols.
+        is_controlling : bool
+            Whether the picture is for the page that controls the window, on which buttons can be used.
 
         Returns
         -------

@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import pygame
 
-from robocov_app.look.colors import mix
+from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.viewer.lessons.page import ClickArea, LessonPage
-from robocov_app.viewer.lessons.player import LessonPlayer, LessonState
+from robocov_app.viewer.lessons.player import LessonPlayer, LessonState, MarkedAnswer
 
 # Lengths in pixels at scale 1.
 _TOP_PX = 6
@@ -22,12 +22,20 @@ _SCROLL_BAR_RIGHT_PX = 6
 """Distance of the scroll bar from the right edge of the sheet."""
 _TEXT_SIZES_PX = (14.0, 13.0)
 """Sizes of the text; the first one at which all of it is visible is used, or else the last one."""
+_WATCHED_TEXT_SIZES_PX = (14.0, 13.0, 12.0, 11.0)
+"""The same for somebody who only watches, and cannot scroll the text."""
 _SCROLL_BAR_STRENGTH = 0.35
 """Fraction of the color of text in the scroll bar."""
 
 
 def draw_lesson_sheet(
-    screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer, scroll_offset: float | None
+    screen: pygame.Surface,
+    layout: Layout,
+    theme: Theme,
+    lesson: LessonPlayer,
+    scroll_offset: float | None,
+    *,
+    has_buttons: bool = True,
 ) -> tuple[list[ClickArea], float, float]:
     """Draw a lesson in the sheet of a small window.
 
@@ -39,6 +47,8 @@ def draw_lesson_sheet(
     lesson : LessonPlayer
     scroll_offset : float or None
         Distance by which the text is scrolled, px; None shows its start, or its end once there is an answer.
+    has_buttons : bool
+        Whether the user can answer, and go to other chapters.
 
     Returns
     -------
@@ -51,10 +61,12 @@ def draw_lesson_sheet(
     """
     top_px = _TOP_PX if layout.handle.height else _TOP_WITHOUT_HANDLE_PX
     top = layout.panel.top + top_px * layout.scale
-    sheet = LessonSheet(screen, layout, theme, lesson, _TEXT_SIZES_PX[-1], top)
-    for text_px in _TEXT_SIZES_PX:
+    sheet_class = LessonSheet if has_buttons else WatchedLessonSheet
+    text_sizes_px = _TEXT_SIZES_PX if has_buttons else _WATCHED_TEXT_SIZES_PX
+    sheet = sheet_class(screen, layout, theme, lesson, text_sizes_px[-1], top)
+    for text_px in text_sizes_px:
         screen.fill(theme.panel, layout.panel)
-        sheet = LessonSheet(screen, layout, theme, lesson, text_px, top, scroll_offset=scroll_offset)
+        sheet = sheet_class(screen, layout, theme, lesson, text_px, top, scroll_offset=scroll_offset)
         sheet.draw()
         if not sheet.max_offset:
             break
@@ -135,3 +147,22 @@ class LessonSheet(LessonPage):
         bar.top = view.top + round(view.height * self.offset / height)
         color = mix(self.theme.panel, self.theme.ink, _SCROLL_BAR_STRENGTH)
         pygame.draw.rect(self.screen, color, bar, border_radius=bar.width)
+
+
+@dataclass
+class WatchedLessonSheet(LessonSheet):
+    """The page of a lesson in the sheet of somebody who only watches: it has no buttons."""
+
+    min_answer_height: ClassVar[float] = 0.0
+    progress_above_bottom: ClassVar[float] = 20.0
+
+    def draw(self) -> None:
+        """Draw the heading, the text and the progress bar."""
+        self._draw_heading()
+        self._draw_scrolled_text()
+        self._draw_progress()
+        self.areas = []
+
+    def _choose_answer_edge(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
+        """Return the color of an answer's frame, which never looks like that of a button."""
+        return super()._choose_answer_edge(answer, is_open=False)

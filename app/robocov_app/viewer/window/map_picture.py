@@ -1,13 +1,11 @@
 """The window without its buttons, drawn in the size of the screen of a phone."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import pygame
 
 from robocov_app.look.theme import get_theme
-from robocov_app.toolkit.window.cover_picture import CoverPicture
 from robocov_app.toolkit.window.layout import build_layout, compute_aspect, is_inside
 from robocov_app.viewer.canvas.canvas import ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
@@ -17,7 +15,6 @@ from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.window.status_display import StatusDisplay
 
-MAX_MAP_PICTURES = 8  # of different sizes that are kept
 _UNUSED_PIXEL = (1.0, 1.0)  # of the window, in the margin of its bar
 
 
@@ -54,8 +51,8 @@ class PictureSources:
     status: StatusDisplay
 
 
-class MapPicture:
-    """Draws panes, chart, message and lesson of a window in another size, for a spectator.
+class ViewerMapPicture:
+    """Draws panes, chart, message and lesson of a window in another size. See `MapPicture`.
 
     Parameters
     ----------
@@ -73,19 +70,8 @@ class MapPicture:
         self._lesson_areas: list[ClickArea] = []
         self._layout_key: _LayoutKey | None = None
 
-    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface:
-        """Draw the panes, the chart, the message and the lesson.
-
-        Parameters
-        ----------
-        size : (width, height), px
-        scale : float
-            Size of texts and symbols.
-
-        Returns
-        -------
-        pygame.Surface
-        """
+    def draw(self, size: tuple[int, int], scale: float, *, is_controlling: bool) -> pygame.Surface:
+        """Draw the panes, the chart, the message and the lesson. See `MapPicture`."""
         self._arrange(size, scale)
         theme = self._canvas.theme
         layout = self._canvas.layout
@@ -99,7 +85,9 @@ class MapPicture:
         self._lesson_areas = []
         lesson = self._sources.lesson.shown
         if lesson is not None:
-            self._lesson_areas, _, _ = draw_lesson_sheet(surface, layout, theme, lesson, None)
+            self._lesson_areas, _, _ = draw_lesson_sheet(
+                surface, layout, theme, lesson, None, has_buttons=is_controlling
+            )
         self._sources.status.draw_message(surface, layout, theme)
         return surface
 
@@ -149,64 +137,3 @@ class MapPicture:
         layout = build_layout(size, scale, panes, compute_aspect(bounds), panel=has_lesson, is_compact=True)
         self._canvas.arrange(layout, get_theme(theme))
         self._chart.arrange(layout, get_theme(theme))
-
-
-class MapPictures:
-    """Pictures of a window without its buttons in several sizes, for phones.
-
-    Parameters
-    ----------
-    viewer : Presenter
-        The viewer.
-    sources : PictureSources
-        Parts of the window that the pictures show.
-    screen : callable
-        Returns the surface of the window.
-    find_cover : callable
-        Returns the box of the window that covers the map, such as that of a dialog; None if nothing does.
-    """
-
-    def __init__(
-        self,
-        viewer: Presenter,
-        sources: PictureSources,
-        screen: Callable[[], pygame.Surface],
-        find_cover: Callable[[], pygame.Rect | None],
-    ) -> None:
-        self._viewer = viewer
-        self._sources = sources
-        self._screen = screen
-        self._find_cover = find_cover
-        self._pictures: dict[tuple[int, int], MapPicture] = {}
-        self._cover = CoverPicture()
-
-    @property
-    def is_covered(self) -> bool:
-        """Whether a dialog, a menu or the help page covers the map. See `MapDrawing`."""
-        return self._find_cover() is not None
-
-    def draw(self, size: tuple[int, int], scale: float) -> pygame.Surface:
-        """Draw the panes without the buttons. See `MapDrawing`."""
-        picture = self._pictures.get(size)
-        if picture is None:
-            if len(self._pictures) >= MAX_MAP_PICTURES:
-                self._pictures.clear()
-            picture = MapPicture(self._viewer, self._sources)
-            self._pictures[size] = picture
-        return picture.draw(size, scale)
-
-    def draw_cover(self, size: tuple[int, int], scale: float) -> pygame.Surface:
-        """Draw the dialog, the menu or the help page that covers the map. See `MapDrawing`."""
-        canvas = self._sources.canvas
-        screen = self._screen()
-        box = self._find_cover() or screen.get_rect()
-        return self._cover.draw(screen, box, size, scale / canvas.layout.scale, canvas.theme)
-
-    def find_window_pixel(self, size: tuple[int, int], pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return the pixel of the window that shows the same as a pixel of the picture. See `MapDrawing`."""
-        if self.is_covered:
-            return self._cover.find_window_pixel(size, pixel)
-        picture = self._pictures.get(size)
-        if picture is None:
-            return pixel
-        return picture.find_window_pixel(pixel)

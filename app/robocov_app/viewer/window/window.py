@@ -17,6 +17,7 @@ from robocov_app.toolkit.window.command_window import CommandWindow
 from robocov_app.toolkit.window.display import set_title
 from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, get_key_name, get_wheel_notches
 from robocov_app.toolkit.window.layout import is_inside
+from robocov_app.toolkit.window.map_pictures import MapPictures
 from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
 from robocov_app.toolkit.window.window import FPS
 from robocov_app.toolkit.window.window_display import WindowDisplay
@@ -36,7 +37,7 @@ from robocov_app.viewer.session.files.run_saver import RunSaver
 from robocov_app.viewer.sharing.share import ShareActions
 from robocov_app.viewer.window.arrangement import Arrangement
 from robocov_app.viewer.window.dialogs import build_branch_dialog, build_comparison_dialog, build_file_dialog
-from robocov_app.viewer.window.map_picture import MapPictures, PictureSources
+from robocov_app.viewer.window.map_picture import PictureSources, ViewerMapPicture
 from robocov_app.viewer.window.menus import WindowMenus
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
@@ -160,7 +161,7 @@ class ViewerWindow(CommandWindow):
         self._runner = SessionRunner(viewer)
         self._status = StatusDisplay(viewer, self.lesson, self.hint, can_suggest=not is_unattended)
         sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
-        self.map_pictures = MapPictures(viewer, sources, lambda: self.screen, self._find_cover)
+        self.map_pictures = MapPictures(self, lambda: ViewerMapPicture(viewer, sources))
         self._inspector = RobotInspector(viewer, self.panel)
         self._controls_reader = WindowControlsReader(
             viewer, self.lesson, self.layer_bar, self.dialogs, self.parts
@@ -268,13 +269,12 @@ class ViewerWindow(CommandWindow):
         controls = self._controls_reader.read(self.screen.get_size(), self.layout)
         return replace(controls, is_covered=self.map_pictures.is_covered)
 
-    def _find_cover(self) -> pygame.Rect | None:
+    def find_cover(self) -> pygame.Rect | None:
         """Return the box of the dialog, menu or help page that covers the map; None if nothing does."""
-        if self.dialogs.is_open:
-            return self.dialogs.box or self.screen.get_rect()
-        if self.is_help_open:
-            return self.screen.get_rect()
-        return self.layer_bar.menu_box if self.layer_bar.is_open else None
+        cover = super().find_cover()
+        if cover is None and self.layer_bar.is_open:
+            return self.layer_bar.menu_box
+        return cover
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window, or leave the lesson in its place."""
