@@ -8,118 +8,160 @@ import sys
 import tarfile
 import tomllib
 import zipfile
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from built_pages import HAS_SPHINX, find_broken_links
 from hatchling.builders.sdist import SdistBuilder
 from hatchling.builders.wheel import WheelBuilder
 
-from robocov import __version__
-from robocov_app.cli import main
+import robocov as rc
+from robocov.controllers import CONTROLLERS
+from robocov_app import learning
+from robocov_app.cli import COMMANDS, main
 from robocov_app.commands import handbook
 
 ROOT = Path(__file__).parents[1]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+DESCRIPTION = (ROOT / PROJECT["readme"]).read_text(encoding="utf-8")
 EXTRAS = PROJECT["optional-dependencies"]
-TEXT = (ROOT / PROJECT["readme"]).read_text()
-WITH_SPHINX = all(find_spec(name) for name in ("sphinx", "furo", "myst_parser"))
+EXTRAS_FOR_DEVELOPERS = {"all", "test", "bench"}
+MAX_ARCHIVE_BYTES = 5_500_000
+MAX_ARCHIVED_FILE_BYTES = 250_000
+MAX_WHEEL_BYTES = 6_000_000
 
 
-def test_all_are_the_extras_of_users() -> None:
-    (everything,) = EXTRAS["all"]
-    assert set(re.findall(r"\w+", everything)) == {"robocov"} | EXTRAS.keys() - {"all", "test", "bench"}
+def test_the_extra_all_contains_the_extras_for_users() -> None:
+    (requirement,) = EXTRAS["all"]
+    assert set(re.findall(r"\w+", requirement)) == {"robocov", *EXTRAS.keys()} - EXTRAS_FOR_DEVELOPERS
 
 
-def test_what_is_large_and_not_needed_is_an_extra() -> None:
-    hard = " ".join(PROJECT["dependencies"])
-    assert not re.findall(r"pyarrow|pandas|sphinx|imageio|distributed|gymnasium", hard)
+def test_large_packages_are_optional() -> None:
+    requirements = " ".join(PROJECT["dependencies"])
+    assert not re.findall(r"pyarrow|pandas|sphinx|imageio|distributed|gymnasium", requirements)
 
 
-def test_the_description_names_the_extras_and_links_to_nothing() -> None:
-    named = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\|.*?\|", TEXT, re.M))))
-    assert named == EXTRAS.keys() - {"all", "test", "bench"}
-    assert not re.findall(r"\]\(|<\w+", TEXT), "pictures and pages of the repository are not on an index"
+def test_the_description_lists_all_extras_for_users() -> None:
+    first_columns = re.findall(r"^\|.*?\|", DESCRIPTION, re.MULTILINE)
+    listed_extras = set(re.findall(r"`(\w+)`", "".join(first_columns)))
+    assert listed_extras == EXTRAS.keys() - EXTRAS_FOR_DEVELOPERS
+
+
+def test_the_description_has_neither_links_nor_pictures() -> None:
+    # They would lead to files of the repository, which package indexes do not have.
+    assert not re.findall(r"\]\(|<\w+", DESCRIPTION)
 
 
 def test_references_name_the_current_version() -> None:
-    citation = (ROOT / "CITATION.cff").read_text()
-    assert f"\nversion: {__version__}\n" in citation
-    recipes = (ROOT / "app/handbook/recipes.md").read_text()
-    assert f"version = {{{__version__}}}" in recipes
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    recipes = (ROOT / "app/handbook/recipes.md").read_text(encoding="utf-8")
     title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
-    assert title is not None and f"title   = {{{title[1]}}}" in recipes
+    assert f"\nversion: {rc.__version__}\n" in citation
+    assert f"version = {{{rc.__version__}}}" in recipes
+    assert title is not None
+    assert f"title   = {{{title[1]}}}" in recipes
 
 
-def test_a_bundled_handbook_is_used(
+def test_without_sphinx_the_command_uses_the_bundled_handbook(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bundled = tmp_path / "pages"
-    opened: list[str] = []
-    bundled.mkdir()
-    (bundled / "index.html").write_text("the pages")
-    monkeypatch.setattr(handbook, "_BUNDLED_PAGES", bundled)
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)  # no Sphinx
+    bundled_pages = tmp_path / "pages"
+    bundled_pages.mkdir()
+    index = bundled_pages / "index.html"
+    index.write_text("the pages")
+    opened_pages: list[str] = []
+    monkeypatch.setattr(handbook, "_BUNDLED_PAGES", bundled_pages)
+    monkeypatch.setattr("webbrowser.open", opened_pages.append)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert main(["handbook"]) == 0
-    assert capsys.readouterr().out == f"{bundled / 'index.html'}\n"
-    assert opened == [(bundled / "index.html").as_uri()]
+    assert capsys.readouterr().out == f"{index}\n"
+    assert opened_pages == [index.as_uri()]
     assert main(["handbook", "--out", str(tmp_path / "site")]) == 0
     assert (tmp_path / "site/index.html").read_text() == "the pages"
 
 
 @pytest.mark.slow
-def test_the_source_archive_has_the_tests_and_no_film(tmp_path: Path) -> None:
+def test_the_source_archive_contains_tests_and_maps_but_no_video(tmp_path: Path) -> None:
     (archive,) = SdistBuilder(str(ROOT)).build(directory=str(tmp_path))
+    sizes = {}
     with tarfile.open(archive) as files:
-        sizes = {info.name.partition("/")[2]: info.size for info in files.getmembers()}
+        for member in files.getmembers():
+            _, _, name = member.name.partition("/")
+            sizes[name] = member.size
     assert {"README.md", PROJECT["readme"], "tests/test_package.py", "maps/rooms.json"} <= sizes.keys()
-    assert not [name for name in sizes if re.search(r"mp4$|__pycache__|\.nb[ic]$|handbook/reference/", name)]
-    assert max(sizes.values()) < 250_000
-    assert Path(archive).stat().st_size < 5.5e6
+    unwanted_files = re.compile(r"mp4$|__pycache__|\.nb[ic]$|handbook/reference/")
+    assert not [name for name in sizes if unwanted_files.search(name)]
+    assert max(sizes.values()) < MAX_ARCHIVED_FILE_BYTES
+    assert Path(archive).stat().st_size < MAX_ARCHIVE_BYTES
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel of this checkout."""
+    """The wheel of this checkout. It contains the built handbook if Sphinx is installed."""
     folder = tmp_path_factory.mktemp("wheel")
     (path,) = WheelBuilder(str(ROOT)).build(directory=str(folder), versions=["standard"])
     return Path(path)
 
 
+@pytest.fixture(scope="module")
+def unpacked_wheel(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the files in the wheel."""
+    folder = tmp_path_factory.mktemp("unpacked")
+    with zipfile.ZipFile(wheel) as files:
+        files.extractall(folder)
+    return folder
+
+
 @pytest.mark.slow
 @pytest.mark.xdist_group("wheel")
-def test_the_wheel_contains_all_assets_of_pages(wheel: Path) -> None:
-    packed = set(zipfile.ZipFile(wheel).namelist())
+def test_the_wheel_contains_only_what_the_program_needs(wheel: Path, unpacked_wheel: Path) -> None:
     assets = {path.name for path in (ROOT / "app/robocov_app/report/assets").iterdir()}
     assert {"report.html.jinja", "report.css", "replay.js"} <= assets
-    assert {f"robocov_app/report/assets/{name}" for name in assets} <= packed
+    assert assets <= {path.name for path in (unpacked_wheel / "robocov_app/report/assets").iterdir()}
+    assert (unpacked_wheel / "robocov/maps/rooms.json").is_file()
+    assert (unpacked_wheel / "robocov/__init__.pyi").is_file(), "the list of public names"
+    packages = {path.name for path in unpacked_wheel.iterdir() if not path.name.endswith(".dist-info")}
+    assert packages == {"robocov", "robocov_app"}
+    assert wheel.stat().st_size < MAX_WHEEL_BYTES
 
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("wheel")
-@pytest.mark.skipif(not WITH_SPHINX, reason="needs robocov[docs]")
-def test_the_wheel_carries_maps_entries_and_a_handbook_that_needs_no_sphinx(
-    wheel: Path, tmp_path: Path
-) -> None:
-    site = tmp_path / "site"
-    empty = tmp_path / "empty"
-    with zipfile.ZipFile(wheel) as files:
-        files.extractall(site)
-    assert wheel.stat().st_size < 6e6
-    assert {path.name for path in site.iterdir() if "-" not in path.name} == {"robocov", "robocov_app"}
-    assert (site / "robocov/__init__.pyi").is_file(), "the list of public names"
-    assert (site / "robocov_app/pages/searchindex.js").is_file() and (
-        site / "robocov/maps/rooms.json"
-    ).is_file()
-    pages = [*(site / "robocov_app/pages").rglob("*.html")]
-    assert len(pages) > 20 and not [page for page in pages if str(ROOT) in page.read_text()]
-    empty.mkdir()
-    script = (
-        f"import sys; sys.path.insert(0, {str(site)!r}); sys.modules['furo'] = None\n"
-        "from robocov_app.cli import main\n"
-        "sys.exit(main(['handbook', '--out', 'book']) or main(['benchmark', 'page', '--out', 'page.html'])\n"
-        "         or main(['check', 'rooms']))"
-    )
-    subprocess.run([sys.executable, "-c", script], cwd=empty, check=True, env={"PATH": "/usr/bin:/bin"})
-    assert (empty / "book/index.html").is_file() and (empty / "page.html").is_file()
+@pytest.mark.skipif(not HAS_SPHINX, reason="needs robocov[docs]")
+def test_the_handbook_in_the_wheel_has_valid_links_and_a_complete_reference(unpacked_wheel: Path) -> None:
+    # Warnings of Sphinx are errors, so that the wheel would not have been built.
+    site = unpacked_wheel / "robocov_app/pages"
+    pages = {file: file.read_text(encoding="utf-8") for file in site.rglob("*.html")}
+    assert len(pages) > 20
+    assert (site / "searchindex.js").is_file()
+    assert not find_broken_links(site)
+    assert not [file for file, text in pages.items() if str(ROOT) in text]
+    reference = {file.stem: text for file, text in pages.items() if file.parent.name == "reference"}
+    assert all(f"robocov {name}" in reference["commands"] for name in COMMANDS)
+    assert all(f'id="{name}"' in reference["gains"] for name in CONTROLLERS)
+    assert all(f'.{name}"' in reference["names"] for name in rc.__all__)
+    assert all(f'id="robocov_app.learning.{name}"' in reference["learning"] for name in learning.__all__)
+    assert "Play or pause" in reference["keys"]
+    assert "Undo" in reference["keys"]
+    assert 'id="robocov.typing.FloatArray"' in reference["other-names"]
+    for page in ("names", "other-names", "learning"):
+        # Signatures show the names of array types, not what these stand for.
+        assert '<span class="pre">ndarray' not in reference[page]
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("wheel")
+@pytest.mark.skipif(not HAS_SPHINX, reason="needs robocov[docs]")
+def test_commands_of_the_wheel_find_its_pages_entries_and_maps(unpacked_wheel: Path, tmp_path: Path) -> None:
+    # `furo` cannot be imported, so that the pages cannot be built.
+    script = f"""
+import sys
+sys.path.insert(0, {str(unpacked_wheel)!r})
+sys.modules["furo"] = None
+from robocov_app.cli import main
+for command in ("handbook --out book", "benchmark page --out page.html", "check rooms"):
+    assert main(command.split()) == 0, command
+"""
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, env={"PATH": "/usr/bin:/bin"})
+    assert (tmp_path / "book/index.html").is_file()
+    assert (tmp_path / "page.html").is_file()

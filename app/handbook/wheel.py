@@ -12,10 +12,13 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class HandbookHook(BuildHookInterface[Any]):
-    """Adds the pages as ``robocov_app/pages``; not in the isolated builds of pip, which stay quick."""
+    """Adds the pages as ``robocov_app/pages``.
+
+    The isolated builds of pip do not have the requirements, and therefore take no longer than without pages.
+    """
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the pages of this very source."""
+        """Build the pages from the source of the wheel."""
         if version == "editable" or not all(map(find_spec, ("sphinx", "furo", "myst_parser", "numpy"))):
             return
         self._folder = TemporaryDirectory()
@@ -26,6 +29,6 @@ class HandbookHook(BuildHookInterface[Any]):
         build_data["force_include"][str(pages)] = "robocov_app/pages"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove what was only for the wheel."""
+        """Remove the temporary pages."""
         if hasattr(self, "_folder"):
             self._folder.cleanup()

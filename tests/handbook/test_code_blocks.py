@@ -33,7 +33,7 @@ PAGES = [README, INDEX_DESCRIPTION, *list_handbook_pages()]
 WINDOW_COMMANDS = {"demo", "edit", "handbook"}
 """Commands that open a window or a browser: their arguments are only parsed."""
 SHORT_RUN = ("--duration", "1", "--lattice", "16")
-ADDED_OPTIONS = {"run": SHORT_RUN, "compare": SHORT_RUN}
+ADDED_OPTIONS = {"run": SHORT_RUN, "compare": SHORT_RUN, "optimum": ("--lattice", "16")}
 """Options that make a command faster."""
 REPLACEMENTS = {
     ", duration=60)": ", duration=2)",
