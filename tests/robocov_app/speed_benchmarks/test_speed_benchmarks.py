@@ -177,7 +177,7 @@ def test_without_the_baseline_the_message_says_how_to_install_it(monkeypatch, ca
     assert "pip install 'robocov[bench]'" in read_error(capsys, "bench", "cost")
     shrink_parts(monkeypatch)
     monkeypatch.setattr(processes, "list_start_cases", lambda quick: [])
-    for other in (step, render, window):
+    for other in (step, render, window, learning):
         monkeypatch.setattr(other, "list_cases", lambda quick: [])
     assert main(["bench", "all", "--quick", "--json"]) == 0
     said = capsys.readouterr()
