@@ -143,10 +143,14 @@ def test_the_handbook_in_the_wheel_has_valid_links_and_a_complete_reference(unpa
     assert all(f'id="robocov_app.learning.{name}"' in reference["learning"] for name in learning.__all__)
     assert "Play or pause" in reference["keys"]
     assert "Undo" in reference["keys"]
+    assert 'href="#obstaclepath"' in reference["formats"], "types link to their tables"
+    assert ">-1<" not in reference["formats"], "placeholders are no defaults"
+    assert ">Type<" not in "".join(reference.values()), "descriptions of properties are not split at a colon"
     assert 'id="robocov.typing.FloatArray"' in reference["other-names"]
     for page in ("names", "other-names", "learning"):
         # Signatures show the names of array types, not what these stand for.
         assert '<span class="pre">ndarray' not in reference[page]
+        assert "_SupportsArray" not in reference[page]
 
 
 @pytest.mark.slow

@@ -15,7 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
 from sphinx.pycode import ModuleAnalyzer
+from sphinx.util.typing import stringify_annotation
 
 import robocov as rc
 from robocov.controllers import get_gains, get_information, list_controller_classes
@@ -23,6 +25,7 @@ from robocov.controllers.base import BaseController
 from robocov.controllers.gains import Gain, Option, format_value
 from robocov.mapfile import build_map_schema, load_map
 from robocov.metrics.run_metrics import COLUMNS
+from robocov.team import UNITS
 from robocov_app import learning
 from robocov_app.cli import COMMANDS, main
 from robocov_app.docstrings import parse_attributes
@@ -35,6 +38,7 @@ from robocov_app.toolkit.window.input import format_key
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.files.models import build_session_schema
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 if TYPE_CHECKING:
@@ -42,6 +46,8 @@ if TYPE_CHECKING:
 
 ARRAY_TYPES = ("FloatArray", "IntArray", "BoolArray", "Float32Array", "Int32Array", "AnyArray")
 """Types of arrays in signatures; names of ``robocov.typing``."""
+ARRAY_LIKE = stringify_annotation(ArrayLike, "smart")
+"""What Sphinx shows for NumPy's type of everything that can be converted to an array."""
 
 OTHER_NAMES = {
     "Figures": ("robocov_app.figures.files.save_figure", "robocov_app.figures.files.render_png"),
@@ -108,10 +114,11 @@ def replace_signature(
     """
     if kind == "class" and issubclass(value, BaseController):
         return str(inspect.signature(value, eval_str=True)).removesuffix(" -> None"), None
-    if parameters is None or "<factory>" not in parameters:
+    if parameters is None:
         return None
     # Sphinx parses signatures as Python, in which the default of a field with a factory is no expression.
-    return parameters.replace("<factory>", "..."), result
+    text = parameters.replace("<factory>", "...").replace(ARRAY_LIKE, "ArrayLike")
+    return None if text == parameters else (text, result)
 
 
 # Commands and keys
@@ -119,7 +126,10 @@ def replace_signature(
 
 def build_commands_page() -> str:
     """Build the page with the help of every command."""
-    text = "# Commands\n\nWhat `robocov COMMAND -h` prints.\n"
+    text = (
+        "# Help of every command\n\n`robocov COMMAND -h` prints these texts. "
+        "[Commands](../commands.md) lists commands by task.\n"
+    )
     for name, command in COMMANDS.items():
         output = io.StringIO()
         with contextlib.redirect_stdout(output), contextlib.suppress(SystemExit):
@@ -135,8 +145,8 @@ def build_keys_page() -> str:
     """Build the page with the keys of the window and of the editor, from their tables of commands."""
     text = (
         "# Keys\n\nThe keys of [the window](../window.md) and of [the editor](../draw-a-map.md). F1 shows "
-        "them there. Ctrl+K finds every command by its title or name. Type those that need a value, such as "
-        "`robots 12`.\n"
+        "them there. Ctrl+K finds every command by its title or name, also those without a key. If a command "
+        "needs a value, type it after the name: `robots 12`.\n"
     )
     with TemporaryDirectory() as folder:
         session = Session(SessionScenario(load_map("square")))
@@ -177,8 +187,9 @@ def build_gains_page() -> str:
     """Build the page with a table of gains for every controller."""
     text = (
         "# Controllers and their gains\n\n`--set GAIN=VALUE` sets a gain in every command, "
-        "`rc.Rapf(k_rep=1.0)` in Python. [Controllers](../controllers.md) explains where each of them "
-        "comes from.\n"
+        "`rc.Rapf(k_rep=1.0)` in Python. [Controllers](../controllers.md) gives the source of each "
+        "controller, and explains the information that robots use: their *own*, *shared maps*, or the "
+        "*whole map*. Equation numbers refer to [the paper](../rapf.md).\n"
     )
     for name, controller in list_controller_classes().items():
         summary = capitalize(controller.summary.rstrip("."))
@@ -202,8 +213,13 @@ def format_range(gain: Gain | Option) -> str:
     """Format the values that a gain may have."""
     if isinstance(gain, Option):
         return ", ".join(gain.choices)
-    text = f"{gain.low:g} to {gain.high:g}"
+    text = f"{format_limit(gain.low)} to {format_limit(gain.high)}"
     return f"{text}, or null" if gain.optional else text
+
+
+def format_limit(value: float) -> str:
+    """Format the end of a range, with exponents as in 1e6 and 1e-6."""
+    return f"{value:g}".replace("e+0", "e").replace("e-0", "e-")
 
 
 def build_formats_page() -> str:
@@ -231,10 +247,18 @@ def build_formats_page() -> str:
     return text + build_table(("key", "meaning", "value"), rows)
 
 
+def describe_robot_property(name: str) -> str:
+    """Return the meaning of a property of all robots, with its unit."""
+    label = name.replace("max_", "maximum_").replace("_", " ").capitalize()
+    return f"{label} of the robots, {UNITS[name]}"
+
+
 def build_schema_tables(title: str, schema: Mapping[str, Any], described: Container[str] = ()) -> str:
     """Build a table of fields for each type of a JSON schema, except for types that are described already."""
     text = ""
-    types = {str(schema.get("title", title)): schema, **schema.get("$defs", {})}
+    definitions = schema.get("$defs", {})
+    types = {str(schema.get("title", title)): schema, **definitions}
+    linked = {name for name, definition in definitions.items() if definition.get("properties")}
     for name, definition in types.items():
         if not definition.get("properties") or name in described:
             continue
@@ -244,8 +268,11 @@ def build_schema_tables(title: str, schema: Mapping[str, Any], described: Contai
             default = "required"
             if field not in required:
                 default = format_default(field_schema)
-            meaning = escape_cell(field_schema.get("description", ""))
-            rows.append((f"`{field}`", meaning, escape_cell(format_type(field_schema)), default))
+            meaning = field_schema.get("description", "")
+            if name == RobotProperties.__name__ and field in UNITS:
+                meaning = f"{describe_robot_property(field)}; null for no limit"
+            field_type = link_types(escape_cell(format_type(field_schema)), linked)
+            rows.append((f"`{field}`", escape_cell(meaning), field_type, default))
         text += f"\n### {name}\n\n{escape_text(definition.get('description', ''))}\n\n"
         text += build_table(("field", "meaning", "type", "default"), rows)
     return text
@@ -255,6 +282,9 @@ def format_default(schema: Mapping[str, Any]) -> str:
     """Format the default of an optional value in a JSON schema."""
     if "default" not in schema:
         return "optional"
+    if "minimum" in schema and schema["default"] < schema["minimum"]:
+        # A placeholder until the value is known; files always contain the value.
+        return "required"
     return f"`{escape_cell(json.dumps(schema['default']))}`"
 
 
@@ -269,19 +299,35 @@ def format_type(schema: Mapping[str, Any]) -> str:
         return f"`{json.dumps(schema['const'])}`"
     if "enum" in schema:
         return " or ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
+    if schema.get("type") == "array" and "prefixItems" in schema:
+        return f"[{', '.join(format_type(item) for item in schema['prefixItems'])}]"
     if schema.get("type") == "array" and isinstance(schema.get("items"), dict):
-        return f"list of {format_type(schema['items'])}"
+        return f"list of {format_plural(format_type(schema['items']))}"
     return str(schema.get("type", "anything"))
+
+
+def format_plural(name: str) -> str:
+    """Format the plural of a type; the names of types with a table of their own do not change."""
+    if name.startswith("list of "):
+        return name.replace("list", "lists", 1)
+    return f"{name}s" if name in ("number", "integer", "string", "object") else name
+
+
+def link_types(text: str, names: Iterable[str]) -> str:
+    """Link the names of types in a text to their tables on the same page."""
+    for name in names:
+        text = re.sub(rf"\b{name}\b", f"[{name}](#{name.lower()})", text)
+    return text
 
 
 def build_metrics_page() -> str:
     """Build the page with the columns of ``metrics.csv`` and of the table of a sweep."""
-    text = "# Metrics\n\n## Along a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
+    text = "# Metrics\n\n## During a run\n\nThe columns of `metrics.csv`, which `robocov metrics` writes; in "
     text += "Python the attributes of [RunMetrics](names.rst).\n\n"
     meanings = parse_attributes(inspect.getdoc(rc.RunMetrics) or "")
     rows = [(f"`{column}`", escape_cell(meanings[name]), f"`{name}`") for name, column in COLUMNS.items()]
     text += build_table(("column", "meaning", "attribute"), rows)
-    text += "\n## Of a whole run\n\nThe columns of a sweep's `results.csv`, after those of the parameters. "
+    text += "\n## For a whole run\n\nThe columns of a sweep's `results.csv`, after those of the parameters. "
     text += "Most are also in `summary` of each `run.json`.\n\n"
     rows = [(f"`{column.name}`", column.unit, escape_cell(column.meaning)) for column in RESULT_COLUMNS]
     return text + build_table(("column", "unit", "meaning"), rows)

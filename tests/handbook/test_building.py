@@ -6,12 +6,22 @@ them there.
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from built_pages import HAS_SPHINX
 
 from robocov_app.cli import main
 from robocov_app.commands import handbook
+
+
+@pytest.mark.skipif(not HAS_SPHINX, reason="needs robocov[docs]")
+def test_lines_do_not_break_before_a_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(handbook.find_page_sources())
+    pattern = import_module("typography").SPACE_BEFORE_UNIT
+    text = "moves 5 cm within 4 s, at 1 m/s; 3 maps, 2 more"
+    assert pattern.sub("~", text) == "moves 5~cm within 4~s, at 1~m/s; 3 maps, 2 more"
 
 
 def test_without_sphinx_the_error_says_what_to_install(

@@ -33,14 +33,14 @@ from robocov_app.terminal.output import format_csv, format_json, replace_non_fin
 _COLLECTION_STEPS = 1000
 """Number of steps between two garbage collections in a long run."""
 FIGURES = {
-    "mean_distance_m": ("double", "m", "final mean distance to the nearest robot, (22) by area or ∫φ"),
+    "mean_distance_m": ("double", "m", "mean distance to the nearest robot at the end, weighted by φ"),
     "mean_distance_over_run_m": ("double", "m", "time average of the mean distance over the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
     "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
-    "settled_at_s": ("double", "s", "when the team came to rest, null if it did not"),
+    "settled_at_s": ("double", "s", "time at which the team settled, null if it did not"),
     "contacts": ("int64", "", "number of contacts of a robot with a wall or another robot"),
     "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
-    "path_length_m": ("double", "m", "distance traveled, mean over the robots"),
+    "path_length_m": ("double", "m", "path length, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
 """Figures of a run in the table, in order, with the type of the column, the unit and the meaning."""

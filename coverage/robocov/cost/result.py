@@ -122,7 +122,7 @@ class CoverageResult(Drawable):
 
     @cached_property
     def first_waypoints(self) -> FloatArray:
-        """First waypoint on the path from the owner to each site, (m, 2) m: a corner, or the site itself."""
+        """First corner on the path from the owner to each site, or else the site itself, (m, 2) m."""
         waypoints = self.points.copy()
         is_bent = self.first_corners >= 0
         waypoints[is_bent] = self.corners[self.first_corners[is_bent]]

@@ -118,7 +118,7 @@ class Environment(Drawable):
 
     @cached_property
     def blocked(self) -> MultiPolygon:
-        """Part of the region that is not free: obstacles, and the outside of a non-convex boundary."""
+        """Part of the region that is not free, including the outside of a non-convex boundary."""
         region = shapely.set_precision(self.region.polygon, GRID_M)
         return extract_polygons(shapely.difference(region, self.free, grid_size=GRID_M))
 
@@ -171,7 +171,7 @@ class Environment(Drawable):
 
     @cached_property
     def free_masses(self) -> FloatArray:
-        """Integral of φ over each component of the free space, m²: the area if there is no density."""
+        """Integral of φ over each component of the free space, m². It is the area if there is no density."""
         components = self.free.geoms
         if self.density is None:
             return freeze([component.area for component in components])

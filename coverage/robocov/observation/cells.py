@@ -28,7 +28,7 @@ class Cells(ABC):
     generators: FloatArray
     """(n, 2) m, the points to which the cells belong."""
     masses: FloatArray
-    """(n,) m², M of equation (2): the area of each cell if the density is 1."""
+    """M of equation (2), (n,) m². It is the area of each cell if the density is 1."""
     centroids: FloatArray
     """(n, 2) m, C of equation (2). The centroid of an empty cell is its generator."""
     density: Density | None = None
@@ -57,6 +57,6 @@ class Cells(ABC):
 
     @cached_property
     def polar_moments(self) -> FloatArray:
-        """J_{V,p} of equation (2), (n,) m⁴: the polar moment of each cell about its generator."""
+        """Polar moment of each cell about its generator, J_{V,p} of equation (2), (n,) m⁴."""
         density = self.density or Uniform()
         return density.compute_moments(self.edges, self.generators)[:, POLAR_MOMENT]

@@ -130,7 +130,7 @@ class Neighbors:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the graph is complete: all robots communicate at any distance."""
+        """Whether the graph is complete, so that all robots communicate at any distance."""
         return self.indptr is None
 
     def list_neighbors(self, robot: int) -> IntArray:

@@ -113,7 +113,7 @@ class Region:
 
     @cached_property
     def diameter(self) -> float:
-        """Diagonal of the bounding box, m: an upper bound on the distance between two points inside."""
+        """Diagonal of the bounding box, m. No two points inside are farther apart."""
         low_x, low_y, high_x, high_y = self.bounds
         return float(np.hypot(high_x - low_x, high_y - low_y))
 
