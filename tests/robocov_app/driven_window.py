@@ -57,7 +57,7 @@ def open_viewer(
     map_name: str = "hall",
     robots: int = 3,
     size: tuple[int, int] = SIZE,
-    scale: float = 1.0,
+    scale: float | None = 1.0,
     shown: set[str] | None = None,
     lattice: int = 16,
     **changes: Any,

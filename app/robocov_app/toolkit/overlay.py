@@ -24,17 +24,17 @@ _MESSAGE_TEXT_PX = 12.5
 _MESSAGE_LINE_PX = 18
 _MIN_MESSAGE_WIDTH_PX = 150
 """Minimum width of the lines of a message; next to an open panel on a phone, the arena is narrower."""
-_MAX_MESSAGE_WIDTH_PX = 620
+_MAX_MESSAGE_WIDTH_PX = 900
 _MESSAGE_MARGIN_PX = 14
 """Distance of the text of a message from the left and right edges of its box."""
 _MESSAGE_HEIGHT_PX = 14
 """Height of the box of a message in addition to that of its lines."""
 _FIRST_LINE_PX = 16
 """Distance of the middle of the first line of a message from the top of its box."""
-_MESSAGE_SIDE_PX = 40
+_MESSAGE_SIDE_PX = 10
 """Minimum distance of a message from the left and right edges of the arena."""
-_MESSAGE_BOTTOM_PX = 42
-"""Distance of a message from the bottom of the arena."""
+_MESSAGE_BOTTOM_PX = 1
+"""Distance of a message from the bottom of the arena, where it covers the margin but not the map."""
 _TAG_MARGIN_PX = 6
 _TAG_HEIGHT_PX = 20
 _TAG_RADIUS_PX = 4
@@ -207,7 +207,7 @@ def draw_status(
 def draw_message(
     screen: Surface, text: str, arena: Box, theme: Theme, scale: float, *, is_error: bool
 ) -> None:
-    """Draw a message at the bottom of the arena; nothing if the text is empty.
+    """Draw a message in the margin at the bottom of the arena; nothing if the text is empty.
 
     In an arena that is too narrow for words, the message extends beyond the arena, but not beyond the screen.
 

@@ -61,7 +61,7 @@ class ToolRail(CommandPart):
         A narrow rail has no space for names. There, tips appear at once.
         """
         super().arrange(layout, theme)
-        self.ui.has_tips_beside = True
+        self.ui.tip_side = "right"
         self._has_labels = layout.rail.width > round(RAIL_WIDTH_PX * layout.scale)
         self.ui.tool_tip.is_immediate = not self._has_labels
 

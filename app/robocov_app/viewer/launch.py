@@ -78,7 +78,7 @@ class ViewerLauncher:
     size : tuple of int or None
         Width and height, px; None for those of the settings.
     scale : float or None
-        Scale of texts and widgets; None for that of the settings.
+        Scale of texts and widgets; None for that of the settings, or one that suits the window.
     shown_layers : frozenset of str
         Layers that are visible in addition to those of the settings.
     hidden_layers : frozenset of str
@@ -164,7 +164,7 @@ class ViewerLauncher:
     def _open_window(self, settings: ViewerSettings) -> ViewerWindow:
         """Open the window with the settings; warn if it is too small for the requested scale."""
         scale = choose_scale(self.scale or settings.scale, has_display=not self._needs_no_display)
-        size = self._choose_size(settings, scale)
+        size = self._choose_size(settings)
         if not self.headless:
             self.session.playback.clock.budget = FRAME_BUDGET_S
         costs = Costs(self.lattice, direct=self.headless)
@@ -206,7 +206,7 @@ class ViewerLauncher:
         viewer.files.recent = list(settings.recent)
         return viewer
 
-    def _choose_size(self, settings: ViewerSettings, scale: float) -> tuple[int, int]:
+    def _choose_size(self, settings: ViewerSettings) -> tuple[int, int]:
         """Return the width and height of the window, px: as requested, or from the settings."""
         if self.size is not None:
             return self.size
@@ -215,8 +215,8 @@ class ViewerLauncher:
         if self.scale is not None:
             # In a smaller window, the requested scale would have to be reduced.
             min_width, min_height = MIN_SIZE_PX
-            width = max(width, round(min_width * scale))
-            height = max(height, round(min_height * scale))
+            width = max(width, round(min_width * self.scale))
+            height = max(height, round(min_height * self.scale))
         if self._needs_no_display:
             return (width, height)
         return fit_to_screen((width, height))

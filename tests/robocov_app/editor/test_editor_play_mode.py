@@ -56,9 +56,9 @@ def test_escape_closes_dialogs_before_it_leads_back(tmp_path: Path) -> None:
     with open_editor(tmp_path, load_sketch("square")) as driver:
         trial = start_trial(driver)
         driver.press_key("f1")
-        assert trial.is_help_open
+        assert trial.help_page.is_open
         driver.press_key("escape")
-        assert driver.window.play_mode.window is trial and not trial.is_help_open
+        assert driver.window.play_mode.window is trial and not trial.help_page.is_open
         driver.press_key("w")
         driver.press_key("escape")
         assert driver.window.play_mode.window is trial

@@ -48,7 +48,7 @@ def test_every_button_runs_its_command(driver: EditorDriver) -> None:
     driver.push_button("undo")
     assert driver.shapes[0] == BOX
     driver.push_button("help")
-    assert driver.window.is_help_open
+    assert driver.window.help_page.is_open
 
 
 def test_the_map_page_edits_name_radius_and_team(driver: EditorDriver) -> None:
@@ -327,6 +327,8 @@ def test_the_help_lists_all_keys(tmp_path: Path, size, scale: float, monkeypatch
     with open_editor(tmp_path, size=size, scale=scale) as driver:
         monkeypatch.setattr(help_page, "render_text", label)
         driver.press_key("f1")
+        for _ in range(5):
+            driver.press_key("page down")
     for action in driver.window.commands.commands:
         if action.keys and not action.hidden:
             title = action.title.partition(":")[0]

@@ -10,6 +10,7 @@ from robocov_app.look.colors import choose_text_color, compute_contrast, mix
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.hues import MAX_OWN_HUES, N_SHARED_HUES, choose_robot_hues, choose_trail_color
 from robocov_app.look.theme import THEMES, get_theme
+from robocov_app.toolkit.overlay import get_accent_ink
 
 
 def find_adjacent_pairs(points: np.ndarray) -> np.ndarray:
@@ -29,6 +30,11 @@ class TestReadability:
         assert compute_contrast(theme.ink, theme.background) >= 10
         assert compute_contrast(theme.faint, theme.background) >= 4.5
         assert compute_contrast(theme.ink, theme.panel) >= 10
+
+    def test_the_chosen_tool_stands_out_for_all_color_visions(self, theme):
+        assert find_least_difference([theme.accent, theme.panel]) >= 30
+        assert find_least_difference([theme.accent, get_accent_ink(theme)]) >= 30
+        assert compute_contrast(get_accent_ink(theme), theme.accent) >= 4.5
 
     def test_numbers_on_robots(self, theme):
         for fill in theme.robots:

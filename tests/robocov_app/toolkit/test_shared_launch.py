@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import pygame
 import pytest
 
 from robocov_app.toolkit.dialogs import create_recovery_question
-from robocov_app.toolkit.window.display import choose_scale
+from robocov_app.toolkit.window.display import choose_scale, find_suitable_scale
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 
 
@@ -22,6 +23,23 @@ def test_window_sizes_are_limited_for_settings(size: tuple[int, int], limited: t
 def test_a_requested_scale_has_priority_over_the_display() -> None:
     assert choose_scale(1.5, has_display=True) == 1.5
     assert choose_scale(None, has_display=False) == 1.0
+    assert choose_scale(None, has_display=True) is None
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"),
+    [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.25), ((2560, 1440), 1.5), ((2560, 720), 1.0)],
+)
+def test_the_scale_grows_with_the_window(
+    size: tuple[int, int], scale: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(1920, 1080)])
+    assert find_suitable_scale(size) == scale
+
+
+def test_the_scale_is_at_least_that_of_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(3840, 2160)])
+    assert find_suitable_scale((1280, 720)) == 2.0
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from robocov_app.toolkit.window.layout import build_layout, find_max_scale, is_i
 def test_the_panel_is_to_the_right_of_the_arena() -> None:
     layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert layout.panel == (960, 44, 320, 676)
-    assert layout.arena == (122, 44, 838, 506)
+    assert layout.arena == (128, 44, 832, 506)
     assert is_inside((10, 10, 5, 5), (14, 10))
     assert not is_inside((10, 10, 5, 5), (15, 10))
 

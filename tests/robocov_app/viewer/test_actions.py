@@ -142,7 +142,7 @@ def prepare(driver: Driver) -> None:
     window = driver.window
     viewer = driver.viewer
     session = driver.session
-    window.is_help_open = False
+    window.help_page.close()
     window.dialogs.close()
     window.lesson.end()
     viewer.attempt(lambda: viewer.files.open_map("square"))
@@ -197,7 +197,7 @@ def list_state(driver: Driver) -> list[object]:
         [pane.controller for pane in session.timeline.panes],
         window.canvas._painters[0].camera,
         [group.focus for group in window._list_focus_groups()],
-        window.is_help_open,
+        window.help_page.is_open,
         window.layer_bar.is_open,
         window.dialogs.is_open,
         window.lesson.player,

@@ -105,9 +105,9 @@ def test_escape_closes_the_help_before_the_lesson(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.press_key("f2")
         driver.press_key("f1")
-        assert driver.window.is_help_open
+        assert driver.window.help_page.is_open
         driver.press_key("escape")
-        assert not driver.window.is_help_open
+        assert not driver.window.help_page.is_open
         assert driver.window.lesson.player is not None
         driver.press_key("escape")
         assert driver.window.lesson.player is None

@@ -12,6 +12,7 @@ import pytest
 
 from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
+from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.viewer.canvas.layer_chips import build_layer_entries
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
@@ -49,15 +50,17 @@ def click(window: ViewerWindow, box: pygame.Rect) -> None:
 
 
 @pytest.mark.parametrize("controllers", [("rpf", "lloyd"), ("lloyd", "rpf")])
-def test_chips_explain_centroids_in_any_order_of_panes(tmp_path: Path, controllers: tuple[str, str]) -> None:
+def test_the_chip_of_centroids_names_controllers_without_goals(
+    tmp_path: Path, controllers: tuple[str, str]
+) -> None:
     with open_window(tmp_path, *controllers) as window:
-        assert "Centroids" in list_texts(window)
+        assert "Centroids (not RPF)" in list_texts(window)
 
 
 def test_chips_explain_each_symbol_once(tmp_path: Path) -> None:
     with open_window(tmp_path, "rpf", "lloyd", "atlas") as window:
         texts = list_texts(window)
-    assert {"Centroids", "Goals"} < set(texts)
+    assert {"Centroids (not RPF)", "Goals"} < set(texts)
     assert len(texts) == len(set(texts))
 
 
@@ -152,6 +155,18 @@ def test_a_key_goes_through_the_presets(tmp_path: Path) -> None:
         for preset in (*LAYER_PRESETS, LAYER_PRESETS[0]):
             window.do("preset:next")
             assert window.viewer.view.layers == preset.layers
+
+
+def test_in_a_small_window_a_menu_replaces_the_presets(tmp_path: Path) -> None:
+    with open_window(tmp_path, size=(900, 600)) as window:
+        window.do("preset:why")
+        window.run_frame(1 / 30)
+        chips = find_chips(window)
+        assert not any(command.startswith("preset:") for command in chips)
+        click(window, chips["presets"])
+        menu = window.dialogs.current
+        assert isinstance(menu, Menu)
+        assert [row.name for row in menu.rows if row] == [f"preset:{preset.name}" for preset in LAYER_PRESETS]
 
 
 def test_the_tool_tip_of_a_chip_says_what_a_click_does(tmp_path: Path, monkeypatch) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pygame
-import pytest
 from driven_window import open_viewer
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,10 +13,8 @@ from sample_sessions import RAPF
 
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.fonts import measure_text
-from robocov_app.toolkit.commands import help_page
 from robocov_app.toolkit.overlay import draw_message, wrap_text
 from robocov_app.toolkit.window.layout import Box
-from robocov_app.viewer.commands.viewer_commands import GROUPS
 from robocov_app.viewer.window.screen_video import copy_pixels
 
 
@@ -37,50 +34,6 @@ def test_a_message_in_a_narrow_arena_keeps_its_words_whole() -> None:
     (box,) = mask.get_bounding_rects()
     assert box.width > measure_text("all controllers", 12)
     assert box.left > 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5), ((3840, 2160), 2.0)]
-)
-def test_the_help_page_contains_all_keys_on_one_card(
-    size: tuple[int, int], scale: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    boxes: list[pygame.Rect] = []
-    texts: set[str] = set()
-    render_text = help_page.render_text
-    draw_card = help_page.draw_card
-
-    def render_and_list(text: str, *rest: object) -> pygame.Surface:
-        texts.add(text)
-        return render_text(text, *rest)
-
-    def draw_and_list(screen: pygame.Surface, box: pygame.Rect, *rest: object) -> None:
-        boxes.append(box.copy())
-        draw_card(screen, box, *rest)
-
-    with open_viewer(tmp_path, size=size, scale=scale) as driver:
-        window = driver.window
-        commands = window.commands.commands
-        veiled = window.screen.copy()
-        help_page.draw_veil(veiled, window.theme)
-        monkeypatch.setattr(help_page, "render_text", render_and_list)
-        monkeypatch.setattr(help_page, "draw_card", draw_and_list)
-        help_page.draw_help_page(
-            window.screen, window.theme, window.layout.scale, commands, groups=GROUPS, hint=""
-        )
-        (box,) = boxes
-        assert window.screen.get_rect().contains(box)
-        # Long titles are shortened.
-        starts = tuple(text.rstrip("…") for text in texts if text.strip("… "))
-        for command in commands:
-            if command.keys:
-                title = command.title.partition(":")[0]
-                assert any(title.startswith(start) for start in starts), title
-        # Nothing is drawn outside the card.
-        for picture in (veiled, window.screen):
-            picture.fill((0, 0, 0), box)
-        assert np.array_equal(copy_pixels(veiled), copy_pixels(window.screen))
 
 
 def test_a_long_message_is_wrapped_within_the_arena(tmp_path: Path) -> None:

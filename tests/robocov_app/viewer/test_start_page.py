@@ -158,11 +158,11 @@ def test_theme_and_help_have_keys_and_buttons() -> None:
         click(page, "theme")
         assert page.theme_name == "light"
         press(page, "f1")
-        assert page.is_help_open
+        assert page.help_page.is_open
         press(page, "escape")
-        assert not page.is_help_open
+        assert not page.help_page.is_open
         click(page, "help")
-        assert page.is_help_open
+        assert page.help_page.is_open
 
 
 def test_examples_move_and_rest_after_a_while() -> None:

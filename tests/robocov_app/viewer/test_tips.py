@@ -14,7 +14,9 @@ from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, draw_tool_tip
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.viewer.panel.sketches import get_sketch
 
-WIDGET = pygame.Rect(100, 80, 36, 36)
+WIDGET = pygame.Rect(270, 80, 36, 36)
+PAGE = pygame.Rect(260, 40, 60, 300)
+"""Panel that contains the widget."""
 
 
 def find_tip_box(text: str, **options) -> pygame.Rect:
@@ -22,7 +24,7 @@ def find_tip_box(text: str, **options) -> pygame.Rect:
     blank = pygame.Color(1, 2, 3)
     screen = pygame.Surface((600, 400))
     screen.fill(blank)
-    draw_tool_tip(screen, text, LIGHT, 1.0, x=WIDGET.left, widget=WIDGET, **options)
+    draw_tool_tip(screen, text, LIGHT, 1.0, widget=WIDGET, page=PAGE, **options)
     mask = pygame.mask.from_threshold(screen, blank, (1, 1, 1))
     mask.invert()
     (box,) = mask.get_bounding_rects()
@@ -36,11 +38,47 @@ def quick_tips(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("driver")
-def test_tips_are_below_or_beside_their_widget() -> None:
+def test_tips_are_below_their_widget_or_beside_its_page() -> None:
     assert find_tip_box("Wall").top > WIDGET.bottom
-    beside = find_tip_box("Wall (W)\nDrag.", is_beside=True)
-    assert beside.left > WIDGET.right
-    assert beside.top < WIDGET.centery < beside.bottom
+    right = find_tip_box("Wall (W)\nDrag.", side="right")
+    assert right.left > PAGE.right
+    assert right.top < WIDGET.centery < right.bottom
+    assert find_tip_box("Wall (W)\nDrag.", side="left").right < PAGE.left
+
+
+@pytest.mark.usefixtures("driver")
+@pytest.mark.parametrize("page", [pygame.Rect(0, 40, 600, 300), pygame.Rect(0, 60, 600, 340)])
+def test_without_space_beside_the_page_tips_are_below_or_above_it(
+    page: pygame.Rect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(globals(), "PAGE", page)
+    assert not find_tip_box("Radius of the robots", side="left").colliderect(page)
+
+
+@pytest.mark.usefixtures("quick_tips")
+def test_tips_of_the_panel_cover_no_row_of_the_panel(driver: Driver) -> None:
+    panel = driver.window.panel.ui
+    label = driver.get_widget("label", "Repulsion strength")
+    driver.move(*driver.find_pixel((0.1, 0.1)))
+    driver.window.draw()
+    before = driver.copy_frame()
+    driver.move(*label.rect.center)
+    driver.window.draw()
+    differs = (driver.copy_frame() != before).any(axis=2)
+    assert not differs[:, panel.box.left :].any()
+    assert differs[:, panel.box.left - 60 : panel.box.left].any()
+
+
+@pytest.mark.usefixtures("quick_tips")
+def test_a_pressed_widget_shows_no_tip_until_the_mouse_has_left_it(driver: Driver) -> None:
+    tip = driver.window.panel.ui.tool_tip
+    plus = driver.get_widget("button", "more").rect.center
+    driver.move(*plus)
+    assert tip.is_due
+    driver.click(*plus)
+    assert not tip.is_due
+    driver.move(*driver.get_widget("button", "fewer").rect.center)
+    assert tip.is_due
 
 
 @pytest.mark.usefixtures("driver")

@@ -167,6 +167,12 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
         assert not driver.viewer.view.is_recording
 
 
+def test_playing_removes_the_hint_to_play(driver: Driver) -> None:
+    driver.viewer.show_message("Press Play, or Space, to let the robots move.")
+    driver.press_key("space")
+    assert driver.viewer.message == ""
+
+
 # help, palette, theme, size
 
 
@@ -174,14 +180,24 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
 def test_the_help_page_closes_by_key_or_click(key: str, driver: Driver) -> None:
     plain = driver.copy_frame()
     driver.press_key(key)
-    assert driver.window.is_help_open
+    assert driver.window.help_page.is_open
     assert not driver.shows_frame(plain)
     driver.press_key("escape")
-    assert not driver.window.is_help_open
+    assert not driver.window.help_page.is_open
     driver.press_key(key)
     driver.click(300, 300)
-    assert not driver.window.is_help_open
+    assert not driver.window.help_page.is_open
     assert driver.viewer.selected_robot is None
+
+
+def test_the_scale_follows_the_size_of_the_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pygame.display, "get_desktop_sizes", lambda: [(1920, 1080)])
+    with open_viewer(tmp_path, size=(1280, 720), scale=None) as driver:
+        assert driver.window.layout.scale == 1.0
+        resize_window(driver, (2560, 1440))
+        assert driver.window.layout.scale == 1.5
+        resize_window(driver, (1280, 720))
+        assert driver.window.layout.scale == 1.0
 
 
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])

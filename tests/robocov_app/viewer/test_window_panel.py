@@ -208,7 +208,7 @@ def test_keys_typed_into_a_field_are_not_shortcuts(driver: Driver) -> None:
     assert driver.viewer.view.theme == "light"
     assert not driver.session.playback.is_playing
     driver.press_key("f1")
-    assert driver.window.is_help_open
+    assert driver.window.help_page.is_open
 
 
 def test_typing_keeps_the_key_repeat(driver: Driver) -> None:

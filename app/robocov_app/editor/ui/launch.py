@@ -56,7 +56,7 @@ class EditorLauncher:
     size : tuple of int or None
         Width and height, px; None for the size that was used last.
     scale : float or None
-        Size of text and widgets; None for the scale that was used last.
+        Size of text and widgets; None for that of the settings, or one that suits the window.
     headless : bool
         Whether to draw without a display. Neither settings nor drafts are saved.
     served : bool

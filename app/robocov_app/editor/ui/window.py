@@ -1,7 +1,6 @@
 """The window of the editor, which handles events and draws frames."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,7 +69,7 @@ class FrameState(NamedTuple):
     team: Team | None
     camera: Camera
     hovered: Problem | None
-    is_help_open: bool
+    help_page: object
     dialog_id: int
     layout_key: tuple[object, ...] | None
     caption: tuple[str, ...]
@@ -85,8 +84,8 @@ class EditorWindow(CommandWindow):
         The editor.
     size : tuple of int
         Width and height, px.
-    scale : float
-        Size of text and widgets.
+    scale : float or None
+        Size of text and widgets; None for one that suits the size of the window.
     drafts : Path or None
         Folder for drafts; None to save no drafts.
     waits_for_workers : bool
@@ -128,7 +127,7 @@ class EditorWindow(CommandWindow):
         self,
         editor: Editor,
         size: tuple[int, int],
-        scale: float,
+        scale: float | None,
         drafts: Path | None,
         *,
         waits_for_workers: bool = False,
@@ -177,8 +176,9 @@ class EditorWindow(CommandWindow):
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        controls = read_window_controls(self.editor, self.screen.get_size(), self.layout, self.parts)
-        return replace(controls, is_covered=self.map_pictures.is_covered)
+        size = self.screen.get_size()
+        is_covered = self.find_cover() is not None
+        return read_window_controls(self.editor, size, self.layout, self.parts, is_covered=is_covered)
 
     def create_save_point(self) -> Callable[[], None]:
         """Return a function that restores the current state of the document after an unexpected error."""
@@ -243,7 +243,7 @@ class EditorWindow(CommandWindow):
             team=canvas.team,
             camera=canvas.camera,
             hovered=canvas.hovered,
-            is_help_open=self.is_help_open,
+            help_page=self.help_page.frame_key,
             dialog_id=id(dialog),
             layout_key=self._layout_key,
             caption=pygame.display.get_caption(),
@@ -303,13 +303,14 @@ class EditorWindow(CommandWindow):
     def _arrange(self) -> None:
         """Update the layout after a change of size, scale, panel or theme; otherwise do nothing."""
         editor = self.editor
-        key = (self.screen.get_size(), self.scale, editor.shows_panel, editor.is_compact, editor.theme)
+        scale = self.suitable_scale
+        key = (self.screen.get_size(), scale, editor.shows_panel, editor.is_compact, editor.theme)
         if key == self._layout_key:
             return
         self._layout_key = key
         self.theme = get_theme(editor.theme)
         self.layout = build_layout(
-            key[0], self.scale, panel=editor.shows_panel, plot=False, is_compact=editor.is_compact
+            key[0], scale, panel=editor.shows_panel, plot=False, is_compact=editor.is_compact
         )
         self.canvas.arrange(self.layout, self.theme)
         for part in self.parts:

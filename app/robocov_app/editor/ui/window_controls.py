@@ -10,7 +10,12 @@ from robocov_app.toolkit.window_part import WindowPart
 
 
 def read_window_controls(
-    editor: Editor, size: tuple[int, int], layout: Layout, parts: Sequence[WindowPart]
+    editor: Editor,
+    size: tuple[int, int],
+    layout: Layout,
+    parts: Sequence[WindowPart],
+    *,
+    is_covered: bool,
 ) -> WindowControls:
     """Return the state of the editor that the buttons of a phone's page show.
 
@@ -24,6 +29,8 @@ def read_window_controls(
         Layout of the window.
     parts : sequence of WindowPart
         Top bar, tool rail and panel.
+    is_covered : bool
+        Whether a dialog or the help page covers the map.
 
     Returns
     -------
@@ -38,10 +45,11 @@ def read_window_controls(
         lesson="",
         has_panel=editor.shows_panel,
         is_typing=editor.dialogs.is_typing or any(part.is_typing for part in parts),
-        scroll_box=find_scroll_box(size, layout, is_covered=editor.dialogs.is_open),
+        scroll_box=find_scroll_box(size, layout, is_covered=is_covered),
         kind="editor",
         is_drawing=editor.tool.is_busy,
         can_delete=bool(editor.selection),
+        is_covered=is_covered,
         map_box=_find_map_box(editor, layout),
     )
 

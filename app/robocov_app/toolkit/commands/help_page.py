@@ -1,71 +1,105 @@
 """The help page, which lists the keys of all commands."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
+import pygame
 from pygame import Rect, Surface
 
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
-from robocov_app.render.fonts import render_text, shorten_to_width
+from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
 from robocov_app.toolkit.commands.command import Command
-from robocov_app.toolkit.overlay import draw_card, draw_veil
-from robocov_app.toolkit.window.input import format_key
+from robocov_app.toolkit.overlay import draw_card, draw_rounded_box, draw_veil, wrap_text
+from robocov_app.toolkit.window.input import SCROLL_PX_PER_NOTCH, format_key, get_key_name, get_wheel_notches
 
 Position: TypeAlias = tuple[float, float]
 """Horizontal and vertical position in the window, px."""
 
-# Lengths in pixels at scale 1.
-_WIDE_WINDOW_PX = 1150
+# Lengths in pixels at scale 1. The page is never drawn at a smaller scale.
+_TEXT_PX = 12
+_ROW_PX = 17.5
+_MIN_COLUMN_PX = 266
 _MAX_WIDTH_PX = 1240
-_MAX_ROW_PX = 16.5
 _MARGIN_PX = 20
 _TOP_PX = 44
 _BOTTOM_PX = 14
 _TITLE_SIZE_PX = 16
-_HINT_SIZE_PX = 11
-_KEY_WIDTH_PX = 84
+_KEY_WIDTH_PX = 98
 _TITLE_GAP_PX = 8
-"""Distance between the title of a command and the next column."""
+"""Distance between the title of a command and the next column, and between the title and the hint."""
 _TITLE_TOP_PX = 12
 _HINT_MIDDLE_PX = 22
 """Distance of the middle of the hint from the upper edge of the page."""
+_HINT_LINE_PX = 16
 _WINDOW_MARGIN_PX = 12
-"""Minimum distance of the page from the left and right edges of the window."""
-_MIN_SPACE_AROUND_ROWS_PX = 90
-"""Minimum difference between the heights of the window and of the rows."""
-_SPACE_AROUND_ROWS_PX = 66
-"""Difference between the heights of the page and of the rows."""
+"""Minimum distance of the page from the edges of the window."""
+_BAR_WIDTH_PX = 6
+_BAR_RIGHT_PX = 7
+"""Distance of the scroll bar from the right edge of the page."""
+_MIN_KNOB_PX = 20
 
-_COLUMN_COUNT = 3
-_WIDE_COLUMN_COUNT = 4
-"""Number of columns in windows that are at least `_WIDE_WINDOW_PX` wide."""
-_TEXT_FRACTION = 0.66
-"""Size of the text as a fraction of the height of a row."""
-_HEADING_TEXT_FRACTION = 0.92
-"""Size of the headings as a fraction of the size of the text."""
+_MIN_SCALE = 1.0
+_TITLE = "Keys"
+_MAX_COLUMNS = 4
 _HEADING_GAP_ROWS = 0.5
 """Space above a heading."""
 _TITLE_STRENGTH = 0.8
 """Fraction of the color of text in the titles of commands."""
-
-_MIN_TEXT_PX = 8
-"""Minimum text size, at any scale."""
+_KNOB_STRENGTH = 0.35
+"""Fraction of the color of text in the scroll bar."""
 _HEADING_ROWS = 2.6
 """Rows that must be free for a heading, so that it is never the last line of a column."""
+
+_LINE_KEYS = {"up": -1.0, "down": 1.0}
+"""Number of rows by which a key scrolls the page."""
+_PAGE_KEYS = {"page up": -1.0, "page down": 1.0, "home": -math.inf, "end": math.inf}
+"""Number of visible heights by which a key scrolls the page."""
+
+
+class _Cell(NamedTuple):
+    """A heading or a command with its column, and its row below the start of the columns."""
+
+    line: str | Command
+    column: int
+    row: float
 
 
 @dataclass(frozen=True)
 class _Columns:
-    """Layout of the help page: `count` columns of rows inside `box`, in pixels."""
+    """Layout of the help page, in pixels.
+
+    Attributes
+    ----------
+    count : int
+        Number of columns.
+    cells : list of _Cell
+        The lines with their positions.
+    box : Rect
+        The card.
+    hint_lines : list of str
+        Lines of the hint below the title; empty if the hint is next to the title.
+    scale : float
+        Scale of the text.
+    """
 
     count: int
-    row_height: float
-    text_size: int
+    cells: list[_Cell]
     box: Rect
+    hint_lines: list[str]
     scale: float
+
+    @property
+    def row_height(self) -> float:
+        """Height of a row, px."""
+        return _ROW_PX * self.scale
+
+    @property
+    def text_size(self) -> int:
+        """Size of the text, px."""
+        return round(_TEXT_PX * self.scale)
 
     @property
     def width(self) -> float:
@@ -73,50 +107,132 @@ class _Columns:
         return (self.box.width - 2 * _MARGIN_PX * self.scale) / self.count
 
     @property
-    def top(self) -> float:
-        """Upper end of the columns, px."""
-        return self.box.top + _TOP_PX * self.scale
+    def height(self) -> float:
+        """Height of the longest column, px."""
+        return max(cell.row + 1 for cell in self.cells) * self.row_height
 
     @property
-    def bottom(self) -> float:
-        """Lower end of the columns, px."""
-        return self.box.bottom - _BOTTOM_PX * self.scale
+    def view(self) -> Rect:
+        """Part of the card in which the columns are visible."""
+        top = round(_measure_top(self.hint_lines) * self.scale)
+        bottom = round(_BOTTOM_PX * self.scale)
+        return Rect(self.box.left, self.box.top + top, self.box.width, self.box.height - top - bottom)
+
+    @property
+    def max_offset(self) -> float:
+        """Maximum distance by which the columns can be scrolled, px."""
+        return max(self.height - self.view.height, 0.0)
 
 
-def draw_help_page(
-    screen: Surface,
-    theme: Theme,
-    scale: float,
-    commands: Sequence[Command],
-    *,
-    groups: Sequence[str],
-    hint: str,
-) -> None:
-    """Draw the help page with the keys of commands over the window.
+class HelpPage:
+    """The page with the keys of all commands; it scrolls if they do not fit into the window.
 
     Parameters
     ----------
-    screen : pygame.Surface
-    theme : Theme
-    scale : float
-        Scale of the text. The text is reduced further if the page does not fit into the window.
-    commands : sequence of Command
     groups : sequence of str
         Names of the command groups, in the order in which they are shown.
     hint : str
-        Text next to the title.
+        Text next to the title, or below it in a narrow window.
+
+    Attributes
+    ----------
+    is_open : bool
+        Whether the page is shown.
     """
-    draw_veil(screen, theme)
-    lines = _list_lines(commands, groups)
-    columns = _arrange_columns(screen, scale, rows=len(lines) + len(groups))
-    draw_card(screen, columns.box, theme, scale)
-    _draw_title(screen, theme, columns, hint)
-    for line, (x, y) in _place_lines(lines, columns):
-        if isinstance(line, str):
-            size = max(_MIN_TEXT_PX, round(columns.text_size * _HEADING_TEXT_FRACTION))
-            screen.blit(render_text(line.upper(), size, theme.accent, True), (round(x), round(y)))
-        else:
-            _draw_command(screen, theme, columns, line, (x, y))
+
+    def __init__(self, groups: Sequence[str], hint: str) -> None:
+        self.is_open = False
+        self._groups = groups
+        self._hint = hint
+        self._offset = 0.0
+        self._columns: _Columns | None = None
+
+    @property
+    def frame_key(self) -> object:
+        """Values on which the drawn page depends."""
+        return self.is_open, self._offset
+
+    def toggle(self) -> None:
+        """Show the page from its start, or close it."""
+        self.is_open = not self.is_open
+        self._offset = 0.0
+
+    def close(self) -> None:
+        """Close the page."""
+        self.is_open = False
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Scroll or close the open page; return whether it has used the event.
+
+        A press of a mouse button closes the page, and does nothing else.
+        """
+        if not self.is_open:
+            return False
+        if event.type == pygame.KEYDOWN:
+            return self._handle_key(get_key_name(event))
+        if event.type == pygame.MOUSEWHEEL:
+            scale = self._columns.scale if self._columns else _MIN_SCALE
+            self._scroll(-SCROLL_PX_PER_NOTCH * scale * get_wheel_notches(event))
+            return True
+        if event.type == pygame.MOUSEBUTTONDOWN:
+            # Turns of the wheel are reported as presses of further buttons, too.
+            if event.button <= pygame.BUTTON_RIGHT:
+                self.close()
+            return True
+        return False
+
+    def _handle_key(self, name: str) -> bool:
+        """Scroll the page by a key; return whether it was used."""
+        columns = self._columns
+        if columns is None:
+            return False
+        if name in _LINE_KEYS:
+            self._scroll(_LINE_KEYS[name] * columns.row_height)
+            return True
+        if name in _PAGE_KEYS:
+            self._scroll(_PAGE_KEYS[name] * columns.view.height)
+            return True
+        return False
+
+    def _scroll(self, distance: float) -> None:
+        """Scroll the columns by a distance, px; they stop at their ends."""
+        if self._columns is not None:
+            self._offset = min(max(self._offset + distance, 0.0), self._columns.max_offset)
+
+    def draw(self, screen: Surface, theme: Theme, scale: float, commands: Sequence[Command]) -> None:
+        """Draw the page over the window, if it is open.
+
+        Parameters
+        ----------
+        screen : pygame.Surface
+        theme : Theme
+        scale : float
+            Scale of the window. The page is drawn at scale 1 or larger.
+        commands : sequence of Command
+        """
+        if not self.is_open:
+            return
+        draw_veil(screen, theme)
+        lines = _list_lines(commands, self._groups)
+        columns = _arrange_columns(screen, max(scale, _MIN_SCALE), self._hint, lines)
+        self._columns = columns
+        self._scroll(0.0)
+        draw_card(screen, columns.box, theme, columns.scale)
+        _draw_title(screen, theme, columns, self._hint)
+        view = columns.view
+        screen.set_clip(view.clip(screen.get_rect()))
+        for cell in columns.cells:
+            x = columns.box.left + _MARGIN_PX * columns.scale + cell.column * columns.width
+            y = view.top + cell.row * columns.row_height - self._offset
+            if not view.top - columns.row_height < y < view.bottom:
+                continue
+            if isinstance(cell.line, str):
+                image = render_text(cell.line.upper(), columns.text_size, theme.accent, True)
+                screen.blit(image, (round(x), round(y)))
+            else:
+                _draw_command(screen, theme, columns, cell.line, (x, y))
+        screen.set_clip(None)
+        _draw_scroll_bar(screen, theme, columns, self._offset)
 
 
 def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str | Command]:
@@ -129,53 +245,91 @@ def _list_lines(commands: Sequence[Command], groups: Sequence[str]) -> list[str 
     return lines
 
 
-def _arrange_columns(screen: Surface, scale: float, rows: int) -> _Columns:
-    """Choose the number of columns, and a row height at which `rows` rows fit."""
+def _arrange_columns(screen: Surface, scale: float, hint: str, lines: Sequence[str | Command]) -> _Columns:
+    """Choose the number of columns by the width of the window, and the height of the card by the rows."""
     width, height = screen.get_size()
-    count = _COLUMN_COUNT
-    if width >= _WIDE_WINDOW_PX * scale:
-        count = _WIDE_COLUMN_COUNT
-    # One spare row, because a heading may have to move to the next column.
-    rows_per_column = math.ceil(rows / count) + 1
-    row_height = min(_MAX_ROW_PX * scale, (height - _MIN_SPACE_AROUND_ROWS_PX * scale) / rows_per_column)
-    box_width = round(min(width - 2 * _WINDOW_MARGIN_PX * scale, _MAX_WIDTH_PX * scale))
-    box_height = round(rows_per_column * row_height + _SPACE_AROUND_ROWS_PX * scale)
+    margin = 2 * _WINDOW_MARGIN_PX * scale
+    box_width = round(min(width - margin, _MAX_WIDTH_PX * scale))
+    text_width = box_width - 2 * _MARGIN_PX * scale
+    count = min(max(int(text_width / (_MIN_COLUMN_PX * scale)), 1), _MAX_COLUMNS)
+    cells = _place_lines(lines, count)
+    hint_lines = _wrap_hint(hint, text_width, scale)
+    space_around_rows = (_measure_top(hint_lines) + _BOTTOM_PX) * scale
+    rows_height = max(cell.row + 1 for cell in cells) * _ROW_PX * scale
+    box_height = round(min(rows_height + space_around_rows, height - margin))
     box = Rect(0, 0, box_width, box_height)
     box.center = width // 2, height // 2
-    text_size = max(_MIN_TEXT_PX, round(row_height * _TEXT_FRACTION))
-    return _Columns(count, row_height, text_size, box, scale)
+    return _Columns(count, cells, box, hint_lines, scale)
+
+
+def _place_lines(lines: Sequence[str | Command], count: int) -> list[_Cell]:
+    """Distribute lines over a number of columns that are as short as possible."""
+    rows = math.ceil(len(lines) / count)
+    cells = _fill_columns(lines, rows)
+    while cells[-1].column >= count:
+        rows += 1
+        cells = _fill_columns(lines, rows)
+    return cells
+
+
+def _fill_columns(lines: Sequence[str | Command], rows: int) -> list[_Cell]:
+    """Distribute lines over columns with a number of rows; as many columns as it takes."""
+    cells: list[_Cell] = []
+    column = 0
+    row = 0.0
+    for line in lines:
+        is_heading = isinstance(line, str)
+        if row + (_HEADING_ROWS if is_heading else 1) > rows:
+            column += 1
+            row = 0.0
+        if is_heading and row > 0.0:
+            row += _HEADING_GAP_ROWS
+        cells.append(_Cell(line, column, row))
+        row += 1
+    return cells
+
+
+def _wrap_hint(hint: str, width: float, scale: float) -> list[str]:
+    """Return the lines of the hint below the title; none if it fits next to the title in a width, px."""
+    size = round(_TEXT_PX * scale)
+    title_width = measure_text(_TITLE, round(_TITLE_SIZE_PX * scale), True)
+    if title_width + _TITLE_GAP_PX * scale + measure_text(hint, size) <= width:
+        return []
+    return wrap_text(hint, size, width)
+
+
+def _measure_top(hint_lines: Sequence[str]) -> float:
+    """Return the height of the title, and of the hint below it, px at scale 1."""
+    return _TOP_PX + _HINT_LINE_PX * len(hint_lines)
 
 
 def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
     scale = columns.scale
-    box = columns.box
-    title = render_text("Keys", round(_TITLE_SIZE_PX * scale), theme.ink, True)
-    screen.blit(title, (box.left + round(_MARGIN_PX * scale), box.top + round(_TITLE_TOP_PX * scale)))
-    image = render_text(hint, round(_HINT_SIZE_PX * scale), theme.faint)
-    right_end = box.right - round(_MARGIN_PX * scale), box.top + round(_HINT_MIDDLE_PX * scale)
-    screen.blit(image, image.get_rect(midright=right_end))
+    left = columns.box.left + round(_MARGIN_PX * scale)
+    top = columns.box.top
+    title = render_text(_TITLE, round(_TITLE_SIZE_PX * scale), theme.ink, True)
+    screen.blit(title, (left, top + round(_TITLE_TOP_PX * scale)))
+    for number, line in enumerate(columns.hint_lines):
+        image = render_text(line, columns.text_size, theme.faint)
+        y = top + round((_TITLE_TOP_PX + _TITLE_SIZE_PX + _TITLE_GAP_PX + _HINT_LINE_PX * number) * scale)
+        screen.blit(image, (left, y))
+    if not columns.hint_lines:
+        image = render_text(hint, columns.text_size, theme.faint)
+        right_end = columns.box.right - round(_MARGIN_PX * scale), top + round(_HINT_MIDDLE_PX * scale)
+        screen.blit(image, image.get_rect(midright=right_end))
 
 
-def _place_lines(
-    lines: Sequence[str | Command], columns: _Columns
-) -> Iterator[tuple[str | Command, Position]]:
-    """Yield each line with the position of its upper left corner, px."""
-    row_height = columns.row_height
-    x = columns.box.left + _MARGIN_PX * columns.scale
-    y = columns.top
-    for line in lines:
-        is_heading = isinstance(line, str)
-        # A heading must fit together with its first command.
-        height = row_height
-        if is_heading:
-            height = row_height * _HEADING_ROWS
-        if y + height > columns.bottom:
-            x += columns.width
-            y = columns.top
-        if is_heading and y > columns.top + columns.scale:
-            y += _HEADING_GAP_ROWS * row_height
-        yield line, (x, y)
-        y += row_height
+def _draw_scroll_bar(screen: Surface, theme: Theme, columns: _Columns, offset: float) -> None:
+    """Draw the scroll bar at the right edge of the card, if not all rows are visible."""
+    if not columns.max_offset:
+        return
+    view = columns.view
+    width = round(_BAR_WIDTH_PX * columns.scale)
+    height = max(round(view.height**2 / columns.height), round(_MIN_KNOB_PX * columns.scale))
+    top = view.top + round((view.height - height) * offset / columns.max_offset)
+    left = columns.box.right - round(_BAR_RIGHT_PX * columns.scale) - width
+    color = mix(theme.panel, theme.ink, _KNOB_STRENGTH)
+    draw_rounded_box(screen, Rect(left, top, width, height), color, edge=color, radius=width // 2)
 
 
 def _draw_command(

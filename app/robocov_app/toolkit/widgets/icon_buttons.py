@@ -17,10 +17,10 @@ from robocov_app.toolkit.widgets.page import Page, Widget
 
 # Lengths in pixels at scale 1.
 _ICON_PX = 20.0
-_ICON_CELL_PX = 34.0  # part of a button with a label that the icon takes
+_ICON_CELL_PX = 32.0  # part of a button with a label that the icon takes
 _MAIN_ICON_PX = 22.0
 _KEY_TEXT_PX = 9.0
-_KEY_MARGIN_PX = (3, 1)
+_KEY_MARGIN_PX = (4, 1)
 _CORNER_RADIUS_PX = 6.0
 _ROUND_RADIUS_PX = 100.0  # larger than any button, so that its ends are half circles
 _KEY_LINE_PX = 11.0
@@ -61,7 +61,7 @@ def show_icon_button(
     selected : bool
         Whether it is highlighted.
     shortcut : str
-        Name of a key, which is drawn in the lower right corner.
+        Name of a key, which is drawn at the right end of the label, or in the corner of a bare icon.
     has_label : bool
         Whether the name is drawn to the right of the icon.
 
@@ -84,12 +84,20 @@ def show_icon_button(
             draw_text(page, text, label, ink, TEXT_PX)
         _draw_icon(page, icon, icon_rect, _ICON_PX, ink)
         if shortcut:
-            corner = rect.inflate(-page.px(2 * _KEY_MARGIN_PX[0]), -page.px(2 * _KEY_MARGIN_PX[1]))
-            corner.top = corner.bottom - page.px(_KEY_LINE_PX)
-            corner.height = page.px(_KEY_LINE_PX)
             faint = ink if selected else page.theme.faint
-            draw_text(page, shortcut, corner, faint, _KEY_TEXT_PX, align="right")
+            place = _place_shortcut(page, rect, in_corner=not has_label)
+            draw_text(page, shortcut, place, faint, _KEY_TEXT_PX, align="right")
     return is_clicked
+
+
+def _place_shortcut(page: Page, button: Rect, *, in_corner: bool) -> Rect:
+    """Return the box of a shortcut: in the lower right corner, or on the line of the label."""
+    margin_x, margin_y = _KEY_MARGIN_PX
+    box = button.inflate(-page.px(2 * margin_x), -page.px(2 * margin_y))
+    if in_corner:
+        box.top = box.bottom - page.px(_KEY_LINE_PX)
+        box.height = page.px(_KEY_LINE_PX)
+    return box
 
 
 def show_main_button(page: Page, icon: str, text: str, *, key: str, tip: str = "") -> bool:

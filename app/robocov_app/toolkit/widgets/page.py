@@ -18,7 +18,7 @@ from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.widgets.open_list import OpenList
 from robocov_app.toolkit.widgets.row_layout import RowLayout
 from robocov_app.toolkit.widgets.text_edit import TextEdit
-from robocov_app.toolkit.widgets.tool_tip import TipSketch, ToolTip, draw_tool_tip
+from robocov_app.toolkit.widgets.tool_tip import TipSide, TipSketch, ToolTip, draw_tool_tip
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 
@@ -104,8 +104,8 @@ class Page(RowLayout):
         Scroll offset and total height of the content at scale 1, px, by the key of the scroll area.
     tool_tip : ToolTip
         Decides when the tip of the widget under the pointer appears.
-    has_tips_beside : bool
-        Whether tips are to the right of their widgets instead of below them.
+    tip_side : TipSide
+        Where tips appear: below their widgets, or to the left or right of the page.
     """
 
     def __init__(self, theme: Theme, scale: float = 1.0) -> None:
@@ -135,7 +135,7 @@ class Page(RowLayout):
         self._last_click_s = -1.0
         self._last_click_key = ""
         self.tool_tip = ToolTip()
-        self.has_tips_beside = False
+        self.tip_side: TipSide = "below"
 
     def build(self) -> None:
         """Show the widgets and handle their input; called in every run."""
@@ -239,10 +239,10 @@ class Page(RowLayout):
                 widget.tip,
                 self.theme,
                 self.scale,
-                x=self.pointer[0],
                 widget=widget.rect,
+                page=self.box,
+                side=self.tip_side,
                 sketch=widget.sketch,
-                is_beside=self.has_tips_beside,
             )
 
     # For widgets

@@ -66,7 +66,7 @@ class PageEvents:
         page.pointer = event.pos
         if event.button != 1:
             return page.is_pointer_inside()
-        page.tool_tip.restart()
+        page.tool_tip.dismiss()
         if handle_list_event(self._page, event):
             return True
         if page.focus is not None and not self._is_focused_widget_at(event.pos):

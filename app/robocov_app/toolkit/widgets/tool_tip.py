@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from time import perf_counter
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from pygame import BLEND_PREMULTIPLIED, Rect, Surface
 
@@ -35,6 +35,10 @@ TipSketch: TypeAlias = Callable[[float], Surface]
 """Function that renders a drawing for a tool tip, with premultiplied alpha, at a scale."""
 
 
+TipSide: TypeAlias = Literal["below", "left", "right"]
+"""Where a tip appears: below its widget, or to the left or right of the page with the widget."""
+
+
 class _Line(NamedTuple):
     """A line of a tool tip."""
 
@@ -54,11 +58,16 @@ class ToolTip:
     def __init__(self) -> None:
         self.is_immediate = False
         self._hovered = ""
+        self._is_dismissed = False
         self._rested_since_s = perf_counter()
 
     def restart(self) -> None:
-        """Restart the waiting time, because a button or key was pressed."""
+        """Restart the waiting time, because a key was pressed."""
         self._rested_since_s = perf_counter()
+
+    def dismiss(self) -> None:
+        """Show no tip until the mouse is over another widget, because this one was pressed."""
+        self._is_dismissed = True
 
     def note_hovered(self, widget: str) -> bool:
         """Record the widget under the mouse, and return whether it has changed.
@@ -71,12 +80,15 @@ class ToolTip:
         if widget == self._hovered:
             return False
         self._hovered = widget
+        self._is_dismissed = False
         self.restart()
         return True
 
     @property
     def is_due(self) -> bool:
-        """Whether the mouse has rested long enough."""
+        """Whether the mouse has rested long enough over a widget that it has not pressed."""
+        if self._is_dismissed:
+            return False
         return self.is_immediate or perf_counter() - self._rested_since_s >= TIP_DELAY_S
 
 
@@ -86,12 +98,12 @@ def draw_tool_tip(
     theme: Theme,
     scale: float,
     *,
-    x: int,
     widget: Rect,
+    page: Rect,
+    side: TipSide = "below",
     sketch: TipSketch | None = None,
-    is_beside: bool = False,
 ) -> None:
-    """Draw a tool tip below a widget, or above it if there is no space below.
+    """Draw a tool tip next to a widget, where it covers neither the widget nor its neighbors.
 
     Parameters
     ----------
@@ -101,14 +113,15 @@ def draw_tool_tip(
     theme : Theme
     scale : float
         Size of texts and margins.
-    x : int
-        Left end of the tip, px.
     widget : pygame.Rect
         Position of the widget in the window, px.
+    page : pygame.Rect
+        Position of the panel, bar or menu with the widget, px.
+    side : TipSide
+        Where the tip appears. If there is no space beside the page, it is below the page; if there is no
+        space below, it is above.
     sketch : TipSketch, optional
         Drawing below the text.
-    is_beside : bool
-        Whether the tip is to the right of the widget instead of below it.
     """
     size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)
@@ -122,7 +135,7 @@ def draw_tool_tip(
         width = max(width, image.get_width())
         height += distance + image.get_height()
     box_size = (width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
-    box = _place_box(box_size, widget, distance, screen.get_rect(), x=x, is_beside=is_beside)
+    box = _place_box(box_size, widget, page, side, distance=distance, window=screen.get_rect())
     _draw_box(screen, box, theme, scale)
     left = box.left + round(_MARGIN_PX * scale)
     top = box.top + distance
@@ -134,16 +147,22 @@ def draw_tool_tip(
 
 
 def _place_box(
-    size: tuple[int, int], widget: Rect, distance: int, window: Rect, *, x: int, is_beside: bool
+    size: tuple[int, int], widget: Rect, page: Rect, side: TipSide, *, distance: int, window: Rect
 ) -> Rect:
-    """Return the box of a tip at a distance from its widget, px, inside the window; see `draw_tool_tip`."""
+    """Return the box of a tip at a distance from its page, px, inside the window; see `draw_tool_tip`."""
     box = Rect((0, 0), size)
-    if is_beside:
-        box.midleft = widget.right + distance, widget.centery
-    else:
-        box.topleft = x, widget.bottom + distance
-        if box.bottom > window.height:
-            box.bottom = widget.top - distance
+    if side == "right":
+        box.midleft = page.right + distance, widget.centery
+        if box.right <= window.right:
+            return box.clamp(window)
+    elif side == "left":
+        box.midright = page.left - distance, widget.centery
+        if box.left >= window.left:
+            return box.clamp(window)
+    covered = widget if side == "below" else page
+    box.midtop = widget.centerx, covered.bottom + distance
+    if box.bottom > window.bottom:
+        box.bottom = covered.top - distance
     return box.clamp(window)
 
 

@@ -9,12 +9,13 @@ import pygame
 
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.commands.command import CommandTable
-from robocov_app.toolkit.commands.help_page import draw_help_page
+from robocov_app.toolkit.commands.help_page import HelpPage
 from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.panel import CommandPanel
 from robocov_app.toolkit.sheet_handle import SheetHandle
 from robocov_app.toolkit.tools.pointer import Pointer
+from robocov_app.toolkit.window.display import find_suitable_scale
 from robocov_app.toolkit.window.input import COMMAND_EVENT, MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.toolkit.window.window import BaseWindow
@@ -60,8 +61,8 @@ class CommandWindow(BaseWindow):
     dialogs : Dialogs
         Shows the open dialog.
     size : (width, height), px
-    scale : float
-        Size of texts and widgets.
+    scale : float or None
+        Size of texts and widgets; None for one that suits the size of the window.
     display : WindowDisplay, optional
         Display of another window, which this one replaces for a time; by default a new window is opened.
 
@@ -77,8 +78,8 @@ class CommandWindow(BaseWindow):
         State of the window.
     dialogs : Dialogs
         Shows the open dialog.
-    is_help_open : bool
-        Whether the help page is shown.
+    help_page : HelpPage
+        The page with the keys of all commands.
     commands : CommandTable
         All commands.
     panel : CommandPanel
@@ -108,7 +109,7 @@ class CommandWindow(BaseWindow):
         model: WindowModel,
         dialogs: Dialogs,
         size: tuple[int, int],
-        scale: float,
+        scale: float | None,
         display: WindowDisplay | None = None,
     ) -> None:
         """Open the window; subclasses build the commands, the panel and the pointer."""
@@ -116,8 +117,15 @@ class CommandWindow(BaseWindow):
         self.model = model
         self.dialogs = dialogs
         self.scale = scale
-        self.is_help_open = False
+        self.help_page = HelpPage(self.groups, self.keys_hint)
         self.sheet_handle = SheetHandle(self.close_sheet)
+
+    @property
+    def suitable_scale(self) -> float:
+        """The requested scale, or else one that suits the size of the window."""
+        if self.scale is not None:
+            return self.scale
+        return find_suitable_scale(self.screen.get_size())
 
     @property
     def status_text(self) -> str:
@@ -137,8 +145,8 @@ class CommandWindow(BaseWindow):
 
     def do(self, name: str) -> None:
         """Run the command with this name; while the help page is open, "cancel" only closes that."""
-        if name == "cancel" and self.is_help_open:
-            self.is_help_open = False
+        if name == "cancel" and self.help_page.is_open:
+            self.help_page.close()
         else:
             self.commands.run(name)
 
@@ -155,12 +163,12 @@ class CommandWindow(BaseWindow):
             if name == "cancel":
                 return
         if name not in ("help", "cancel"):
-            self.is_help_open = False
+            self.help_page.close()
         self.do(name)
 
     def toggle_help(self) -> None:
         """Show or hide the help page."""
-        self.is_help_open = not self.is_help_open
+        self.help_page.toggle()
 
     def open_palette(self) -> None:
         """Open the dialog that finds and runs commands by their names."""
@@ -194,7 +202,7 @@ class CommandWindow(BaseWindow):
         """Return the box of the dialog, menu or help page that covers the map; None if nothing does."""
         if self.dialogs.is_open:
             return self.dialogs.box or self.screen.get_rect()
-        return self.screen.get_rect() if self.is_help_open else None
+        return self.screen.get_rect() if self.help_page.is_open else None
 
     def handle_quit(self) -> None:
         """React when the user closes the window."""
@@ -216,10 +224,10 @@ class CommandWindow(BaseWindow):
         """Handle an event that no dialog has used."""
         if event.type == pygame.DROPFILE:
             self.model.attempt(lambda: self.open_file(Path(event.file)))
+        elif self.help_page.handle_event(event):
+            pass
         elif event.type == pygame.KEYDOWN:
             self.press_key(event)
-        elif event.type == pygame.MOUSEBUTTONDOWN and self.is_help_open:
-            self.is_help_open = False
         elif event.type in MOUSE_EVENTS:
             self.handle_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
@@ -249,14 +257,12 @@ class CommandWindow(BaseWindow):
 
     def restore_view(self) -> None:
         """Close everything that may have caused an exception while drawing."""
-        self.is_help_open = False
+        self.help_page.close()
         self.dialogs.discard()
 
     def draw_above_map(self) -> None:
         """Draw the help page and the open dialog over the window, and show the frame."""
         scale = self.layout.scale
-        if self.is_help_open:
-            commands = self.commands.commands
-            draw_help_page(self.screen, self.theme, scale, commands, groups=self.groups, hint=self.keys_hint)
+        self.help_page.draw(self.screen, self.theme, scale, self.commands.commands)
         self.dialogs.draw(self.screen, self.theme, scale)
         self.display.show()

@@ -1,6 +1,7 @@
 """The display: SDL's video driver, size and scale of the window, and its title."""
 
 import gc
+import math
 import os
 import sys
 import warnings
@@ -24,6 +25,8 @@ _INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
 REDUCED_MOTION_VARIABLE = "ROBOCOV_REDUCED_MOTION"
 """Environment variable: if it is neither empty nor 0, windows on the screen show no animations."""
 _FULL_HD_HEIGHT_PX = 1080
+_USUAL_WINDOW_PX = (1280, 720)
+"""Size of a window that is shown at scale 1."""
 _MAX_SCALE = 3.0
 _SCALE_STEP = 0.25
 _COLLECTION_THRESHOLD = 50_000
@@ -94,23 +97,43 @@ def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
 def get_screen_scale() -> float:
     """Return the scale at which text is readable on the largest display: 1 up to full HD, 2 for 4K."""
     height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=_FULL_HD_HEIGHT_PX)
-    scale = round(height / _FULL_HD_HEIGHT_PX / _SCALE_STEP) * _SCALE_STEP
-    return float(min(max(scale, 1.0), _MAX_SCALE))
+    return _round_scale(height / _FULL_HD_HEIGHT_PX)
 
 
-def choose_scale(requested: float | None, *, has_display: bool) -> float:
-    """Return the scale of a window: the requested one, or by default one that suits the display.
+def _round_scale(scale: float) -> float:
+    """Round a scale to a multiple of `_SCALE_STEP` from 1 to `_MAX_SCALE`."""
+    return min(max(round(scale / _SCALE_STEP) * _SCALE_STEP, 1.0), _MAX_SCALE)
+
+
+def choose_scale(requested: float | None, *, has_display: bool) -> float | None:
+    """Return the scale of a window: the requested one, or None if the scale follows the window's size.
 
     Parameters
     ----------
     requested : float or None
         Scale from an option or the settings.
     has_display : bool
-        Whether the window is visible.
+        Whether the window is visible. By default, the scale of others is 1.
     """
-    if requested:
-        return requested
-    return get_screen_scale() if has_display else 1.0
+    if requested is None and not has_display:
+        return 1.0
+    return requested
+
+
+def find_suitable_scale(size: tuple[int, int]) -> float:
+    """Return the scale that suits a window: that of the screen, or more if the window is large.
+
+    Text grows with the square root of the size, so that a large window shows both more and larger text.
+    The scale is 1 at 1280 x 720, and 1.5 at 2560 x 1440.
+
+    Parameters
+    ----------
+    size : (width, height), px
+    """
+    width, height = size
+    usual_width, usual_height = _USUAL_WINDOW_PX
+    growth = math.sqrt(min(width / usual_width, height / usual_height))
+    return max(_round_scale(growth), get_screen_scale())
 
 
 def fit_to_screen(size: tuple[int, int]) -> tuple[int, int]:

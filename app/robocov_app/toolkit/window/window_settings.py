@@ -18,7 +18,7 @@ class WindowSettings(BaseModel):
     theme : {"light", "dark"}
         Colors.
     scale : float or None
-        Scale of texts and widgets; None to choose one that suits the screen.
+        Scale of texts and widgets; None for one that suits the size of the window and the screen.
     width, height : int
         Size of the window, px.
     tab : str

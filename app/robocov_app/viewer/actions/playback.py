@@ -21,7 +21,8 @@ class PlaybackActions:
         self._viewer = viewer
 
     def toggle_pause(self) -> None:
-        """Play or pause."""
+        """Play or pause, and remove the status message, which may have suggested this."""
+        self._viewer.clear_message()
         session = self._viewer.session
         session.playback.is_playing = not session.playback.is_playing
         session.playback.stop_when_settled = False

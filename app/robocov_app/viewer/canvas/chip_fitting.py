@@ -12,20 +12,24 @@ _DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
 def fit_chips(
     chips: Sequence[Chip],
     presets: Sequence[Chip],
+    more: Chip,
     standard_commands: set[str],
     measure: Callable[[Chip], int],
     space: int,
 ) -> tuple[list[Chip], list[Chip]]:
     """Leave out chips, or their texts, until the others fit into a space.
 
-    Symbols that need no explanation are left out first, then the presets. Then the chips of standard layers
-    lose their texts and are left out, from the last one, so that symbols that are new to the user keep
-    their texts. Everything that is left out is also in the menu of layers, and chips without text have a tip.
+    Symbols that need no explanation are left out first, then a button replaces the presets. Then the chips of
+    standard layers lose their texts and are left out, from the last one, so that symbols that are new to the
+    user keep their texts. Everything that is left out is also in the menu of layers, and chips without text
+    have a tip.
 
     Parameters
     ----------
     chips, presets : sequence of Chip
         All chips of layers, and of presets.
+    more : Chip
+        Button that opens the menu of the presets.
     standard_commands : set of str
         Commands of the chips of layers that are visible by default.
     measure : callable
@@ -41,7 +45,8 @@ def fit_chips(
     def fits(some_chips: Sequence[Chip], some_presets: Sequence[Chip]) -> bool:
         return sum(measure(chip) for chip in [*some_chips, *some_presets]) <= space
 
-    for shown_presets in (list(presets), []):
+    button = [more] if presets else []
+    for shown_presets in (list(presets), button):
         remaining = list(chips)
         for name in _DROPPED_FIRST:
             if fits(remaining, shown_presets):
@@ -55,10 +60,10 @@ def fit_chips(
     for group in (standard, other):
         for chip in reversed(group):
             chips_by_command[chip.command] = replace(chip, has_text=False)
-            if fits(list(chips_by_command.values()), []):
-                return list(chips_by_command.values()), []
+            if fits(list(chips_by_command.values()), button):
+                return list(chips_by_command.values()), button
         for chip in reversed(group):
             del chips_by_command[chip.command]
-            if fits(list(chips_by_command.values()), []):
-                return list(chips_by_command.values()), []
-    return [], []
+            if fits(list(chips_by_command.values()), button):
+                return list(chips_by_command.values()), button
+    return [], button

@@ -14,7 +14,7 @@ from robocov_app.toolkit.keyboard_focus import BasicFocusGroup
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_card
 from robocov_app.toolkit.tools.pointer import Pixel
 from robocov_app.toolkit.widgets.appearance import draw_ring
-from robocov_app.toolkit.widgets.tool_tip import ToolTip, draw_tool_tip
+from robocov_app.toolkit.widgets.tool_tip import TipSide, ToolTip, draw_tool_tip
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.viewer.canvas.chip_fitting import fit_chips
 from robocov_app.viewer.canvas.layer_chips import (
@@ -32,6 +32,8 @@ BAR_HEIGHT_PX = 30.0
 """Height of the strip above the map that the bar takes, at scale 1; it never depends on the layers."""
 MENU_COMMAND = "layers"
 """Command that opens and closes the menu of all layers."""
+PRESETS_COMMAND = "presets"
+"""Command that opens the menu of the presets."""
 
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 10.0
@@ -95,6 +97,13 @@ class LayerBar(BasicFocusGroup):
         """Open or close the menu of all layers."""
         self.is_open = not self.is_open
 
+    def find_preset_position(self) -> tuple[int, int]:
+        """Return where the menu of the presets opens, px: below the last chip."""
+        boxes = [box for _, box in self.chips]
+        if not boxes:
+            return 0, 0
+        return boxes[-1].left, boxes[-1].bottom
+
     # Keyboard focus
 
     def list_focusable_keys(self) -> list[str]:
@@ -116,7 +125,7 @@ class LayerBar(BasicFocusGroup):
 
         A press elsewhere closes the menu, and still acts on the map.
         """
-        self._tool_tip.restart()
+        self._tool_tip.dismiss()
         self.focus = None
         chip = self._find_chip(pixel)
         if chip is not None:
@@ -204,7 +213,8 @@ class LayerBar(BasicFocusGroup):
 
         space = width - 2 * margin - measure(menu) + gap
         standard_commands = {f"layer:{layer.name}" for layer in layers if layer.is_default}
-        chips, presets = fit_chips(chips, presets, standard_commands, measure, space)
+        more = Chip("more", PRESETS_COMMAND, label="…")
+        chips, presets = fit_chips(chips, presets, more, standard_commands, measure, space)
         placed = []
         x = left + margin
         for chip in [menu, *chips]:
@@ -333,10 +343,17 @@ class LayerBar(BasicFocusGroup):
         if not self._hovered or not self._tool_tip.is_due or not pygame.display.get_init():
             return
         for chip, box in [*self.chips, *self.rows]:
-            if _get_id(chip) == self._hovered:
-                tip = _describe_chip(chip, self._commands[chip.command].tip)
-                draw_tool_tip(screen, tip, self._theme, self._scale, x=box.left, widget=box)
-                return
+            if _get_id(chip) != self._hovered:
+                continue
+            tip = _describe_chip(chip, self._commands[chip.command].tip)
+            side: TipSide = "below"
+            page = box
+            if (chip, box) in self.rows:
+                # Below its row, the tip would cover the next one.
+                side = "right"
+                page = self.menu_box
+            draw_tool_tip(screen, tip, self._theme, self._scale, widget=box, page=page, side=side)
+            return
 
 
 def _get_id(chip: Chip) -> str:

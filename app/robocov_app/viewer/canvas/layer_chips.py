@@ -16,8 +16,8 @@ from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_rounded_box, get_accent_ink, get_field_color
 from robocov_app.toolkit.sentence_case import to_sentence_case
 
-ChipKind: TypeAlias = Literal["menu", "layer", "preset", "row"]
-"""The button that opens the menu, a layer in the bar, a preset, or a layer in the menu."""
+ChipKind: TypeAlias = Literal["menu", "layer", "preset", "more", "row"]
+"""The button of the menu, a layer in the bar, a preset, the button of the presets, or a layer in the menu."""
 
 # Lengths in pixels at scale 1.
 CHIP_HEIGHT_PX = 22.0
@@ -34,6 +34,8 @@ _ICON_WIDTH_PX = 16.0
 
 _MARK_TEXTS = {CELL_CENTROID: "centroids", GOAL: "goals"}
 """Texts of the marks that the same layer draws, depending on the controller."""
+_GOAL_LAYERS = ("centroids", "goals")
+"""Layers that are empty for controllers without goals, such as RPF."""
 _DIMMED_ALPHA = 150
 """Opacity, up to 255, of the veil over the symbols of hidden layers."""
 
@@ -87,7 +89,8 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
     -------
     tuple of LegendEntry
         Empty if no scene has anything to draw in this layer. A single symbol has the title of the layer, so
-        that all chips name what they show and hide in the same way.
+        that all chips name what they show and hide in the same way. If the controllers of some panes have no
+        goals, the text says so.
     """
     legends = [layer.legend(scene) for scene in scenes if layer.can_draw(scene)]
     entries = merge_legends(legends, lambda entry: entry.key)
@@ -95,8 +98,21 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
     for entry in entries:
         text = layer.title if len(entries) == 1 else entry.text
         text = _MARK_TEXTS.get(entry.text, text)
-        chip_entries.append(LegendEntry(to_sentence_case(text), entry.draw, entry.style))
+        text = to_sentence_case(text)
+        if entry is entries[-1]:
+            text += _describe_exceptions(layer, scenes)
+        chip_entries.append(LegendEntry(text, entry.draw, entry.style))
     return tuple(chip_entries)
+
+
+def _describe_exceptions(layer: Layer, scenes: Sequence[Scene]) -> str:
+    """Return which controllers have no goals, such as " (not RPF)"; empty if all have some."""
+    if layer.name not in _GOAL_LAYERS:
+        return ""
+    labels = [scene.label for scene in scenes if not (layer.can_draw(scene) and layer.legend(scene))]
+    if not labels:
+        return ""
+    return f" (not {', '.join(dict.fromkeys(labels))})"
 
 
 def measure_chip(canvas: Canvas, chip: Chip) -> int:

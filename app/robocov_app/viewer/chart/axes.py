@@ -1,5 +1,7 @@
 """Title and axes of the chart."""
 
+from pygame import Rect
+
 from robocov_app.look.axes import MAX_TIME_INTERVALS, choose_tick_step, list_ticks
 from robocov_app.look.colors import mix
 from robocov_app.render.canvas import Canvas
@@ -15,6 +17,8 @@ _SWITCH_GAP_PX = 16
 _SWITCH_PADDING_PX = 6
 _VALUE_GAP_PX = 7
 _TIME_GAP_PX = 4
+_WAITING_MARGIN_PX = 10
+_WAITING_HEIGHT_PX = 22
 _MIN_TIME_STEP_S = 1.0
 _GRID_STRENGTH = 0.12
 
@@ -37,6 +41,17 @@ def draw_computation_state(
     if state and right - canvas.measure_text(state) > left:
         row = 0.5 * TOP_PX * frame.scale
         canvas.draw_text(state, (right, row), color=frame.theme.faint, anchor="right")
+
+
+def draw_waiting_text(canvas: Canvas, frame: ChartFrame, scale: ChartScale, text: str) -> None:
+    """Draw what the chart waits for in the middle of the empty plot."""
+    middle = (scale.times.left + 0.5 * scale.times.width, 0.5 * (TOP_PX * frame.scale + scale.bottom))
+    width = canvas.measure_text(text) + 2 * _WAITING_MARGIN_PX * frame.scale
+    height = _WAITING_HEIGHT_PX * frame.scale
+    box = Rect(0, 0, round(width), round(height))
+    box.center = round(middle[0]), round(middle[1])
+    canvas.surface.fill(frame.theme.panel, box)
+    canvas.draw_text(text, middle, color=frame.theme.ink, anchor="middle")
 
 
 def draw_switch(canvas: Canvas, frame: ChartFrame, title_end: float) -> Box:

@@ -6,8 +6,15 @@ import pygame
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas
 from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.window.layout import Box, Layout, is_inside
-from robocov_app.viewer.chart.axes import draw_axes, draw_computation_state, draw_switch, draw_title
+from robocov_app.viewer.chart.axes import (
+    draw_axes,
+    draw_computation_state,
+    draw_switch,
+    draw_title,
+    draw_waiting_text,
+)
 from robocov_app.viewer.chart.branch_tree import (
     BranchLine,
     draw_branch_tree,
@@ -33,6 +40,8 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.past.curves import DISTANCE, TIME, PlottedQuantity
 from robocov_app.viewer.window.status import describe_cut_off
 
+_FIRST_VALUE_TEXT = "Computing the first value"
+"""Shown in place of the curves while the cost of the first step is computed."""
 REFRESH_INTERVAL_S = 0.1
 """Minimum time between two drawings of curves that grow."""
 
@@ -235,10 +244,13 @@ class Chart:
         scale = self._scale
         title_end = draw_title(canvas, frame)
         self.switch_box = draw_switch(canvas, frame, title_end) if self._has_times else None
-        draw_computation_state(
-            canvas, frame, self.viewer.costs.state, left=title_end, right=scale.times.right
-        )
+        state = to_sentence_case(self.viewer.costs.state)
+        has_samples = any(len(curve) for curve in frame.list_curves())
+        if has_samples:
+            draw_computation_state(canvas, frame, state, left=title_end, right=scale.times.right)
         draw_axes(canvas, frame, scale)
+        if not has_samples:
+            draw_waiting_text(canvas, frame, scale, state or _FIRST_VALUE_TEXT)
         draw_events(canvas, frame, scale)
         self.ghosts = draw_ghosts(canvas, frame, scale)
         draw_curves(canvas, frame, scale)

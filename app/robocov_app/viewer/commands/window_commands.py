@@ -34,6 +34,8 @@ class ViewerWindowActions(WindowActions):
         Opens the dialog that adds a controller to the comparison.
     toggle_layer_menu : callable
         Opens or closes the menu of all layers.
+    open_preset_menu : callable
+        Opens the menu of the presets of layers.
     focus_next, focus_previous : callable
         Give the keyboard focus to the next or the previous control.
     open_share_menu : callable
@@ -51,6 +53,7 @@ class ViewerWindowActions(WindowActions):
     list_branches: Action
     compare: Action
     toggle_layer_menu: Action
+    open_preset_menu: Action
     focus_next: Action
     focus_previous: Action
     open_share_menu: Action
@@ -89,6 +92,7 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     group.add("pan:down", "Pan down", pan_down, "ctrl+down", repeats=True)
     group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
     group.add("layers", "Menu of layers and presets", actions.toggle_layer_menu, "l")
+    group.add("presets", "Presets of layers", actions.open_preset_menu, "ctrl+l")
     group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
     group.add("focus:next", "Next control; Enter or Space uses it", actions.focus_next, "tab", repeats=True)
     group.add("focus:previous", "Previous control", actions.focus_previous, "shift+tab", repeats=True)

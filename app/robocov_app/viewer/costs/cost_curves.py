@@ -1,13 +1,46 @@
 """Costs of the displayed step, which are requested in every frame and added to the curves on arrival."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.states import PaneSetup
 
-MAX_INITIAL_GAP_S = 0.3  # if a curve starts later than this, earlier costs are requested
+MAX_INITIAL_GAP_S = 0.3  # between the samples of a curve that are added at its start
 TIME_TOLERANCE_S = 1e-9
+
+
+class _MissingState(NamedTuple):
+    """State of a pane whose cost is not in its curve yet.
+
+    Attributes
+    ----------
+    pane : int
+        Number of the pane.
+    time : float, s
+    positions : (n, 2) array, m
+    setup : PaneSetup
+        Map, team and controller at that time.
+    radius : float, m
+        Radius of the smallest robot of all panes at that time.
+    """
+
+    pane: int
+    time: float
+    positions: Array
+    setup: PaneSetup
+    radius: float
+
+    @property
+    def environment(self) -> Environment:
+        """The map at that time."""
+        return self.setup.environment
 
 
 class CostCurves:
@@ -21,13 +54,19 @@ class CostCurves:
     Attributes
     ----------
     answer_count : int
-        Number of answers so far.
+        Number of answers so far about the displayed map.
+    earlier_answer_count : int
+        Number of answers so far about earlier maps.
     """
 
     def __init__(self, viewer: ViewerModel) -> None:
         self.answer_count = 0
+        self.earlier_answer_count = 0
         self._viewer = viewer
         self._past_version = -1  # of the timeline at the last request
+        self._is_turn_of_displayed_step = False  # while costs of the first seconds are missing
+        self._earlier_costs: Costs | None = None
+        self._earlier_map: Environment | None = None
 
     def update(self) -> None:
         """Request the costs of the displayed step, and add those that have arrived to the curves."""
@@ -35,6 +74,8 @@ class CostCurves:
         if session.timeline.past_version != self._past_version:
             self._past_version = session.timeline.past_version
             self._viewer.costs.forget()
+            if self._earlier_costs is not None:
+                self._earlier_costs.forget()
         for pane in session.timeline.panes:
             self._request_pane_cost(pane)
         self._request_first_seconds()
@@ -75,38 +116,87 @@ class CostCurves:
     def _request_first_seconds(self) -> None:
         """Request costs of the first seconds, which had passed before costs could be computed on the map.
 
-        They are requested backwards in time from the first known cost. While the run plays, requests for them
-        alternate with those for the displayed step.
+        They are requested backwards in time from the first known cost. If the map was edited meanwhile,
+        costs on the earlier map are computed by another process.
         """
         session = self._viewer.session
-        if not session.timeline.is_live:
+        if not session.timeline.is_live or self._viewer.costs.state:
             return
-        if session.playback.is_playing and self.answer_count % 2:
+        missing = [state for pane in session.timeline.panes if (state := self._find_missing_state(pane))]
+        for state in missing:
+            if state.environment is session.displayed.environment:
+                self._request_on_displayed_map(state)
+        earlier = [state for state in missing if state.environment is not session.displayed.environment]
+        if earlier:
+            self._request_on_earlier_map(earlier)
+        elif not missing:
+            self.close()
+
+    def _find_missing_state(self, pane: Pane) -> _MissingState | None:
+        """Return the state of a pane shortly before the start of its curve; None if it starts at time 0."""
+        first_time = min(pane.distance_curve.times, default=0.0)
+        if first_time <= TIME_TOLERANCE_S:
+            return None
+        history = self._viewer.session.timeline.history
+        index = history.find_index(max(first_time - MAX_INITIAL_GAP_S, 0.0))
+        states = history[index].states
+        state = states.get(pane.number)
+        time = history.get_time(index)
+        if state is None or time >= first_time - TIME_TOLERANCE_S:
+            return None
+        radius = min(other.setup.team.min_radius for other in states.values())
+        return _MissingState(pane.number, time, state.positions, state.setup, radius)
+
+    def _request_on_displayed_map(self, state: _MissingState) -> None:
+        """Request the cost of an earlier state on the displayed map.
+
+        While the run plays, these requests alternate with those for the displayed step.
+        """
+        if self._viewer.session.playback.is_playing and self._is_turn_of_displayed_step:
             return
-        history = session.timeline.history
-        for pane in session.timeline.panes:
-            first_time = min(pane.distance_curve.times, default=0.0)
-            if first_time <= MAX_INITIAL_GAP_S:
-                continue
-            target = 0.0
-            if first_time > 2 * MAX_INITIAL_GAP_S:
-                target = first_time - MAX_INITIAL_GAP_S
-            index = history.find_index(target)
-            state = history[index].states.get(pane.number)
-            # Costs can only be computed on the displayed map.
-            if state is None or state.setup.environment is not session.displayed.environment:
-                continue
-            self._viewer.costs.request(
-                pane.number,
-                history.get_time(index),
-                state.positions,
-                speeds=state.setup.speed_limits,
-                is_for_curve=True,
-            )
+        self._viewer.costs.request(
+            state.pane, state.time, state.positions, speeds=state.setup.speed_limits, is_for_curve=True
+        )
+
+    def _request_on_earlier_map(self, states: Sequence[_MissingState]) -> None:
+        """Request the costs of states on the newest of their maps, unless another request is pending."""
+        newest = max(states, key=lambda state: state.time)
+        costs = self._earlier_costs
+        if costs is None:
+            costs = self._viewer.costs.create_similar()
+            self._earlier_costs = costs
+        if self._earlier_map is not newest.environment:
+            self._earlier_map = newest.environment
+            costs.set_environment(newest.environment, newest.radius)
+        if not costs.is_idle:
+            return
+        for state in states:
+            if state.environment is newest.environment:
+                costs.request(
+                    state.pane,
+                    state.time,
+                    state.positions,
+                    speeds=state.setup.speed_limits,
+                    is_for_curve=True,
+                )
+
+    def close(self) -> None:
+        """End the process that computes costs on earlier maps."""
+        if self._earlier_costs is not None:
+            self._earlier_costs.close()
+        self._earlier_costs = None
+        self._earlier_map = None
 
     def _add_answers(self) -> None:
-        for number, known_cost in self._viewer.costs.poll():
-            self.answer_count += 1
+        answers = self._viewer.costs.poll()
+        self.answer_count += len(answers)
+        if answers:
+            self._is_turn_of_displayed_step = not self._is_turn_of_displayed_step
+        if self._earlier_costs is not None:
+            earlier_answers = self._earlier_costs.poll()
+            self.earlier_answer_count += len(earlier_answers)
+            answers += earlier_answers
+        for number, known_cost in answers:
             for pane in self._viewer.session.timeline.panes:
                 if pane.number != number or known_cost.time > pane.time + TIME_TOLERANCE_S:
                     continue

@@ -125,6 +125,7 @@ class Costs:
         self.known: dict[int, KnownCost] = {}
         self.state = ""
         self.lattice = lattice
+        self._is_direct = direct
         self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostCodec())
         if not direct:
             service = "robocov_app.viewer.costs.costs:CostService"
@@ -152,6 +153,15 @@ class Costs:
         self._queued = {}
         self._prepare_map()
         self.poll()
+
+    def create_similar(self) -> "Costs":
+        """Return other costs with the same number of sites, which are computed in another process."""
+        return Costs(self.lattice, direct=self._is_direct)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether the map is prepared and all requests are answered."""
+        return self._is_prepared and self._pending is None and not self._queued
 
     def forget(self) -> None:
         """Drop all known costs and pending requests, because they belong to another run."""

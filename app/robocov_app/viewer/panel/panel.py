@@ -67,7 +67,8 @@ _NUMBER_PX = (58, 42)  # the value and its unit
 _UNLIMITED_PX = (103,)  # the word "unlimited" instead of value and unit
 _ROW_PX = 24
 _HIGH_ROW_PX = 28
-_MAP_PX = (172, 0)  # menus of the map and of its starts
+_MAP_PX = (28, 0, 34, 104)  # menus of the map and of its starts, each with its label
+_LABEL_GAP_PX = 4
 # Label and number of robots, minus, plus, a gap, label and value of the seed, next seed.
 _ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
 _SLIDER_ROW_PX = 20
@@ -180,10 +181,12 @@ class ViewerPanel(CommandPanel):
         labels = shorten_names(files.list_maps())
         maps = {label: name for name, label in labels.items()}
         ui.header("Map and team")
-        ui.row(*_MAP_PX, height=_HIGH_ROW_PX, below=5)
+        ui.row(*_MAP_PX, height=_HIGH_ROW_PX, gap=_LABEL_GAP_PX, below=5)
+        ui.label("Map")
         label = ui.dropdown("map", list(maps), labels.get(files.map_name, files.map_name), tip="Map")
         if label is not None:
             viewer.attempt(partial(files.open_map, maps[label]))
+        ui.label("Start")
         starts = viewer.playback.list_starts()
         start = ui.dropdown("start", starts, scenario.start_name, tip="Where the robots start")
         if start is not None:

@@ -25,7 +25,7 @@ class StartLauncher:
     size : tuple of int or None
         Width and height, px; None for those of the settings.
     scale : float or None
-        Scale of texts; None for that of the settings.
+        Scale of texts; None for that of the settings, or one that suits the page.
     folder : Path
         Folder in which files are opened.
 

@@ -16,10 +16,10 @@ from robocov_app.look.theme import Theme, get_theme
 from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.commands.command import Command, CommandTable
-from robocov_app.toolkit.commands.help_page import draw_help_page
+from robocov_app.toolkit.commands.help_page import HelpPage
 from robocov_app.toolkit.dialogs import Dialogs, create_file_choice
 from robocov_app.toolkit.overlay import draw_message
-from robocov_app.toolkit.window.display import prefers_reduced_motion
+from robocov_app.toolkit.window.display import find_suitable_scale, prefers_reduced_motion
 from robocov_app.toolkit.window.input import get_wheel_notches
 from robocov_app.toolkit.window.layout import Box, find_max_scale
 from robocov_app.toolkit.window.window import BaseWindow
@@ -66,8 +66,8 @@ class StartPage(BaseWindow):
     Parameters
     ----------
     size : (width, height), px
-    scale : float
-        Size of texts and widgets.
+    scale : float or None
+        Size of texts and widgets; None for one that suits the size of the window.
     theme_name : str
         ``light`` or ``dark``.
     recent : sequence of Path
@@ -91,7 +91,7 @@ class StartPage(BaseWindow):
     def __init__(
         self,
         size: tuple[int, int],
-        scale: float,
+        scale: float | None,
         *,
         theme_name: ThemeName = _LIGHT_NAME,
         recent: Sequence[Path] = (),
@@ -106,7 +106,7 @@ class StartPage(BaseWindow):
         self.model = WindowModel()
         self.dialogs = Dialogs()
         self.focus = ItemFocus()
-        self.is_help_open = False
+        self.help_page = HelpPage(_GROUPS, _HINT)
         self._recent = list(recent)
         self._folder = folder
         self._can_open_viewer = can_open_viewer
@@ -143,7 +143,7 @@ class StartPage(BaseWindow):
             Command("file", "Open a file", group, self.open_dialog, ("ctrl+o",)),
             Command("theme", "Light or dark", group, self.toggle_theme, ("t",)),
             Command("help", "Keys", group, self.toggle_help, ("f1",)),
-            Command("cancel", "Close help", group, self._close_help, ("escape",), hidden=True),
+            Command("cancel", "Close help", group, self.help_page.close, ("escape",), hidden=True),
             Command("quit", "Quit", group, self._quit, ("ctrl+q",)),
         ]
         return commands
@@ -184,10 +184,7 @@ class StartPage(BaseWindow):
 
     def toggle_help(self) -> None:
         """Show or hide the list of keys."""
-        self.is_help_open = not self.is_help_open
-
-    def _close_help(self) -> None:
-        self.is_help_open = False
+        self.help_page.toggle()
 
     def _quit(self) -> None:
         self.choice = None
@@ -205,7 +202,7 @@ class StartPage(BaseWindow):
             self._commands.release_key(event)
         elif self.choice is not None:
             self._handle_while_loading(event)
-        elif self.dialogs.handle_event(event):
+        elif self.dialogs.handle_event(event) or self.help_page.handle_event(event):
             pass
         elif event.type == pygame.KEYDOWN:
             self._press_key(event)
@@ -230,9 +227,6 @@ class StartPage(BaseWindow):
         self.dialogs.ignore_letter(event.unicode)
 
     def _click(self, pixel: tuple[int, int]) -> None:
-        if self.is_help_open:
-            self.is_help_open = False
-            return
         item = self.focus.find_at(pixel)
         if item is not None:
             item.action()
@@ -263,7 +257,7 @@ class StartPage(BaseWindow):
             self.screen.get_size(),
             self.theme_name,
             self.focus.name,
-            self.is_help_open,
+            self.help_page.frame_key,
             round(time * ANIMATION_FPS),
         )
 
@@ -281,7 +275,7 @@ class StartPage(BaseWindow):
         """Lay out the page for the size of the window, and list the items."""
         size = self.screen.get_size()
         self.theme: Theme = get_theme(self.theme_name)
-        scale = min(self.scale, find_max_scale(size))
+        scale = min(self.scale or find_suitable_scale(size), find_max_scale(size))
         layout: StartLayout = build_start_layout(size, scale, len(self._maps.names), bool(self._recent))
         self._layout = layout
         self.focus.items = [
@@ -316,8 +310,7 @@ class StartPage(BaseWindow):
         _draw_headings(drawing, self._layout)
         for item in self.focus.items:
             item.draw(drawing, item.name == self.focus.name)
-        if self.is_help_open:
-            draw_help_page(self.screen, theme, scale, self._commands.commands, groups=_GROUPS, hint=_HINT)
+        self.help_page.draw(self.screen, theme, scale, self._commands.commands)
         self._draw_message()
         self.dialogs.draw(self.screen, theme, scale)
         self.display.show()

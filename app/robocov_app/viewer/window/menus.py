@@ -1,10 +1,11 @@
-"""Menus of the viewer's window: the context menu of the selection, and the share menu."""
+"""Menus of the viewer's window: those of the selection, of what can be shared, and of the presets."""
 
 from collections.abc import Callable, Sequence
 
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.viewer.layer_presets import LAYER_PRESETS
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.sharing.share import ShareActions
 
@@ -57,6 +58,10 @@ class WindowMenus:
         if self._share.has_link:
             names.insert(0, LINK_COMMAND)
         self._open_menu(names, pixel)
+
+    def open_preset_menu(self, pixel: tuple[int, int]) -> None:
+        """Open the menu of the presets of layers at a pixel."""
+        self._open_menu([f"preset:{preset.name}" for preset in LAYER_PRESETS], pixel)
 
     def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
         """Open a menu of commands; an empty name separates two groups."""

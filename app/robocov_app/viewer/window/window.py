@@ -1,7 +1,6 @@
 """The viewer's window, which handles events, advances time and draws frames."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import pygame
@@ -61,8 +60,8 @@ class ViewerWindow(CommandWindow):
         State of the window, and actions on it.
     size : tuple of int
         Width and height, px.
-    scale : float
-        Size of texts and widgets.
+    scale : float or None
+        Size of texts and widgets; None for one that suits the size of the window.
     is_unattended : bool
         Whether there is no user. Then videos wait for their encoder instead of dropping frames, and lessons
         answer their own questions.
@@ -101,8 +100,8 @@ class ViewerWindow(CommandWindow):
         The keyboard focus in the chart.
     share : ShareActions
         Shares the session as text, as a file or as a link.
-    is_help_open : bool
-        Whether the help page is shown.
+    help_page : HelpPage
+        The page with the keys of all commands.
     top_bar_class : type of TopBar
         Class of the top bar.
     """
@@ -121,7 +120,7 @@ class ViewerWindow(CommandWindow):
         self,
         viewer: Presenter,
         size: tuple[int, int],
-        scale: float,
+        scale: float | None,
         *,
         is_unattended: bool = False,
         display: WindowDisplay | None = None,
@@ -163,9 +162,7 @@ class ViewerWindow(CommandWindow):
         sources = PictureSources(self.canvas, self.chart, self.lesson, self._status)
         self.map_pictures = MapPictures(self, lambda: ViewerMapPicture(viewer, sources))
         self._inspector = RobotInspector(viewer, self.panel)
-        self._controls_reader = WindowControlsReader(
-            viewer, self.lesson, self.layer_bar, self.dialogs, self.parts
-        )
+        self._controls_reader = WindowControlsReader(viewer, self.lesson, self.dialogs, self.parts)
         self._arrangement = Arrangement(viewer, self.lesson, self.canvas, self.chart, self.parts)
         self._arrange()
         self.draw()
@@ -190,6 +187,7 @@ class ViewerWindow(CommandWindow):
             toggle_help=self.toggle_help,
             open_palette=self.open_palette,
             toggle_layer_menu=lambda: self.layer_bar.toggle_menu(),
+            open_preset_menu=lambda: self._menus.open_preset_menu(self.layer_bar.find_preset_position()),
             focus_next=lambda: self.focus.step(1),
             focus_previous=lambda: self.focus.step(-1),
             open_share_menu=lambda: self._menus.open_share_menu(self.top_bar.find_menu_position("share")),
@@ -248,6 +246,7 @@ class ViewerWindow(CommandWindow):
         # This restores the session and the layers from before the lesson, which are those to be saved.
         self.lesson.end()
         self.video_recorder.close()
+        self._cost_curves.close()
         self.viewer.costs.close()
 
     def set_appearance(self, appearance: PageAppearance) -> None:
@@ -266,8 +265,8 @@ class ViewerWindow(CommandWindow):
     @property
     def controls(self) -> WindowControls:
         """State that the buttons of a phone's page show."""
-        controls = self._controls_reader.read(self.screen.get_size(), self.layout)
-        return replace(controls, is_covered=self.map_pictures.is_covered)
+        is_covered = self.find_cover() is not None
+        return self._controls_reader.read(self.screen.get_size(), self.layout, is_covered=is_covered)
 
     def find_cover(self) -> pygame.Rect | None:
         """Return the box of the dialog, menu or help page that covers the map; None if nothing does."""
@@ -319,6 +318,7 @@ class ViewerWindow(CommandWindow):
             session.timeline.past_version,
             session.playback.is_playing,
             self._cost_curves.answer_count,
+            self._cost_curves.earlier_answer_count,
             self._status.seek_progress,
             viewer.costs.state,
             self._arrangement.key,
@@ -343,7 +343,7 @@ class ViewerWindow(CommandWindow):
 
     def _arrange(self) -> None:
         """Lay out the window if its size, or the number or shape of panes has changed."""
-        self._arrangement.update(self.screen.get_size(), self.scale)
+        self._arrangement.update(self.screen.get_size(), self.suitable_scale)
         self.layout = self._arrangement.layout
         self.theme = self._arrangement.theme
 
@@ -376,7 +376,7 @@ class ViewerWindow(CommandWindow):
         if name == "cancel" and self.layer_bar.is_open:
             self.layer_bar.toggle_menu()
             return
-        closes_help = name == "cancel" and self.is_help_open
+        closes_help = name == "cancel" and self.help_page.is_open
         if not closes_help and self.lesson.handle_command(name):
             return
         super().do(name)

@@ -6,7 +6,7 @@ from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.window.layout import Box, Layout, find_scroll_box
 from robocov_app.toolkit.window.page_view import WindowControls
 from robocov_app.toolkit.window_part import WindowPart
-from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX, LayerBar
+from robocov_app.viewer.canvas.layer_bar import BAR_HEIGHT_PX
 from robocov_app.viewer.lessons.guide import LessonGuide
 from robocov_app.viewer.presenter import Presenter
 
@@ -20,8 +20,6 @@ class WindowControlsReader:
         The viewer.
     lesson : LessonGuide
         The lesson, if there is one.
-    layer_bar : LayerBar
-        The legend.
     dialogs : Dialogs
         Shows the open dialog.
     parts : sequence of WindowPart
@@ -32,18 +30,30 @@ class WindowControlsReader:
         self,
         viewer: Presenter,
         lesson: LessonGuide,
-        layer_bar: LayerBar,
         dialogs: Dialogs,
         parts: Sequence[WindowPart],
     ) -> None:
         self._viewer = viewer
         self._lesson = lesson
-        self._layer_bar = layer_bar
         self._dialogs = dialogs
         self._parts = parts
 
-    def read(self, size: tuple[int, int], layout: Layout) -> WindowControls:
-        """Return the state of a window of the given size, px, and layout."""
+    def read(self, size: tuple[int, int], layout: Layout, *, is_covered: bool) -> WindowControls:
+        """Return the state of the window.
+
+        Parameters
+        ----------
+        size : (width, height), px
+            Size of the window.
+        layout : Layout
+            Layout of the window.
+        is_covered : bool
+            Whether a dialog, a menu or the help page covers the map.
+
+        Returns
+        -------
+        WindowControls
+        """
         viewer = self._viewer
         destination, _ = viewer.session.timeline.destination
         return WindowControls(
@@ -55,9 +65,8 @@ class WindowControlsReader:
             lesson=self._describe_lesson(),
             has_panel=viewer.view.has_panel,
             is_typing=self._dialogs.is_typing or any(part.is_typing for part in self._parts),
-            scroll_box=find_scroll_box(
-                size, layout, is_covered=self._dialogs.is_open or self._layer_bar.is_open
-            ),
+            scroll_box=find_scroll_box(size, layout, is_covered=is_covered),
+            is_covered=is_covered,
             map_box=_find_map_box(layout),
         )
 

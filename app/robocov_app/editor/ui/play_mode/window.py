@@ -58,7 +58,7 @@ class PlayWindow(ViewerWindow):
         viewer: PlayPresenter,
         drafts: PlayDrafts,
         display: WindowDisplay,
-        scale: float,
+        scale: float | None,
         *,
         is_unattended: bool,
     ) -> None:
@@ -101,7 +101,7 @@ class PlayWindow(ViewerWindow):
 
     def do(self, name: str) -> None:
         """Run a command; Escape returns to the editor if there is nothing to cancel."""
-        is_open = self.is_help_open or self.dialogs.is_open or self.lesson.player is not None
+        is_open = self.help_page.is_open or self.dialogs.is_open or self.lesson.player is not None
         viewer = self.viewer
         drag_tool = viewer.toolbox.hand
         is_idle = not is_open and viewer.tool is drag_tool and viewer.selected_robot is None
@@ -112,7 +112,7 @@ class PlayWindow(ViewerWindow):
 
 
 def open_play_window(
-    editor: Editor, display: WindowDisplay, scale: float, *, waits_for_workers: bool
+    editor: Editor, display: WindowDisplay, scale: float | None, *, waits_for_workers: bool
 ) -> PlayWindow:
     """Open the map of an editor in the viewer.
 
@@ -122,8 +122,8 @@ def open_play_window(
         The editor.
     display : WindowDisplay
         Display of the window in which the viewer is shown.
-    scale : float
-        Size of text and widgets.
+    scale : float or None
+        Size of text and widgets; None for one that suits the size of the window.
     waits_for_workers : bool
         Whether to wait for everything instead of computing in the background.
 

@@ -1,0 +1,67 @@
+"""Cost curves of runs that started before costs could be computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_window import Driver, open_viewer
+from sample_sessions import HALL
+
+from robocov.cost import CoverageCost
+from robocov_app.viewer.chart import axes
+from robocov_app.viewer.costs.cost_curves import CostCurves
+
+LATTICE = 16
+STEPS_BEFORE_WALL = 60
+
+
+def run_without_costs(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run, draw a wall and run on, while no costs are computed."""
+    with monkeypatch.context() as patch:
+        patch.setattr(CostCurves, "update", lambda curves: None)
+        for _ in range(STEPS_BEFORE_WALL):
+            driver.session.playback.step()
+        driver.press_key("w")
+        driver.drag_at((0.5, 3.2), (1.5, 3.2))
+        for _ in range(STEPS_BEFORE_WALL):
+            driver.session.playback.step()
+
+
+def test_a_curve_gets_its_beginning_on_the_map_before_a_wall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_viewer(tmp_path, lattice=LATTICE) as driver:
+        (pane,) = driver.session.timeline.panes
+        for curve in pane.curves.values():
+            curve.__init__()
+        run_without_costs(driver, monkeypatch)
+        assert driver.session.displayed.environment is not HALL
+        assert not len(pane.distance_curve)
+        driver.run_frames(60, seconds=0.0)
+        curve = pane.distance_curve
+        assert curve.times[0] == 0.0
+        assert np.diff(curve.times).max() < 0.5
+        start = driver.session.timeline.history[0].states[pane.number]
+        expected = CoverageCost(HALL, LATTICE, radius=start.setup.team.min_radius)
+        assert curve.values[0] == expected(start.positions).mean_distance
+
+
+def test_an_empty_chart_says_what_it_waits_for(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    monkeypatch.setattr(
+        "robocov_app.viewer.chart.chart.draw_waiting_text",
+        lambda canvas, frame, scale, text: (
+            texts.append(text) or axes.draw_waiting_text(canvas, frame, scale, text)
+        ),
+    )
+    for curve in driver.session.timeline.panes[0].curves.values():
+        curve.__init__()
+    driver.viewer.costs.state = "cost: preparing the map, 40%, 12 s left"
+    before = driver.copy_frame()
+    driver.window.draw()
+    assert texts[-1] == "Cost: preparing the map, 40%, 12 s left"
+    left, top, width, height = driver.window.layout.chart
+    differs = (driver.copy_frame() != before).any(axis=2)
+    assert differs[top : top + height, left : left + width].any()
