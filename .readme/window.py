@@ -65,7 +65,7 @@ def draw_window(theme: str, name: str) -> None:
         viewer.pass_time(60.0)  # Let earlier messages disappear.
         for _ in range(8):
             window.run_frame(0.0)
-        save_screenshot(window, HERE / name)
+        save_screenshot(window, PICTURES / name)
 
 
 def draw_editor(theme: str, name: str) -> None:
