@@ -59,7 +59,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "sent": Quantity(
         "bytes sent",
         "bytes a robot sends per second",
-        lambda rating: rating.compute_rate("told_bytes"),
+        lambda rating: rating.compute_rate("sent_bytes"),
     ),
 }
 PLOT_SIZE_PX = (560, 400)

@@ -320,7 +320,7 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         "Contacts": f"{contacts} of {len(rating.rows)}",
         "At rest": rest_text,
         "Rest, s": format_number(rest_time, ".0f"),
-        "B/s": format_number(rating.compute_rate("told_bytes"), ".0f"),
+        "B/s": format_number(rating.compute_rate("sent_bytes"), ".0f"),
         "µs/s": format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
     }
 

@@ -10,6 +10,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from robocov.controllers.registry import update_gain_names
 from robocov.errors import InputError, quote
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
@@ -37,6 +38,8 @@ FIGURES = (
     "stuck_robots",
 )
 """Figures of a run that a row contains in addition to its effort and its gaps."""
+_FORMER_FIGURE_NAMES = {"told_bytes": "sent_bytes"}
+"""Names of figures in rows of earlier versions, with those of today."""
 _RESULTS_VERSION_PATTERN = re.compile(r"\(results (\d+)\)")
 """Number of the results' version in that of robocov; see `robocov_app.sweep.worker.list_result_versions`."""
 _FIRST_VERSION_WITH_MESSAGES = 5
@@ -97,7 +100,9 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     if run.error is not None:
         return {**head, "error": run.error}
     figures = {name: run.figures[name] for name in FIGURES}
-    return {**head, **figures, **json.loads(effort), **compute_gaps(track, task.map, figures)}
+    row = {**head, **figures, **json.loads(effort), **compute_gaps(track, task.map, figures)}
+    _update_row_names(row)
+    return row
 
 
 def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[str, float | None]:
@@ -150,7 +155,7 @@ def describe_method() -> list[str]:
         "near_final_s: the time from which J stays within 5% of its final value. settled_at_s: the time "
         "from which no robot moves 5 cm in any 4 s. path_length_m: mean over robots. work_J: integral of "
         "|F v|, all robots.",
-        "told_bytes: what all robots send, received or not: 20 bytes (number and position) a robot and "
+        "sent_bytes: what all robots send, received or not: 20 bytes (number and position) a robot and "
         "control period, or at the message rate, and the messages of the controller, such as shared maps.",
         "deciding_s: processor time of the controller alone, all robots; it depends on the machine.",
     ]
@@ -209,8 +214,10 @@ def read_result(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: suite: expected the suite of {suite.SUITE_FILE.name}, got {result.get('suite')}"
         )
-    _check_head(result, path)
+    _check_types_except_rows(result, path)
+    _update_gain_names(result["entry"])
     for k, row in enumerate(result["rows"]):
+        _update_row_names(row)
         _check_row(row, f"{path}: rows[{k}]")
     return result
 
@@ -249,15 +256,28 @@ _RUN_TYPES = {"track": str, "map": str, "seed": int}
 _FAILED_ROW_TYPES = {**_RUN_TYPES, "error": str}
 _ROW_TYPES = {
     **_RUN_TYPES,
-    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound", "told_bytes", "deciding_s"), int | float | None),
+    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound", "sent_bytes", "deciding_s"), int | float | None),
 }
 
 
-def _check_head(result: dict[str, Any], path: Path) -> None:
+def _check_types_except_rows(result: dict[str, Any], path: Path) -> None:
     """Raise InputError unless everything but the rows of a result has the expected types."""
     _require_types(result, _HEAD_TYPES, path)
     _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
     _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
+
+
+def _update_gain_names(entry: dict[str, Any]) -> None:
+    """Replace, in place, the names of gains that were renamed since an entry was made."""
+    for key in ("gains", "set"):
+        entry[key] = update_gain_names(entry["controller"], entry[key])
+
+
+def _update_row_names(row: Any) -> None:
+    """Replace, in place, the names of figures that were renamed since a row was made."""
+    for former_name, name in _FORMER_FIGURE_NAMES.items():
+        if isinstance(row, dict) and former_name in row:
+            row[name] = row.pop(former_name)
 
 
 def _check_row(row: Any, location: str) -> None:

@@ -220,7 +220,7 @@ def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Recor
             return False
 
         record = scenario.run(simulation, should_stop=measure_step)
-    return record, {"deciding_s": simulation.decision_time, "told_bytes": meter.bytes}
+    return record, {"deciding_s": simulation.decision_time, "sent_bytes": meter.bytes}
 
 
 class CommunicationMeter:

@@ -76,7 +76,7 @@ class Adaptive(BaseController):
     exactly. At its position p_i, in its cell V_i with the centroid C_i, robot i learns by
 
         dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ
-        da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `least`
+        da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `min_density`
 
     The first term of da_i/dt fits the robot's measurements. The second one, with P_i = ∫ K (q - p_i)^T dq
     over V_i, makes the paper's Lyapunov function decrease. The third one is the consensus with the neighbors;
@@ -112,7 +112,7 @@ class Adaptive(BaseController):
         8.0, "functions", "number of functions along a side of the region", low=2.0, high=20.0, whole=True
     )
     prior: float = gain(1.0, "1", "density everywhere before the first measurement", low=1e-3)
-    least: float = gain(0.05, "1", "minimum of the estimated density", low=1e-6)
+    min_density: float = gain(0.05, "1", "minimum of the estimated density", low=1e-6)
     learning: float = gain(3.0, "1/s²", "γ, rate at which measurements are learned")
     consensus: float = gain(1.0, "1/s", "ζ, rate at which neighbors agree")
     coupling: float = gain(1e-3, "1/(m⁴ s)", "k, effect of the offset to the centroid")
@@ -230,7 +230,7 @@ class Adaptive(BaseController):
         identity = np.eye(memory.parameters.shape[1])
         decay = self.learning * matrices + self.consensus * identity
         parameters = _solve(identity + dt * decay, memory.parameters + dt * drive)
-        parameters = np.maximum(parameters, self.least)
+        parameters = np.maximum(parameters, self.min_density)
         return replace(
             memory,
             estimates=_multiply(parameters, lattice.functions.T),
@@ -252,7 +252,7 @@ class Adaptive(BaseController):
             measurements[robot, square] = values[robot]
             if is_new or memory.has_new_measurements[robot]:
                 estimate = self._estimate_by_gaussian_process(lattice, measurements[robot])
-                estimates[robot] = np.maximum(estimate, self.least)
+                estimates[robot] = np.maximum(estimate, self.min_density)
         return replace(
             memory,
             estimates=estimates,

@@ -12,24 +12,24 @@ Value: TypeAlias = float | str | None
 """Value of a gain: a number, None for no limit, or one of the choices of an `Option`."""
 
 _METADATA_KEY = "gain"
-_FORMER_SPELLINGS = {"neighbours": "neighbors"}
-"""Spellings of gains and choices in files of earlier versions, with those of today."""
+_FORMER_NAMES = {"neighbours": "neighbors", "least": "min_density"}
+"""Names of gains and choices in files of earlier versions, with those of today."""
 _MAX_PLAIN_GAIN = 1e12
 """Limit of the absolute value of a number that a user's dataclass declares without `gain`."""
 _DIMENSIONLESS = "1"
 """Unit of dimensionless gains, which is not written after a number."""
 
 
-def update_spelling(name: str, known: Collection[str]) -> str:
-    """Return the present spelling of a gain or choice from a file, which may be of an earlier version.
+def update_name(name: str, known: Collection[str]) -> str:
+    """Return the present name of a gain or choice from a file, which may be of an earlier version.
 
     Examples
     --------
-    >>> update_spelling("neighbours", {"neighbors", "eta"}), update_spelling("eta", {"neighbors", "eta"})
+    >>> update_name("neighbours", {"neighbors", "eta"}), update_name("eta", {"neighbors", "eta"})
     ('neighbors', 'eta')
     """
-    spelling = _FORMER_SPELLINGS.get(name, name)
-    return spelling if name not in known and spelling in known else name
+    present_name = _FORMER_NAMES.get(name, name)
+    return present_name if name not in known and present_name in known else name
 
 
 def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
@@ -114,7 +114,7 @@ class Option:
     optional: ClassVar[bool] = False
 
     def validate(self, value: object, controller_name: str) -> str:
-        """Return a value in its present spelling if it is one of the choices.
+        """Return the present name of a choice if the value is one of the choices.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Option:
             raise ParameterError(
                 f"{controller_name}.{self.name}: expected one of {expected}, got {quote(value)}"
             )
-        value = update_spelling(value, self.choices)
+        value = update_name(value, self.choices)
         if value not in self.choices:
             raise ParameterError(
                 f"{controller_name}.{self.name}: {describe_unknown_name('choice', value, self.choices)}"
@@ -357,7 +357,7 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
         if not gains:
             place = f"{controller_name}.{given_name}"
             raise ParameterError(f"{place}: controller {controller_name!r} has no gains")
-        name = update_spelling(given_name, gains)
+        name = update_name(given_name, gains)
         if name not in gains:
             raise ParameterError(f"{controller_name}: {describe_unknown_name('gain', name, gains)}")
         checked_values[name] = gains[name].validate(value, controller_name)

@@ -24,7 +24,7 @@ from robocov.controllers.exploration.exploring_lloyd import ExploringLloyd
 from robocov.controllers.exploration.frontier_median import FrontierMedian
 from robocov.controllers.exploration.greedy_submodular import GreedySubmodular
 from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
-from robocov.controllers.gains import Option, Value, get_gains, instantiate_controller, update_spelling
+from robocov.controllers.gains import Option, Value, get_gains, instantiate_controller, update_name
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.gp_ucb import GpUcb
 from robocov.controllers.individual import to_team_controller
@@ -197,8 +197,8 @@ def _describe_unknown_controller(name: str) -> str:
     return describe_unknown_name("controller", name, list_controller_classes())
 
 
-def update_gain_spellings(controller: str, gains: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the gains in a file with the present spellings of names and choices.
+def update_gain_names(controller: str, gains: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the gains in a file with the present names of gains and choices.
 
     Parameters
     ----------
@@ -212,16 +212,16 @@ def update_gain_spellings(controller: str, gains: Mapping[str, Value]) -> dict[s
 
     Examples
     --------
-    >>> update_gain_spellings("poduri", {"neighbours": 3.0})
+    >>> update_gain_names("poduri", {"neighbours": 3.0})
     {'neighbors': 3.0}
     """
     known = get_gains(CONTROLLERS.get(controller))
     updated: dict[str, Value] = {}
     for given_name, value in gains.items():
-        name = update_spelling(given_name, known)
+        name = update_name(given_name, known)
         declared = known.get(name)
         if isinstance(declared, Option) and isinstance(value, str):
-            value = update_spelling(value, declared.choices)
+            value = update_name(value, declared.choices)
         updated[name] = value
     return updated
 

@@ -14,7 +14,7 @@ import numpy as np
 from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import get_controller_label
 from robocov.controllers.gains import Value
-from robocov.controllers.registry import update_gain_spellings
+from robocov.controllers.registry import update_gain_names
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
@@ -447,7 +447,7 @@ class Record(Drawable):
             team=team,
             controller=document.controller.name,
             label=get_controller_label(document.controller.name),
-            gains=update_gain_spellings(document.controller.name, document.controller.gains),
+            gains=update_gain_names(document.controller.name, document.controller.gains),
             start=document.start,
             seed=document.seed,
             dt=document.dt_s,

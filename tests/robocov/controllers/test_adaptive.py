@@ -141,7 +141,7 @@ def test_the_gaussian_process_fits_the_measurements() -> None:
         squares = memory.lattice.squares[known]
         distances = np.hypot(*(memory.lattice.samples[:, None] - squares).transpose(2, 0, 1))
         nearest = distances.argmin(axis=0)
-        measurements = np.maximum(memory.measurements[i, known], controller.least)
+        measurements = np.maximum(memory.measurements[i, known], controller.min_density)
         errors = np.abs(memory.estimates[i, nearest] - measurements)
         assert np.median(errors) < 0.25
     exploring = learn_everywhere(Adaptive(estimate="gp", explore=1.0), HOT, 12)

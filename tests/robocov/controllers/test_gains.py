@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from robocov.controllers import (
     CONTROLLERS,
+    Adaptive,
     Boosting,
     Poduri,
     Rapf,
@@ -19,7 +20,7 @@ from robocov.controllers import (
     make_controller,
 )
 from robocov.controllers.gains import Gain, Option, choice, gain, instantiate_controller
-from robocov.controllers.registry import update_gain_spellings
+from robocov.controllers.registry import update_gain_names
 from robocov.errors import ParameterError
 
 
@@ -102,11 +103,13 @@ def test_gains_may_be_one_of_several_choices() -> None:
         choice("up", ("left", "right"), "where to pass")
 
 
-def test_former_spellings_in_files_are_accepted() -> None:
+def test_former_names_in_files_are_accepted() -> None:
     assert make_controller("poduri", {"neighbours": 3.0}) == Poduri(neighbors=3.0)
+    assert make_controller("adaptive", {"least": 0.1}) == Adaptive(min_density=0.1)
+    assert update_gain_names("adaptive", {"least": 0.1}) == {"min_density": 0.1}
     assert make_controller("boosting", {"boost": "neighbours"}) == Boosting(boost="neighbors")
-    assert update_gain_spellings("boosting", {"boost": "neighbours"}) == {"boost": "neighbors"}
-    assert update_gain_spellings("mine.py:Mine", {"neighbours": 3.0}) == {"neighbours": 3.0}
+    assert update_gain_names("boosting", {"boost": "neighbours"}) == {"boost": "neighbors"}
+    assert update_gain_names("mine.py:Mine", {"neighbours": 3.0}) == {"neighbours": 3.0}
 
 
 def test_gains_of_users_keep_their_spelling() -> None:

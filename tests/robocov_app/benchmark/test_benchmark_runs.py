@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from swept import HEAD, PULL, DirectExecutor
 
-from robocov.controllers import load_controller_class
+from robocov.controllers import Adaptive, get_gain_values, load_controller_class
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import place_labels
@@ -90,7 +90,7 @@ def test_runs_are_rated_verified_and_shown_on_a_page(
     for row in result["rows"]:
         best = suite.load_frozen_maps()[row["map"]]["references"]["6"]["mean_distance_m"]
         assert row["gap"] == row["mean_distance_m"] / best - 1.0 > 0.0
-        assert row["told_bytes"] == pytest.approx(6 * 20 * (60 if row["track"] == "ideal" else 2))
+        assert row["sent_bytes"] == pytest.approx(6 * 20 * (60 if row["track"] == "ideal" else 2))
         assert row["deciding_s"] > 0.0
     assert verify(tmp_path / "a", sample=1) == (1, [])
     page = str(tmp_path / "page.html")
@@ -122,6 +122,16 @@ def test_bundled_results_are_complete() -> None:
             assert "error" in row or row.items() >= compute_gaps(row["track"], row["map"], row).items()
     # A result of the same controller replaces the bundled one on the page.
     assert len(load_bundled_results(results[:1])) == len(results) - 1
+
+
+def test_former_names_in_results_are_updated(tmp_path: Path) -> None:
+    content = gzip.decompress((ENTRIES / "adaptive.json.gz").read_bytes()).decode()
+    path = tmp_path / "result.json"
+    path.write_text(content.replace('"min_density"', '"least"').replace('"sent_bytes"', '"told_bytes"'))
+    result = read_result(path)
+    assert result["entry"]["gains"] == get_gain_values(Adaptive())
+    for row in result["rows"]:
+        assert "error" in row or (row["sent_bytes"] > 0.0 and "told_bytes" not in row)
 
 
 @pytest.mark.slow
@@ -491,7 +501,7 @@ def test_the_page_fits_narrow_and_wide_windows(
                 "settled_at_s": 8.0,
                 "path_length_m": 8.0 - k,
                 "work_J": 50.0,
-                "told_bytes": 4e5 * (k + 1),
+                "sent_bytes": 4e5 * (k + 1),
                 "deciding_s": 0.1 * 20**k,
             }
             for j, map_name in enumerate(("rooms", "polygons-7001"))

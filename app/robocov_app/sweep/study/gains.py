@@ -10,7 +10,7 @@ from itertools import product
 from typing import Any, TypeAlias, get_args
 
 from robocov.controllers import get_gain_values, get_gains
-from robocov.controllers.gains import Gain, Option, Value, instantiate_controller, update_spelling
+from robocov.controllers.gains import Gain, Option, Value, instantiate_controller, update_name
 from robocov.errors import JsonPath, ParameterError, describe_unknown_name, format_path, quote
 from robocov_app.sweep.study.sampling import Range, Sampling, Scale
 from robocov_app.sweep.study.value_paths import parse_values, require_distinct, validate_at
@@ -140,7 +140,7 @@ def _parse_value(known: Mapping[str, Gain | Option], name: str, value: object, p
 
 def _find_gain(known: Mapping[str, Gain | Option], name: str, path: JsonPath) -> Gain | Option:
     """Look up a gain by its name; raise ParameterError if the controller has no such gain."""
-    name = update_spelling(name, known)
+    name = update_name(name, known)
     if name in known:
         return known[name]
     # The path leads to the value of the gain, or to an item in a list of values.

@@ -70,7 +70,7 @@ GAIN_LABELS: Mapping[str, str] = MappingProxyType(
         "estimate": "Density model",
         "basis": "Basis functions",
         "prior": "Prior density",
-        "least": "Minimum density",
+        "min_density": "Minimum density",
         "learning": "Learning rate",
         "consensus": "Consensus rate",
         "coupling": "Coupling",

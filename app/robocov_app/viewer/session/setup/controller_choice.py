@@ -10,7 +10,7 @@ from pydantic import AfterValidator, ConfigDict, Field
 from robocov.controllers import CONTROLLERS, get_gains, load_controller_class, make_controller
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, format_value
-from robocov.controllers.registry import update_gain_spellings
+from robocov.controllers.registry import update_gain_names
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.files.fields import MAX_TEXT_CHARS, build_refusal, convert_field
 
@@ -41,7 +41,7 @@ class ControllerChoice:
 
     def __post_init__(self) -> None:
         # Sessions and runs of earlier versions contain former spellings.
-        object.__setattr__(self, "gains", update_gain_spellings(self.name, self.gains))
+        object.__setattr__(self, "gains", update_gain_names(self.name, self.gains))
 
     def build(self) -> Controller:
         """Build the controller. If it is in a user's file, that file is executed.
