@@ -16,7 +16,7 @@ from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion.conversion_options import Shaping
 from robocov_app.formats.geometry.conversion.environment import build_environment
 from robocov_app.formats.geometry.conversion.map_layout import build_boundary
-from robocov_app.formats.geometry.conversion.starts import find_roomiest_point
+from robocov_app.formats.geometry.conversion.starts import find_widest_point
 from robocov_app.formats.geometry.polygons import round_polygons
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
@@ -375,8 +375,8 @@ _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
 def test_the_start_is_where_clearance_is_largest(blocks: list[tuple[int, int, int, int]]) -> None:
     solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])
     room = max(shapely.get_parts(box(-1, -1, 16, 16) - solid), key=lambda part: part.area)
-    (x, y), away = find_roomiest_point(room, 0.01)
+    (x, y), away = find_widest_point(room, 0.01)
     assert room.contains(shapely.Point(x, y))
     assert away == pytest.approx(room.boundary.distance(shapely.Point(x, y)))
     assert away >= shapely.maximum_inscribed_circle(room, tolerance=0.001).length - 0.0101
-    assert find_roomiest_point(room, 0.01, sufficient=0.5)[1] >= min(0.5, away - 0.01)
+    assert find_widest_point(room, 0.01, sufficient=0.5)[1] >= min(0.5, away - 0.01)

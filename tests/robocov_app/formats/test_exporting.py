@@ -25,7 +25,7 @@ from robocov_app.formats import (
     export_map,
     import_map,
 )
-from robocov_app.formats.geometry.conversion.starts import find_rooms
+from robocov_app.formats.geometry.conversion.starts import find_center_regions
 
 ROOM = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)))
 
@@ -174,7 +174,9 @@ def test_maps_go_out_and_in(tmp_path: Path, name: str, format_name: str) -> None
     back, _, _ = import_map(path, options=read)
     assert back.free.is_valid
     assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
-    assert len(find_rooms(back.free, DEFAULT_RADIUS_M)) == len(find_rooms(environment.free, DEFAULT_RADIUS_M))
+    assert len(find_center_regions(back.free, DEFAULT_RADIUS_M)) == len(
+        find_center_regions(environment.free, DEFAULT_RADIUS_M)
+    )
     drawn = [back.boundary_polygon, *(shape.polygon for shape in back.obstacles), *back.free.geoms]
     for ring in shapely.get_rings(drawn):
         assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
 from robocov_app.formats.geometry.cells.vectorize import trace_outline
-from robocov_app.formats.geometry.conversion.starts import find_rooms
+from robocov_app.formats.geometry.conversion.starts import find_center_regions
 from robocov_app.formats.geometry.simplification.checks import MAX_OUTLINE_CHANGE
 from robocov_app.formats.geometry.simplification.narrow_gaps import find_closed_gaps
 from robocov_app.formats.geometry.simplification.original_outline import OriginalOutline
@@ -135,8 +135,8 @@ def test_a_door_as_wide_as_a_robot_stays_open() -> None:
     outline = affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0))
     for tolerance in (CELL, 2 * CELL, 4 * CELL):
         result = simplify_free_space(outline, tolerance, CELL, 0.124)
-        assert len(find_rooms(result.free, 0.124)) == 1, tolerance
-    assert len(find_rooms(outline, 0.126)) == 2
+        assert len(find_center_regions(result.free, 0.124)) == 1, tolerance
+    assert len(find_center_regions(outline, 0.126)) == 2
 
 
 def test_reduced_simplification_is_noted() -> None:
@@ -147,9 +147,9 @@ def test_reduced_simplification_is_noted() -> None:
         low = int(28 + 4 * np.sin((column - 40) / 40 * np.pi))
         free[low : low + 6, column] = True
     outline = affinity.scale(trace_outline(free, "grid"), CELL, CELL, origin=(0, 0))
-    assert len(find_rooms(outline, 0.115)) == 1
+    assert len(find_center_regions(outline, 0.115)) == 1
     result = simplify_free_space(outline, 3 * CELL, CELL, 0.115)
-    assert len(find_rooms(result.free, 0.115)) == 1
+    assert len(find_center_regions(result.free, 0.115)) == 1
     (line,) = [line for line in result.changed if "narrow" in line]
     assert line.endswith("so that a robot of radius 0.115 m still fits through")
     assert count_vertices(result.free) < count_vertices(outline) / 2
@@ -192,8 +192,8 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
     assert shapely.distance(outline.boundary, corners).max() <= tolerance * (1 + 1e-6) + CELL / 16
     assert abs(result.area - outline.area) <= 0.02 * outline.area + 1e-9
     # two places that a robot of just this size goes between are connected afterwards
-    before = find_rooms(outline, radius * 1.0001)
-    after = shapely.union_all(find_rooms(result, radius * 0.99))
+    before = find_center_regions(outline, radius * 1.0001)
+    after = shapely.union_all(find_center_regions(result, radius * 0.99))
     parts = shapely.get_parts(after)
     for room in before:
         if room.area < 4 * radius * radius:

@@ -38,7 +38,7 @@ class Shaping(Options):
     radius: float = DEFAULT_RADIUS_M
     """Radius of a robot, m; passages in which it fits stay open."""
     default_start: Literal["room", "uniform"] = "room"
-    """Default start of the map: a disc where there is most room, or anywhere."""
+    """Default start of the map: a disc around the widest point, or anywhere."""
 
     def __post_init__(self) -> None:
         self.require_ranges(

@@ -21,7 +21,11 @@ from robocov_app.formats.geometry.conversion.map_layout import (
     normalize_ring,
 )
 from robocov_app.formats.geometry.conversion.primitives import restore_primitives
-from robocov_app.formats.geometry.conversion.starts import build_starts, find_rooms, require_room
+from robocov_app.formats.geometry.conversion.starts import (
+    build_starts,
+    find_center_regions,
+    require_clearance,
+)
 from robocov_app.formats.geometry.conversion.validity import build_valid_boundary, build_valid_free_space
 from robocov_app.formats.geometry.polygons import round_polygons
 from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace, simplify_free_space
@@ -68,7 +72,7 @@ def build_environment(
     parts = drop_specks(selection.parts, conversion)
     outer = _choose_boundary(boundary_parts, parts, selection, conversion)
     conversion.require_at_most(MAX_OBSTACLES, sum(len(part.interiors) for part in parts), "obstacles")
-    require_room(parts, conversion)
+    require_clearance(parts, conversion)
     unsimplified = MultiPolygon(parts)
     simplified = _simplify(unsimplified, original, conversion)
     conversion.require_at_most(MAX_VERTICES, shapely.count_coordinates(simplified.free), "vertices")
@@ -221,7 +225,9 @@ def _report_unreachable(environment: Environment, conversion: Conversion) -> Non
     """Report the regions that a robot cannot reach from the largest one."""
     if shapely.get_num_coordinates(environment.free) > _MAX_CHECKED_VERTICES:
         return
-    areas = sorted((room.area for room in find_rooms(environment.free, conversion.radius)), reverse=True)
+    areas = sorted(
+        (region.area for region in find_center_regions(environment.free, conversion.radius)), reverse=True
+    )
     if len(areas) > 1:
         count = f"{format_count(len(areas) - 1, 'part')} of {format_area(sum(areas[1:]), 3)}"
         conversion.notes.append(

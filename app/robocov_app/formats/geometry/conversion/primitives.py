@@ -22,7 +22,7 @@ from robocov_app.formats.foreign_map import Primitive
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.deviation import find_moved_walls, measure_deviation
 from robocov_app.formats.geometry.conversion.map_layout import MapLayout
-from robocov_app.formats.geometry.conversion.starts import find_rooms
+from robocov_app.formats.geometry.conversion.starts import find_center_regions
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
 from robocov_app.formats.geometry.polygons import round_polygons
 from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace
@@ -57,11 +57,13 @@ def restore_primitives(
     -------
     MapLayout
     """
-    max_rooms = max(len(find_rooms(space, conversion.radius)) for space in (unsimplified, simplified.free))
+    max_regions = max(
+        len(find_center_regions(space, conversion.radius)) for space in (unsimplified, simplified.free)
+    )
     free_before = layout.compute_free()
     rejected: frozenset[Primitive] = frozenset()
     for _ in range(_MAX_ROUNDS):
-        candidate = _match_primitives(layout, simplified.tolerance, max_rooms, rejected, conversion)
+        candidate = _match_primitives(layout, simplified.tolerance, max_regions, rejected, conversion)
         if not candidate.primitives:
             return layout
         pockets = _find_pockets(candidate, free_before)
@@ -107,13 +109,13 @@ def transform_numbers(obstacle: _Obstacle, function: Callable[[float], float]) -
 def _match_primitives(
     layout: MapLayout,
     tolerance: float,
-    max_rooms: int,
+    max_regions: int,
     rejected: frozenset[Primitive],
     conversion: Conversion,
 ) -> MapLayout:
     """Return a layout in which primitives replace the polygons that consist of them.
 
-    The replacement must not divide the free space into more than `max_rooms` regions between which a robot
+    The replacement must not divide the free space into more than `max_regions` regions between which a robot
     cannot move. If it does, only polygons that are a single primitive are replaced; if that does not help
     either, the layout is returned unchanged. Primitives in `rejected` are not used.
     """
@@ -136,7 +138,7 @@ def _match_primitives(
             part for part, match in zip(layout.solid, matches, strict=True) if not 0 < len(match) <= max_count
         ]
         candidate = layout._replace(solid=solid, primitives=primitives)
-        if len(find_rooms(candidate.compute_free(), conversion.radius)) <= max_rooms:
+        if len(find_center_regions(candidate.compute_free(), conversion.radius)) <= max_regions:
             return candidate
     return layout
 

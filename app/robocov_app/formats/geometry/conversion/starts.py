@@ -1,4 +1,4 @@
-"""Positions where robots can start: rooms, the roomiest point, and the starts of a converted map."""
+"""Positions where robots can start, and the starts of a converted map."""
 
 import math
 
@@ -15,10 +15,10 @@ from robocov_app.formats.geometry.crossings import extract_sides
 from robocov_app.formats.geometry.simplification.narrow_gaps import count_ray_crossings
 
 _MAX_SQUARES = 1024
-"""Maximum number of squares of each size in the search for the roomiest point."""
+"""Maximum number of squares of each size in the search for the widest point."""
 _MAX_RAY_CROSSINGS = 5_000_000
-_MIN_ROOM_AREA_RADII2 = 0.25
-"""Smaller regions, in squared radii of the robot, are not rooms."""
+_MIN_REGION_AREA_RADII2 = 0.25
+"""Smaller regions, in squared radii of the robot, are ignored."""
 _MIN_START_TOLERANCE_M = 0.01
 _START_STEPS_PER_SIDE = 500
 """The tolerance for the center of a start is the side of a square of the same area, divided by this."""
@@ -29,7 +29,7 @@ _MAX_DISC_RADIUS_M = 2.0
 _MIN_DISC_RADIUS_M = 0.02
 
 
-def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+def find_center_regions(free: MultiPolygon, radius: float) -> list[Polygon]:
     """Find the regions in which the center of a robot can move, except for tiny ones.
 
     Parameters
@@ -44,11 +44,11 @@ def find_rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
         The regions; a robot cannot move from one to another.
     """
     inner = free.buffer(-radius, quad_segs=4)
-    min_area = _MIN_ROOM_AREA_RADII2 * radius * radius
+    min_area = _MIN_REGION_AREA_RADII2 * radius * radius
     return [part for part in shapely.get_parts(inner).tolist() if part.area > min_area]
 
 
-def find_roomiest_point(
+def find_widest_point(
     free: Polygon, tolerance: float, sufficient: float = math.inf
 ) -> tuple[tuple[float, float], float]:
     """Find the point of a free space that is farthest from its walls.
@@ -114,14 +114,14 @@ def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[FloatArray, fl
     return np.stack(corners, axis=-1).reshape(-1, 2) + side / 2, side
 
 
-def require_room(parts: list[Polygon], conversion: Conversion) -> None:
+def require_clearance(parts: list[Polygon], conversion: Conversion) -> None:
     """Raise MapError if no part of the free space is wide enough for a robot to start in."""
     clearance = conversion.clearance
     widest = 0.0
     for part in parts:
         # No point of a part is farther from its walls than the radius of the disc of the same area.
         if math.sqrt(part.area / math.pi) > widest:
-            _, distance = find_roomiest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
+            _, distance = find_widest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
             widest = max(widest, distance)
         if widest >= clearance:
             return
@@ -135,11 +135,11 @@ def require_room(parts: list[Polygon], conversion: Conversion) -> None:
 
 
 def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartSpec]:
-    """Build the starts of a map: a disc around the roomiest point, anywhere, and the robots of the file."""
+    """Build the starts of a map: a disc around the widest point, anywhere, and the robots of the file."""
     part = free.geoms[0]
     # A finer tolerance would hardly move the start.
     tolerance = max(_MIN_START_TOLERANCE_M, math.sqrt(part.area) / _START_STEPS_PER_SIDE)
-    (x, y), distance = find_roomiest_point(part, tolerance)
+    (x, y), distance = find_widest_point(part, tolerance)
     # The disc contains the centers of robots, so it keeps the clearance of a robot from the walls.
     radius = min(distance - conversion.clearance, _MAX_DISC_RADIUS_M)
     uniform = UniformStart()
