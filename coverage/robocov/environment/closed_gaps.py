@@ -26,8 +26,9 @@ _BAR_DEPTH_M = 3 * GRID_M
 """Length by which a bar extends into a wall if it does not end at a vertex. The exact point on the wall is
 not on the grid, and a bar that ended there might leave a crack."""
 _EDGES_PER_QUARTER = 32
-"""Edges per quarter circle around corners when the free space is eroded, for an error of 3e-4 of the radius.
-GEOS also simplifies walls with closely spaced vertices, by up to 1% of the radius."""
+"""Edges per quarter circle around corners when the free space is eroded. They are closer to the corner than
+the circle by at most 3e-4 of the radius, which is less than the gap between robot and wall. GEOS also
+simplifies walls with closely spaced vertices, by up to 1% of the radius."""
 _NO_FACE = -1
 """Used in place of the index of a face if there is none."""
 
@@ -105,7 +106,10 @@ def build_bars(free: MultiPolygon, radius: float) -> list[Polygon]:
 
 
 def compute_center_areas(
-    free: MultiPolygon, closed: MultiPolygon, clearance: float, edges_per_quarter: int
+    free: MultiPolygon,
+    closed: MultiPolygon,
+    clearance: float,
+    edges_per_quarter: int = _EDGES_PER_QUARTER,
 ) -> np.ndarray:
     """Compute the area where the center of a disc can be in each component of a free space with closed gaps.
 

@@ -18,10 +18,6 @@ from robocov.environment import (
 from robocov.potential import compute_spread_directions
 from robocov.typing import FloatArray, IntArray
 
-_EDGES_PER_QUARTER = 32
-"""Number of edges that replace a quarter circle around a corner. They are closer to the corner than the
-circle by at most 3e-4 of the radius, which is less than the gap between robot and wall."""
-
 _MAX_PUSHES = 60
 """Maximum number of times that overlapping robots are pushed apart before the search gives up."""
 
@@ -69,12 +65,7 @@ class ConfigurationSpace:
     def __init__(self, free: MultiPolygon, radius: float, closed: MultiPolygon | None = None) -> None:
         self.clearance = compute_start_clearance(radius)
         self.spacing = compute_start_spacing(radius)
-        areas = compute_center_areas(
-            free,
-            free if closed is None else closed,
-            clearance=self.clearance,
-            edges_per_quarter=_EDGES_PER_QUARTER,
-        )
+        areas = compute_center_areas(free, free if closed is None else closed, self.clearance)
         self.components: tuple[BaseGeometry, ...] = tuple(areas)
         shapely.prepare(list(self.components))
 
