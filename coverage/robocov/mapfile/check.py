@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,8 +34,6 @@ _SECONDS_PER_SQUARED_VERTEX = 6.1e-8
 """Measured time to set up a `robocov.cost.CoverageCost`, divided by the square of the number of vertices."""
 _MAX_EQUAL_DISTANCE_M = 1e-6
 """Distance below which two vertices are probably meant to be the same."""
-_EDGES_PER_QUARTER = 32
-"""Edges per quarter circle around corners when the area of the centers of robots is computed."""
 _INTERIORS_INTERSECT = "T********"
 """DE-9IM pattern of two shapes whose interiors have points in common."""
 
@@ -77,9 +76,6 @@ class MapReport:
         Areas of the connected components of the free space, the largest first.
     radius : float, m
         Radius of the robots.
-    unreachable_area : float, m²
-        Free area that no robot can reach from the largest area in which robots can move: sealed rooms, and
-        everything behind gaps that are narrower than a robot.
     narrowest_gap : Gap or None
         Narrowest passage of the free space; see `robocov.environment.find_narrowest_gap`.
     starts : tuple of StartReport
@@ -105,13 +101,22 @@ class MapReport:
     obstacle_count: int
     components: tuple[float, ...]
     radius: float
-    unreachable_area: float
     narrowest_gap: Gap | None
     starts: tuple[StartReport, ...]
     warnings: tuple[str, ...]
     density: str | None = None
     density_range: tuple[float, float] | None = None
     mean_density: float = 1.0
+    _environment: Environment = field(kw_only=True, repr=False, compare=False)
+
+    @cached_property
+    def unreachable_area(self) -> float:
+        """Free area that no robot can reach from the largest area in which robots can move, m².
+
+        It contains sealed rooms, and everything behind gaps that are narrower than a robot. It is computed
+        when it is read for the first time, because this takes longer than all other measures.
+        """
+        return compute_unreachable_area(self._environment, self.radius)
 
     @property
     def free_fraction(self) -> float:
@@ -182,13 +187,13 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         obstacle_count=len(environment.obstacles),
         components=tuple(float(component.area) for component in environment.free.geoms),
         radius=radius,
-        unreachable_area=compute_unreachable_area(environment, radius),
         narrowest_gap=gap,
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(_find_warnings(environment, gap, radius)),
         density=None if density is None else density.kind,
         density_range=None if density is None else (density.min_value, _find_maximum(density)),
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
+        _environment=environment,
     )
 
 
@@ -209,7 +214,7 @@ def compute_unreachable_area(environment: Environment, radius: float) -> float:
     """
     closed = environment.close_gaps(radius)
     components = np.array(closed.free.geoms)
-    center_areas = compute_center_areas(environment.free, closed.free, radius, _EDGES_PER_QUARTER)
+    center_areas = compute_center_areas(environment.free, closed.free, radius)
     has_robot = ~shapely.is_empty(center_areas)
     reachable_areas = shapely.area(components[has_robot])
     # The thin bars that close gaps have an area of a few square micrometers.

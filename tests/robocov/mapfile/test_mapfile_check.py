@@ -201,3 +201,15 @@ def test_the_unreachable_area_depends_on_the_radius() -> None:
     assert report.unreachable_area == pytest.approx(4 * 6, abs=0.08)
     assert check_map(environment, radius=4.0).unreachable_area == pytest.approx(free_area)
     assert report.to_dict()["unreachable_area_m2"] == report.unreachable_area
+
+
+def test_the_unreachable_area_is_computed_when_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    radii = []
+    monkeypatch.setattr(
+        "robocov.mapfile.check.compute_unreachable_area", lambda _, radius: radii.append(radius)
+    )
+    report = check_map(build_room(), radius=0.2)
+    assert radii == []
+    report.to_dict()
+    report.to_dict()
+    assert radii == [0.2]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, TypeAlias
 
 import tyro
 
@@ -22,7 +22,7 @@ from robocov.errors import (
 )
 from robocov.files.writing import resolve_target
 from robocov.mapfile import dump_map, list_bundled_maps, load_map, save_map
-from robocov.mapfile.check import check_map
+from robocov.mapfile.check import MapReport, check_map
 from robocov_app.commands.options import FigureOptions
 from robocov_app.terminal.output import check_output_file, echo, print_answer
 from robocov_app.terminal.progress import show_progress
@@ -127,7 +127,7 @@ def command(options: Arguments) -> None:
         _check_file(out, overwrite=options.overwrite)
     tasks = _list_tasks(options)
     environments = []
-    rows = []
+    reports = {}
     is_quiet = options.json or not options.writes_folder
     with show_progress("generating", len(tasks), quiet=is_quiet) as update:
         for number, task in enumerate(tasks, start=1):
@@ -141,12 +141,12 @@ def command(options: Arguments) -> None:
                 echo(dump_map(environment), end="")
             else:
                 save_map(environment, path)
-                rows.append({"file": str(path), **check_map(environment).to_dict()})
+                reports[path] = check_map(environment)
             update(number)
     if options.plot is not None:
         _save_sheet(options, options.plot, environments)
     if out is not None:
-        print_answer(options, {"out": str(out), "maps": rows}, *map(_describe_map, rows), indent=1)
+        _print_reports(options, out, reports)
 
 
 def _build_map(task: _MapTask) -> Environment:
@@ -169,14 +169,24 @@ def _save_sheet(options: Arguments, path: Path, environments: list[Environment])
     save_figure(plot_maps(environments, options.theme), path)
 
 
-def _describe_map(row: dict[str, Any]) -> str:
+def _print_reports(options: Arguments, out: Path, reports: Mapping[Path, MapReport]) -> None:
+    """Print the reports on the maps by their files: one line each, or all measures as JSON."""
+    if options.json:
+        rows = [{"file": str(path), **report.to_dict()} for path, report in reports.items()]
+        print_answer(options, {"out": str(out), "maps": rows}, indent=1)
+        return
+    for path, report in reports.items():
+        echo(f"{path}: {_describe_map(report)}")
+
+
+def _describe_map(report: MapReport) -> str:
     """Return the most important properties of a map as a line of text."""
     passages = "no passage"
-    if row["narrowest_gap_m"] is not None:
-        passages = f"narrowest gap {row['narrowest_gap_m']:.3f} m"
-    obstacles = format_count(row["obstacles"], "obstacle")
-    free_area = f"{row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"
-    return f"{row['file']}: {free_area}, {passages}, {obstacles}, {row['vertices']} vertices"
+    if report.narrowest_gap is not None:
+        passages = f"narrowest gap {report.narrowest_gap.width:.3f} m"
+    obstacles = format_count(report.obstacle_count, "obstacle")
+    free_area = f"{report.free_area:.4g} of {report.area:.4g} m² free"
+    return f"{free_area}, {passages}, {obstacles}, {report.vertex_count} vertices"
 
 
 def _prepare_folder(folder: Path | None, *, overwrite: bool) -> None:
