@@ -206,14 +206,15 @@ class ExploringLloyd(BaseController):
 def _measure(seen: Observations, memory: ExploringMemory) -> FloatArray:
     """Return the measurements, (n, s), including those that the robots make in this step.
 
-    A robot measures φ only at the centers of the squares within its sensing range.
+    A robot measures φ at the centers of the squares within its sensing range whose φ it does not know yet.
     """
     measurements = memory.measurements.copy()
     centers = memory.grid.centers
     for robot, position in enumerate(seen.positions):
         squared_distances = ((centers - position) ** 2).sum(axis=1)
         is_sensed = squared_distances <= memory.team.sensing_range[robot] ** 2
-        measurements[robot, is_sensed] = seen.measure_density(robot, centers[is_sensed])
+        is_new = is_sensed & np.isnan(measurements[robot])
+        measurements[robot, is_new] = seen.measure_density(robot, centers[is_new])
     return measurements
 
 

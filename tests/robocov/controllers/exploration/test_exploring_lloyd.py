@@ -34,8 +34,10 @@ class SensedDensity(Density):
     def __init__(self, positions: FloatArray, sensing_range: float) -> None:
         self.positions = positions
         self.sensing_range = sensing_range
+        self.evaluated_points: list[FloatArray] = []
 
     def evaluate(self, points: FloatArray) -> FloatArray:
+        self.evaluated_points.append(points)
         squared_distances = ((points[:, None] - self.positions) ** 2).sum(axis=2)
         assert (squared_distances.min(axis=1) <= self.sensing_range**2).all()
         return PEAK.evaluate(points)
@@ -82,6 +84,18 @@ def test_a_robot_measures_only_within_its_sensing_range() -> None:
         is_known = ~np.isnan(memory.measurements[robot])
         distances = np.hypot(*(memory.grid.centers - position).T)
         np.testing.assert_array_equal(is_known, distances <= 1.5)
+
+
+def test_a_robot_measures_each_square_once() -> None:
+    controller = ExploringLloyd()
+    positions = np.array([[3.0, 4.0]])
+    memory = controller.begin(SQUARE.region, Team.homogeneous(1, sensing_range=1.5))
+    density = SensedDensity(positions, 1.5)
+    for time in (0.0, 2.0, 4.0):
+        memory = controller.decide(build_observations(positions, density, time), memory).memory
+    points = np.concatenate(density.evaluated_points)
+    assert len(points) > 0
+    assert len(np.unique(points, axis=0)) == len(points)
 
 
 def test_a_team_that_explores_finds_a_peak_that_it_does_not_know() -> None:
