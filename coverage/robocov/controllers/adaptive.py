@@ -15,6 +15,7 @@ from robocov.controllers.density_exchange import (
     MessageLists,
     ParameterExchange,
     add_received_measurements,
+    measure_own_density,
 )
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import choice, gain, response_time_gain
@@ -214,7 +215,7 @@ class Adaptive(BaseController):
         functions = lattice.evaluate_basis(seen.positions)
         # These are Λ and λ, after one step of the first two equations.
         matrices = memory.information_matrices + dt * functions[:, :, None] * functions[:, None]
-        vectors = memory.information_vectors + dt * functions * _measure(seen)[:, None]
+        vectors = memory.information_vectors + dt * functions * measure_own_density(seen)[:, None]
         goals = compute_sample_centroids(is_own, lattice.samples, memory.estimates, seen.positions)
         # P (C - p) is the integral over the cell of K(q) (q - p)·(C - p), here a sum over samples q.
         offsets = lattice.samples - seen.positions[:, None]
@@ -243,7 +244,7 @@ class Adaptive(BaseController):
     def _learn_by_gaussian_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory after each robot has measured, with estimates from all known measurements."""
         lattice = memory.lattice
-        values = _measure(seen)
+        values = measure_own_density(seen)
         measurements = memory.measurements.copy()
         estimates = memory.estimates.copy()
         for robot, position in enumerate(seen.positions):
@@ -322,11 +323,6 @@ def _solve(matrices: FloatArray, right_sides: FloatArray) -> FloatArray:
                 solutions[i, row] -= matrices[i, row, column] * solutions[i, column]
             solutions[i, row] /= matrices[i, row, row]
     return solutions
-
-
-def _measure(seen: Observations) -> FloatArray:
-    """Return φ at the positions of the robots, (n,). A robot may use no other values of φ."""
-    return seen.measure_density(np.arange(len(seen.positions)), seen.positions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

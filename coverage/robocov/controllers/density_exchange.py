@@ -221,6 +221,11 @@ class MeasurementMemory:
     """Time of the last plan, s."""
 
 
+def measure_own_density(seen: Observations) -> FloatArray:
+    """Measure the density at the position of each robot, (n,)."""
+    return seen.measure_density(np.arange(len(seen.positions)), seen.positions)
+
+
 def add_received_measurements(seen: Observations, measurements: FloatArray) -> FloatArray:
     """Add the measurements that arrive in a step to those that the robots know.
 

@@ -12,6 +12,7 @@ from robocov.controllers.density_exchange import (
     MeasurementExchange,
     MeasurementMemory,
     add_received_measurements,
+    measure_own_density,
 )
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
@@ -216,7 +217,7 @@ def compute_bound(posterior: Posterior, measurements: FloatArray, beta: float) -
 
 def _add_own_measurements(seen: Observations, memory: GpUcbMemory) -> GpUcbMemory:
     """Return the memory with a new measurement of each robot, made at its own position."""
-    values = seen.measure_density(np.arange(len(seen.positions)), seen.positions)
+    values = measure_own_density(seen)
     measurements = memory.measurements.copy()
     posteriors = []
     for robot, posterior in enumerate(memory.posteriors):
