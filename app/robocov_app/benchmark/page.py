@@ -472,10 +472,7 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
 
 def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
     """Build the table of suspicious runs, with the number of runs for each reason."""
-    rapf: Mapping[str, Any] = {"rows": []}
-    for result in results:
-        if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:
-            rapf = result
+    rapf = _find_default_rapf(results)
     rows = []
     for result, label in zip(results, labels, strict=True):
         runs_by_reason: dict[str, list[str]] = {}
@@ -486,3 +483,12 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
             rows.append((label, str(len(runs)), reason, runs[0]))
     head = ("Controller", "Runs", "Reason", "First run")
     return PageTable("Suspicious runs by controller and reason", head, rows, text_columns=frozenset({2, 3}))
+
+
+def _find_default_rapf(results: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Return the last result of RAPF with default gains; without one, a result without rows."""
+    rapf: Mapping[str, Any] = {"rows": []}
+    for result in results:
+        if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:
+            rapf = result
+    return rapf

@@ -216,6 +216,7 @@ def read_result(path: Path) -> dict[str, Any]:
         )
     _check_types_except_rows(result, path)
     _update_gain_names(result["entry"])
+    result["method"] = [_update_figure_names(str(sentence)) for sentence in result["method"]]
     for k, row in enumerate(result["rows"]):
         _update_row_names(row)
         _check_row(row, f"{path}: rows[{k}]")
@@ -271,6 +272,13 @@ def _update_gain_names(entry: dict[str, Any]) -> None:
     """Replace, in place, the names of gains that were renamed since an entry was made."""
     for key in ("gains", "set"):
         entry[key] = update_gain_names(entry["controller"], entry[key])
+
+
+def _update_figure_names(text: str) -> str:
+    """Replace, in a text, the names of figures that were renamed."""
+    for former_name, name in _FORMER_FIGURE_NAMES.items():
+        text = text.replace(former_name, name)
+    return text
 
 
 def _update_row_names(row: Any) -> None:

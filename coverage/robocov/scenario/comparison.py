@@ -21,10 +21,12 @@ from robocov.scenario.scenario import Scenario
 
 DEFAULT_CONTROLLERS = ("rapf", "rpf", "lloyd")
 """The controllers of the paper."""
+_MEAN_TIME_TITLE = "mean time"
+"""Title of the column that only teams with different speeds have."""
 _COLUMNS = {
     "": "{label}",
     "mean distance": "{mean_distance_m:.3f} m",
-    "mean time": "{mean_time_s:.3f} s",
+    _MEAN_TIME_TITLE: "{mean_time_s:.3f} s",
     "above lowest": "{above_best:.1%}",
     "cost": "{cost_m3:.2f} m³",
     "settled": "{settled}",
@@ -143,8 +145,9 @@ def format_comparison(
         Cells of each run. The mean time is left out unless all runs have one.
     """
     columns = dict(_COLUMNS)
-    if not all("mean_time_s" in row for row in results):
-        del columns["mean time"]
+    have_mean_times = all("mean_time_s" in row for row in results)
+    if not have_mean_times:
+        del columns[_MEAN_TIME_TITLE]
     rows = []
     for label, row in zip(labels, results, strict=True):
         settled = "not yet"

@@ -127,8 +127,9 @@ def test_bundled_results_are_complete() -> None:
 def test_former_names_in_results_are_updated(tmp_path: Path) -> None:
     content = gzip.decompress((ENTRIES / "adaptive.json.gz").read_bytes()).decode()
     path = tmp_path / "result.json"
-    path.write_text(content.replace('"min_density"', '"least"').replace('"sent_bytes"', '"told_bytes"'))
+    path.write_text(content.replace('"min_density"', '"least"').replace("sent_bytes", "told_bytes"))
     result = read_result(path)
+    assert any(sentence.startswith("sent_bytes: ") for sentence in result["method"])
     assert result["entry"]["gains"] == get_gain_values(Adaptive())
     for row in result["rows"]:
         assert "error" in row or (row["sent_bytes"] > 0.0 and "told_bytes" not in row)
