@@ -1,17 +1,8 @@
 """Small functions on arrays."""
 
-from typing import TypeAlias
-
 import numpy as np
 
-from robocov.typing import BoolArray as BoolArray
-from robocov.typing import FloatArray
-from robocov.typing import IntArray as IntArray
-from robocov.typing import Point as Point
-from robocov.typing import Ring as Ring
-
-Array: TypeAlias = FloatArray
-"""The former name of `robocov.typing.FloatArray`."""
+from robocov.typing import FloatArray, IntArray
 
 
 def freeze(values: object) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.editor.model.geometry import Box
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.surface_cache import LatestValue
@@ -45,10 +45,10 @@ class Outline:
         The geometry.
     """
 
-    rings: list[Array]
+    rings: list[FloatArray]
     outer: list[bool]
-    lines: list[Array]
-    bounds: Array
+    lines: list[FloatArray]
+    bounds: FloatArray
     geometry: shapely.Geometry
 
     @property
@@ -99,9 +99,9 @@ def _intersect_line(
 
 def build_outline(geometry: shapely.Geometry) -> Outline:
     """Build the outline of a geometry: rings of its polygons, and coordinates of all other parts."""
-    rings: list[Array] = []
+    rings: list[FloatArray] = []
     outer: list[bool] = []
-    lines: list[Array] = []
+    lines: list[FloatArray] = []
     for part in shapely.get_parts(geometry):
         if isinstance(part, shapely.Polygon):
             rings += [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
@@ -117,7 +117,7 @@ class Outlines:
     def __init__(self) -> None:
         # By the id of the item. The item is stored as well, because Python reuses ids.
         self._outlines: dict[int, tuple[Item, Outline]] = {}
-        self._bounds: LatestValue[Array] = LatestValue()
+        self._bounds: LatestValue[FloatArray] = LatestValue()
 
     def get(self, item: Item) -> Outline:
         """Return the outline of an obstacle, from the cache if possible."""
@@ -135,7 +135,7 @@ class Outlines:
         items = [sketch.obstacles[k] for k in np.flatnonzero(is_near)]
         return [item for item in items if not item.hidden]
 
-    def _list_bounds(self, sketch: Sketch) -> Array:
+    def _list_bounds(self, sketch: Sketch) -> FloatArray:
         """Return the (n, 4) bounds of all obstacles, m."""
         # Old outlines are dropped once there are far more of them than obstacles.
         if len(self._outlines) > MAX_OUTLINES_PER_OBSTACLE * len(sketch.obstacles) + SPARE_OUTLINES:

@@ -10,8 +10,8 @@ import pygame
 import shapely
 from pygame import Rect, Surface
 
-from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
+from robocov.typing import FloatArray
 from robocov_app.editor.canvas.outlines import build_outline
 from robocov_app.editor.canvas.sheet_view import View, compute_pixel_box
 from robocov_app.editor.model.geometry import distance, format_length
@@ -109,7 +109,7 @@ def get_problem_color(theme: Theme, *, is_error: bool) -> Color:
     return theme.warning
 
 
-def to_pixels(canvas: Canvas, points: Iterable[Point]) -> Array:
+def to_pixels(canvas: Canvas, points: Iterable[Point]) -> FloatArray:
     """Convert positions of the map to pixels.
 
     Parameters
@@ -279,7 +279,7 @@ def draw_path(canvas: Canvas, path: ObstaclePath, color: Color) -> None:
         canvas.draw_sprite(partial(sprites.render_dot, WAYPOINT_RADIUS_PX * canvas.scale, color), point)
 
 
-def _draw_arrow(canvas: Canvas, start: Array, end: Array, color: Color) -> None:
+def _draw_arrow(canvas: Canvas, start: FloatArray, end: FloatArray, color: Color) -> None:
     """Draw an arrow in the middle of a leg from start to end, px, unless the leg is too short."""
     scale = canvas.scale
     length = float(np.hypot(*(end - start)))
@@ -488,7 +488,7 @@ def _move_above_cursor_label(canvas: Canvas, label: str, position: Point, cursor
     return position
 
 
-def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
+def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the ends of a gap, px, and a vector perpendicular to it with a length of `GAP_END_HALF_PX`."""
     start, end = canvas.camera.to_pixels(np.array(gap.between))
     length = max(float(np.hypot(*(end - start))), MIN_LENGTH_PX)

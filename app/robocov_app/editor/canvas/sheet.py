@@ -8,7 +8,7 @@ import pygame
 import shapely
 from pygame import Rect, Surface
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.editor.canvas.outlines import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
 from robocov_app.editor.canvas.sheet_view import (
@@ -314,14 +314,14 @@ def compute_hull_excess(sketch: Sketch) -> shapely.Geometry:
     return shapely.difference(polygon.convex_hull, polygon)
 
 
-def _compute_boundary_pixels(view: View, sketch: Sketch) -> Array | None:
+def _compute_boundary_pixels(view: View, sketch: Sketch) -> FloatArray | None:
     """Return the corners of the boundary, (k, 2) px; None if it has no area."""
     if sketch.boundary is None or len(sketch.boundary) <= 2:
         return None
     return view.camera.to_pixels(np.asarray(sketch.boundary, dtype=float))
 
 
-def _draw_floor(canvas: Canvas, boundary: Array | None, box: Rect) -> None:
+def _draw_floor(canvas: Canvas, boundary: FloatArray | None, box: Rect) -> None:
     """Fill a box of the image with the colors outside and inside the boundary."""
     canvas.surface.fill(choose_outside_color(canvas.theme), box)
     if boundary is not None:
@@ -395,7 +395,7 @@ def _fill_with_holes(canvas: Canvas, outline: Outline, fill: Color) -> None:
     canvas.surface.blit(layer.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], color: Color) -> None:
+def _draw_rings(canvas: Canvas, corners: FloatArray, ends: list[int], color: Color) -> None:
     """Draw several closed rings.
 
     Parameters

@@ -6,10 +6,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import MAX_SPEED_M_S, MIN_SIZE_M, MIN_SPEED_M_S
+from robocov.typing import FloatArray
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import compute_center, round_map_point, to_array
 from robocov_app.editor.model.selection import Change, Selection
@@ -126,7 +126,7 @@ def find_leg(path: ObstaclePath, point: Point, reach: float) -> int | None:
     return leg + 1
 
 
-def _find_nearest(gaps: Array, reach: float) -> int | None:
+def _find_nearest(gaps: FloatArray, reach: float) -> int | None:
     """Return the index of the smallest of (k,) distances, m; None if it exceeds `reach`."""
     if not len(gaps):
         return None

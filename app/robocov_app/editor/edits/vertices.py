@@ -16,10 +16,10 @@ from scipy.sparse.csgraph import connected_components
 from shapely import LineString, Polygon
 
 from robocov import environment as env
-from robocov.arrays import Array, BoolArray
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     drop_repeated_points,
@@ -221,7 +221,7 @@ def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, 
 
 def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool) -> Ring:
     """Return a ring in which arcs replace the corners with cuts."""
-    points: list[Array] = []
+    points: list[FloatArray] = []
     for index, point in enumerate(ring):
         if index in cuts:
             points.append(_build_arc(ring, index, cuts[index]))
@@ -273,7 +273,7 @@ def _compute_turn(ring: Ring, index: int) -> float:
     return abs(cmath.phase((after - corner) * (corner - before).conjugate()))
 
 
-def _build_arc(ring: Ring, index: int, cut: CornerCut) -> Array:
+def _build_arc(ring: Ring, index: int, cut: CornerCut) -> FloatArray:
     """Return the points of the arc that replaces a corner and touches both edges, (segments + 1, 2) m."""
     before, corner, after = _list_neighbors(ring, index)
     backwards = (before - corner) / abs(before - corner)
@@ -475,7 +475,7 @@ def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
     return round_ring(moved)
 
 
-def _align_straight_edges(coordinates: Array, is_straight: BoolArray) -> Array:
+def _align_straight_edges(coordinates: FloatArray, is_straight: BoolArray) -> FloatArray:
     """Give both ends of each straight edge, and thus those of consecutive ones, the same coordinate.
 
     Parameters

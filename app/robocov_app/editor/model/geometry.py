@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.editor.model import require
 from robocov_app.toolkit.tools.geometry import compute_bearing
 
@@ -33,12 +33,12 @@ def round_point(point: Iterable[float]) -> Point:
     return round_length(x), round_length(y)
 
 
-def to_array(points: Sequence[Point] | Array) -> Array:
+def to_array(points: Sequence[Point] | FloatArray) -> FloatArray:
     """Return points as a (k, 2) array, m."""
     return np.asarray(points, dtype=float).reshape(-1, 2)
 
 
-def round_ring(points: Sequence[Point] | Array) -> Ring:
+def round_ring(points: Sequence[Point] | FloatArray) -> Ring:
     """Round points to tenths of a millimeter; raise MapError if any is too far from the origin."""
     coordinates = to_array(points)
     # This comparison is also false for nan.

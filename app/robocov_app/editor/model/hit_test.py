@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array, BoolArray
 from robocov.environment import DiscStart, Point, PointsStart, StartSpec
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.selection import Edge, Selection, list_vertices
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
@@ -145,7 +145,7 @@ def find_vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Ow
     return Selection(vertices=frozenset(pairs[k][0] for k in np.flatnonzero(inside).tolist()))
 
 
-def _is_in_box(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
+def _is_in_box(points: Sequence[Point] | FloatArray, a: Point, b: Point) -> BoolArray:
     """Return a mask of the points, (k, 2) m, in a box between two corners."""
     coordinates = to_array(points)
     is_inside = (coordinates >= np.minimum(a, b)) & (coordinates <= np.maximum(a, b))

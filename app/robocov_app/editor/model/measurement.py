@@ -7,9 +7,9 @@ import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov.arrays import Array, BoolArray, IntArray
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
+from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, find_problems, format_position
@@ -139,7 +139,7 @@ def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geom
     return swept, MultiPolygon(list(parts[is_beyond_corner & is_wide]))
 
 
-def _exceeds_distance(parts: Array, target: shapely.Geometry, distance: float) -> BoolArray:
+def _exceeds_distance(parts: FloatArray, target: shapely.Geometry, distance: float) -> BoolArray:
     """Return a mask of the polygons with a vertex farther from the target than a distance, m."""
     if target.is_empty:
         return np.ones(len(parts), dtype=bool)
@@ -151,7 +151,7 @@ def _exceeds_distance(parts: Array, target: shapely.Geometry, distance: float) -
     return exceeds
 
 
-def _count_open_stretches(parts: Array, free: MultiPolygon) -> IntArray:
+def _count_open_stretches(parts: FloatArray, free: MultiPolygon) -> IntArray:
     """Count, for each polygon, the connected stretches of its outline that do not lie on walls."""
     walls = free.boundary
     shapely.prepare(walls)

@@ -10,9 +10,9 @@ import shapely
 from shapely import LineString, MultiPoint, Polygon
 
 from robocov import environment as env
-from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
+from robocov.typing import FloatArray
 from robocov_app.editor.model.geometry import to_array
 from robocov_app.editor.model.problem import Problem, format_position
 from robocov_app.editor.model.selection import format_numbered_name
@@ -150,12 +150,12 @@ def _check_ring(ring: Ring, label: str = "its outline") -> Iterator[Problem]:
         yield _describe_crossings(label, points, polygon)
 
 
-def _is_flat(polygon: Polygon, extent: Array) -> bool:
+def _is_flat(polygon: Polygon, extent: FloatArray) -> bool:
     hull_area = shapely.convex_hull(polygon).area
     return bool(extent.min() < MIN_SIZE_M or hull_area <= FLAT_RATIO * float(extent.max()) ** 2)
 
 
-def _describe_crossings(label: str, points: Array, polygon: Polygon) -> Problem:
+def _describe_crossings(label: str, points: FloatArray, polygon: Polygon) -> Problem:
     crossings = _find_crossings(points, polygon)
     others = len(crossings) - 1
     suffix = ""
@@ -167,7 +167,7 @@ def _describe_crossings(label: str, points: Array, polygon: Polygon) -> Problem:
     return Problem(message, MultiPoint(crossings[:MAX_CROSSINGS]), kind="crossing")
 
 
-def _find_crossings(points: Array, polygon: Polygon) -> list[Point]:
+def _find_crossings(points: FloatArray, polygon: Polygon) -> list[Point]:
     """Return the points where an outline crosses or touches itself, from left to right.
 
     The outline is cut into pieces at all crossings. More than two pieces end at a crossing.
@@ -212,7 +212,7 @@ def _check_distance(points: Ring) -> Iterator[Problem]:
             return
 
 
-def _build_line(points: Array) -> shapely.Geometry | None:
+def _build_line(points: FloatArray) -> shapely.Geometry | None:
     """Build a line from points, or a point if there is only one; return None if there are none."""
     if not len(points):
         return None

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 Point: TypeAlias = tuple[float, float]
 
@@ -13,7 +13,9 @@ SHIFT_ANGLE_DEG = 45.0
 """While Shift is held, lines and moves have a multiple of this angle."""
 
 
-def find_nearest_on_edges(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
+def find_nearest_on_edges(
+    starts: FloatArray, ends: FloatArray, point: Point
+) -> tuple[FloatArray, FloatArray]:
     """Find the point of each edge that is nearest to a given point.
 
     Parameters

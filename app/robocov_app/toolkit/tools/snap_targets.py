@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.toolkit.tools.geometry import Point, find_nearest_on_edges
 
 PointKind: TypeAlias = Literal["vertex", "center", "midpoint"]
@@ -23,8 +23,8 @@ class Edges(NamedTuple):
         Ends of each edge.
     """
 
-    starts: Array
-    ends: Array
+    starts: FloatArray
+    ends: FloatArray
 
 
 _NO_EDGES = Edges(np.empty((0, 2)), np.empty((0, 2)))
@@ -43,7 +43,9 @@ class SnapTargets:
         Edges that can be snapped to, but not their midpoints.
     """
 
-    def __init__(self, vertices: Array, centers: Array, edges: Edges, outlines: Edges = _NO_EDGES) -> None:
+    def __init__(
+        self, vertices: FloatArray, centers: FloatArray, edges: Edges, outlines: Edges = _NO_EDGES
+    ) -> None:
         """Index the points by kind, the bounding boxes of the edges, and the coordinates for alignment."""
         middles = (edges.starts + edges.ends) / 2
         points_by_kind = {"vertex": vertices, "center": centers, "midpoint": middles}
@@ -118,6 +120,6 @@ def list_outline_edges(polygons: Sequence[shapely.Geometry]) -> Edges:
     return Edges(points[:-1][is_edge], points[1:][is_edge])
 
 
-def _to_point(coordinates: Array) -> Point:
+def _to_point(coordinates: FloatArray) -> Point:
     x, y = coordinates.tolist()
     return x, y

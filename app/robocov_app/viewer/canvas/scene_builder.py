@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.distance_map.colors import choose_color_limit
 from robocov_app.render.painter import Painter
@@ -70,15 +70,15 @@ class SceneBuilder:
         if np.isfinite(largest) and not low * self._color_limit <= largest <= high * self._color_limit:
             self._color_limit = choose_color_limit(_COLOR_LIMIT_MARGIN * largest)
 
-    def _get_path(self, known_cost: KnownCost | None) -> Array | None:
+    def _get_path(self, known_cost: KnownCost | None) -> FloatArray | None:
         """Return the path from the cursor to its nearest robot, (k, 2) m; None if it is not shown."""
         if known_cost is None or self._viewer.inspection.cursor is None:
             return None
         return known_cost.path
 
     def _list_scans(
-        self, pane: Pane, setup: PaneSetup, positions: Array, selected: int | None
-    ) -> list[tuple[Array, Array]]:
+        self, pane: Pane, setup: PaneSetup, positions: FloatArray, selected: int | None
+    ) -> list[tuple[FloatArray, FloatArray]]:
         """Return the scan of the selected robot or, if none is selected, the scans of all robots.
 
         Nothing is returned for teams so large that each scan would have too few rays.

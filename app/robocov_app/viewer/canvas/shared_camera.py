@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Point
+from robocov.typing import FloatArray
 from robocov_app.render.camera import Camera
 from robocov_app.render.painter import Painter
 from robocov_app.toolkit.tools.viewport import pan_within, zoom_about
@@ -130,6 +130,6 @@ class SharedCamera:
         for painter in self._painters:
             painter.camera = camera.with_view(painter.camera.view)
 
-    def _get_bounds(self) -> Array:
+    def _get_bounds(self) -> FloatArray:
         """Return the bounds of the map as rows (x_min, y_min) and (x_max, y_max), (2, 2) m."""
         return np.reshape(self._viewer.session.displayed.environment.region.bounds, (2, 2))

@@ -7,8 +7,8 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Obstacle
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
@@ -119,7 +119,7 @@ def _draw_obstacle_outline(canvas: Canvas, obstacle: Obstacle, color: Color, wid
             canvas.draw_outline(corners, color, canvas.scale_width(width))
 
 
-def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
+def _draw_line(canvas: Canvas, points: FloatArray, *, is_closed: bool) -> None:
     if len(points) < 2:
         return
     canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(_LINE_PX), is_closed=False)
@@ -129,7 +129,7 @@ def _draw_line(canvas: Canvas, points: Array, *, is_closed: bool) -> None:
         )
 
 
-def _draw_box(canvas: Canvas, corners: Array) -> None:
+def _draw_box(canvas: Canvas, corners: FloatArray) -> None:
     """Draw a dashed box between two opposite corners, px."""
     (left, top), (right, bottom) = corners.tolist()
     outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
@@ -137,7 +137,7 @@ def _draw_box(canvas: Canvas, corners: Array) -> None:
         canvas.draw_dashed_line(start, end, canvas.theme.accent, canvas.scale_width(_LINE_PX))
 
 
-def _draw_marks(canvas: Canvas, points: Array, half_size: float) -> None:
+def _draw_marks(canvas: Canvas, points: FloatArray, half_size: float) -> None:
     """Draw a square at each point; half of its size is in px at scale 1."""
     size = half_size * canvas.scale
     for x, y in points.tolist():

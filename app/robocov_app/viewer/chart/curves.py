@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
 from robocov_app.look.theme import Theme
@@ -41,7 +41,7 @@ class GhostLine(NamedTuple):
     """
 
     node: int
-    points: Array
+    points: FloatArray
 
 
 def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
@@ -76,7 +76,7 @@ def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[Gh
     return lines
 
 
-def _draw_ghost_line(canvas: Canvas, points: Array, color: Color) -> None:
+def _draw_ghost_line(canvas: Canvas, points: FloatArray, color: Color) -> None:
     is_dashed = len(points) >= MIN_DASHED_POINTS
     for index in range(len(points) - 1):
         is_gap = is_dashed and index % _SEGMENTS_PER_DASH == _SEGMENTS_PER_DASH - 1
@@ -84,7 +84,7 @@ def _draw_ghost_line(canvas: Canvas, points: Array, color: Color) -> None:
             canvas.draw_line(points[index].tolist(), points[index + 1].tolist(), color)
 
 
-def find_nearest_ghost(ghosts: Sequence[GhostLine], point: Array, reach: float) -> int | None:
+def find_nearest_ghost(ghosts: Sequence[GhostLine], point: FloatArray, reach: float) -> int | None:
     """Return the last node of the branch whose curve is nearest to a point of the page.
 
     Parameters
@@ -121,7 +121,7 @@ def map_curve_styles(panes: Sequence[Pane]) -> dict[int, CurveStyle]:
     return dict(zip(controllers, styles, strict=True))
 
 
-def thin_points(points: Array) -> Array:
+def thin_points(points: FloatArray) -> FloatArray:
     """Drop points of a curve, (k, 2) px, that are indistinguishable from the next point.
 
     The last point is always kept, since the curve grows there.

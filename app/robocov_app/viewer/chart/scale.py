@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 from robocov_app.look.axes import Axis, choose_growing_time_limit, choose_growing_value_axis
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.window.layout import Layout
@@ -121,7 +121,7 @@ class ChartScale:
         fraction = (value - self.values.start) / (self.values.end - self.values.start)
         return self.bottom + (self.top - self.bottom) * fraction
 
-    def to_points(self, times: Array, values: Array) -> Array:
+    def to_points(self, times: FloatArray, values: FloatArray) -> FloatArray:
         """Return the points of a curve, (k, 2) px, for times, (k,) s, and values, (k,)."""
         columns = self.times.left + self.times.width * times / self.times.end
         fractions = (values - self.values.start) / (self.values.end - self.values.start)
@@ -130,7 +130,7 @@ class ChartScale:
 
 
 def build_chart_scale(
-    times: TimeScale, layout: Layout, curves: Sequence[Array], tree_height: float = 0.0
+    times: TimeScale, layout: Layout, curves: Sequence[FloatArray], tree_height: float = 0.0
 ) -> ChartScale:
     """Build the scale of a chart so that all values of its curves are visible.
 

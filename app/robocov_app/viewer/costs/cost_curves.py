@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Environment
+from robocov.typing import FloatArray
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
@@ -33,7 +33,7 @@ class _MissingState(NamedTuple):
 
     pane: int
     time: float
-    positions: Array
+    positions: FloatArray
     setup: PaneSetup
     radius: float
 
@@ -106,7 +106,7 @@ class CostCurves:
                 session.displayed.get_setup(pane).speed_limits,
             )
 
-    def _find_path_target(self) -> Array | None:
+    def _find_path_target(self) -> FloatArray | None:
         """Return the point whose path to its nearest robot is shown, (2,) m; None if no path is shown."""
         cursor = self._viewer.inspection.cursor
         if cursor is None or "path" not in self._viewer.view.layers:

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
 from robocov.defaults import DEFAULT_LATTICE, DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov.kernel_compilation import call_cost_kernels, compile_kernels
+from robocov.typing import FloatArray
 from robocov_app.jobs.messages import Channel, Codec
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
 from robocov_app.render.distance_map.pixel_distances import DistanceField
@@ -44,7 +44,7 @@ class KnownCost:
 
     time: float
     result: CoverageResult
-    path: Array | None
+    path: FloatArray | None
     get_lattice: Callable[[], FieldLattice]
     travel_time: float | None = None
 
@@ -58,8 +58,8 @@ class _SharedSites(NamedTuple):
     """Data shared by all results on a map: sites, corners of geodesic paths, and weights of the sites."""
 
     sites: Sites
-    corners: Array
-    weights: Array | None
+    corners: FloatArray
+    weights: FloatArray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +92,9 @@ class CostRequest:
     environment: Environment | None
     lattice: int
     time: float = 0.0
-    positions: Array | None = None
-    point: Array | None = None
-    speeds: Array | None = None
+    positions: FloatArray | None = None
+    point: FloatArray | None = None
+    speeds: FloatArray | None = None
     is_for_curve: bool = False
     radius: float = DEFAULT_RADIUS_M
 
@@ -173,9 +173,9 @@ class Costs:
         self,
         pane: int,
         time: float,
-        positions: Array,
-        point: Array | None = None,
-        speeds: Array | None = None,
+        positions: FloatArray,
+        point: FloatArray | None = None,
+        speeds: FloatArray | None = None,
         *,
         is_for_curve: bool = False,
     ) -> None:
@@ -276,7 +276,7 @@ class _Answer(NamedTuple):
     shared: _SharedSites | None
     time: float = 0.0
     result: CoverageResult | None = None
-    path: Array | None = None
+    path: FloatArray | None = None
     travel_time: float | None = None
 
 
@@ -387,12 +387,12 @@ class CostService:
         self._varying_cost = TimeVaryingCost(self._cost, progress=stop_for_newer_map)
 
 
-def _evaluate(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> _Answer:
+def _evaluate(cost: TimeVaryingCost, request: CostRequest, positions: FloatArray) -> _Answer:
     """Compute the answer to a request, without the shared data."""
     result = cost.evaluate_all_robots(request.time, positions)
     if result is None:
         raise InputError("positions: expected at least one at a free position, got none")
-    path: Array | None = None
+    path: FloatArray | None = None
     if request.point is not None:
         # There is no path from a point that is not free.
         with suppress(RobocovError):
@@ -414,7 +414,7 @@ def _evaluate(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> 
     return _Answer(None, request.time, result, path, travel_time)
 
 
-def _compute_travel_time(cost: TimeVaryingCost, request: CostRequest, positions: Array) -> float | None:
+def _compute_travel_time(cost: TimeVaryingCost, request: CostRequest, positions: FloatArray) -> float | None:
     """Return the mean time until the first robot can reach a point, s; None without speeds."""
     if request.speeds is None:
         return None

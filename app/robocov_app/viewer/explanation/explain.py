@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
+from robocov.typing import FloatArray
 from robocov_app.viewer.explanation.motion_classification import classify_motion
 from robocov_app.viewer.explanation.motion_sentence import describe_motion
 from robocov_app.viewer.explanation.sentences import (
@@ -65,7 +65,7 @@ def explain(
     robot: int,
     *,
     numbers: Sequence[int] | None = None,
-    recent: Array | None = None,
+    recent: FloatArray | None = None,
 ) -> RobotReport:
     """Explain why a robot moves, or why it does not.
 

@@ -4,8 +4,8 @@ from enum import Enum
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.metrics import SETTLED_DISTANCE_M
+from robocov.typing import FloatArray
 from robocov_app.viewer.explanation.situation import RobotSituation, compute_alignment
 
 MAX_REST_SPEED_M_S = 0.05
@@ -28,7 +28,7 @@ class Motion(Enum):
     STARTING = "starting"
 
 
-def classify_motion(situation: RobotSituation, recent: Array | None) -> Motion:
+def classify_motion(situation: RobotSituation, recent: FloatArray | None) -> Motion:
     """Classify the motion of a robot.
 
     Parameters

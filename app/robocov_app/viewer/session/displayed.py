@@ -4,11 +4,11 @@ from contextlib import suppress
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.metrics import SETTLED_WINDOW_S
 from robocov.observation import Snapshot
+from robocov.typing import FloatArray
 from robocov_app.viewer.session.pane import Pane, resume_simulation, select_working
 from robocov_app.viewer.session.past.decision_replay import has_same_forces, rebuild_snapshot
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
@@ -52,7 +52,7 @@ class DisplayedState:
         """Return the setup of a pane in the displayed state."""
         return self._get_state(pane).setup
 
-    def get_positions(self, pane: Pane) -> Array:
+    def get_positions(self, pane: Pane) -> FloatArray:
         """Return the positions of the robots of a pane, (n, 2) m."""
         if self._timeline.is_live:
             return pane.positions
@@ -75,7 +75,7 @@ class DisplayedState:
             state = state._replace(memory=None, inbox=None)
         return rebuild_snapshot(state, self.time, dt)
 
-    def get_trail(self, pane: Pane) -> tuple[Array, Array]:
+    def get_trail(self, pane: Pane) -> tuple[FloatArray, FloatArray]:
         """Return the trajectories of a pane up to the displayed time.
 
         Parameters
@@ -99,7 +99,7 @@ class DisplayedState:
         last[0, : len(displayed)] = displayed
         return np.concatenate([positions, last]), np.append(times, self.time)
 
-    def get_recent_positions(self, pane: Pane, number: int) -> Array:
+    def get_recent_positions(self, pane: Pane, number: int) -> FloatArray:
         """Return positions of a robot during the last `SETTLED_WINDOW_S` before the displayed time.
 
         Parameters

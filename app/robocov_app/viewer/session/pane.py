@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.conditions import Conditions
 from robocov.controllers import has_memory
 from robocov.environment import Point
@@ -16,6 +15,7 @@ from robocov.scenario import Scenario
 from robocov.simulation import Simulation
 from robocov.simulation.team_state import TeamState
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 from robocov.world.free_positions import relocate_robots
 from robocov_app.render.record_scene import select_robots
 from robocov_app.render.scene import Scene
@@ -43,8 +43,8 @@ class Continuation(NamedTuple):
     """
 
     setup: PaneSetup
-    positions: Array | None = None
-    velocities: Array | None = None
+    positions: FloatArray | None = None
+    velocities: FloatArray | None = None
 
 
 class Pane:
@@ -93,17 +93,17 @@ class Pane:
         return self.setup.numbers
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """Positions of the working robots, (n, 2) m."""
         return self._select_working(self.simulation.positions)
 
     @property
-    def velocities(self) -> Array:
+    def velocities(self) -> FloatArray:
         """Velocities of the working robots, (n, 2) m/s."""
         return self._select_working(self.simulation.velocities)
 
     @property
-    def steering(self) -> Array | None:
+    def steering(self) -> FloatArray | None:
         """Headings and turning rates of working unicycles, (n, 2) rad and rad/s; None in a team of points."""
         steering = self.simulation.steering
         if steering is None:
@@ -117,7 +117,7 @@ class Pane:
             return self.setup.team
         return self.simulation.team
 
-    def _select_working(self, rows: Array) -> Array:
+    def _select_working(self, rows: FloatArray) -> FloatArray:
         """Return the rows of the working robots."""
         if self.setup.follows_schedule:
             return rows[self.setup.simulated_rows]
@@ -128,7 +128,7 @@ class Pane:
         return select_working(self.simulation.observe_and_decide(), self.setup)
 
     @property
-    def starts(self) -> Array:
+    def starts(self) -> FloatArray:
         """First positions of the working robots, (n, 2) m."""
         return self.trail.get_starts(self.time, self.numbers)
 
@@ -143,7 +143,7 @@ class Pane:
             return self.numbers.index(number)
         return None
 
-    def step(self, pushes: Array | None = None) -> None:
+    def step(self, pushes: FloatArray | None = None) -> None:
         """Simulate one step.
 
         Parameters
@@ -177,7 +177,7 @@ class Pane:
         return True
 
     def build_scene(
-        self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any
+        self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[FloatArray, FloatArray], **more: Any
     ) -> Scene:
         """Build the scene of a step, for drawing.
 
@@ -359,7 +359,7 @@ class Pane:
             # Robots that have just joined (row -1) start with heading and turning rate 0.
             steering = np.where(rows[:, None] < 0, 0.0, old.steering[rows])
 
-        def build(positions: Array, velocities: Array) -> Simulation:
+        def build(positions: FloatArray, velocities: FloatArray) -> Simulation:
             return old.with_changes(
                 environment=environment,
                 controller=controller,
@@ -393,7 +393,7 @@ def select_working(snapshot: Snapshot, setup: PaneSetup) -> Snapshot:
 
 
 def start_simulation(
-    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None
+    setup: PaneSetup, positions: FloatArray, dt: float, velocities: FloatArray | None = None
 ) -> Simulation:
     """Build the simulation of a pane at time 0.
 
@@ -449,10 +449,10 @@ def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
 
 def _build_pane_scenario(
     setup: PaneSetup,
-    positions: Array,
+    positions: FloatArray,
     dt: float,
-    velocities: Array | None,
-    steering: Array | None = None,
+    velocities: FloatArray | None,
+    steering: FloatArray | None = None,
 ) -> Scenario:
     """Build the scenario of a pane's setup that starts from a given state of the robots."""
     return Scenario(

@@ -6,11 +6,11 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
+from robocov.typing import FloatArray
 from robocov_app.viewer.session.editing.drag_spring import compute_spring_forces
 from robocov_app.viewer.session.editing.edits import (
     AddRobot,
@@ -246,7 +246,7 @@ class PaneGroup:
         for pane, setup, simulation in changes:
             pane.adopt(setup, simulation)
 
-    def _compute_pull(self, pane: Pane) -> Array | None:
+    def _compute_pull(self, pane: Pane) -> FloatArray | None:
         """Return the forces of the spring that pulls the dragged robot, (n, 2) N; None if there is none."""
         if self.drag is None:
             return None
@@ -256,7 +256,7 @@ class PaneGroup:
         simulated_row = int(pane.setup.simulated_rows[row])
         return compute_spring_forces(pane.simulation, simulated_row, self.drag.target)
 
-    def _find_changing_robots(self, change_times: Array) -> list[int]:
+    def _find_changing_robots(self, change_times: FloatArray) -> list[int]:
         """Return the numbers of the robots whose change times, (n,) s, lie within the last step."""
         now = self.time + TIME_TOLERANCE_S
         before = self.time - self.scenario.dt + TIME_TOLERANCE_S

@@ -13,11 +13,11 @@ import numpy as np
 import shapely
 from scipy.ndimage import distance_transform_edt
 
-from robocov.arrays import Array, IntArray
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov.scenario import run as simulate
+from robocov.typing import FloatArray, IntArray
 from robocov_app.look.hues import MAX_OWN_HUES, choose_robot_hues
 from robocov_app.viewer.start.previews import PREVIEW_FILE
 
@@ -66,7 +66,7 @@ RECORDED_RUNS = (
 )
 
 
-def record_outline(environment: Environment) -> list[Array]:
+def record_outline(environment: Environment) -> list[FloatArray]:
     """Return the boundary of a map and the rings of its free space, (k, 2) in m each.
 
     The rings are in the order in which they are drawn: the exterior of a component of the free space, then
@@ -135,9 +135,9 @@ def _list_neighbors(grid: IntArray) -> Sequence[tuple[int, int]]:
     return [(int(first), int(second)) for first, second in pairs if first != second]
 
 
-def record_previews() -> dict[str, Array]:
+def record_previews() -> dict[str, FloatArray]:
     """Record all previews; return their arrays by the names under which they are stored."""
-    arrays: dict[str, Array] = {}
+    arrays: dict[str, FloatArray] = {}
     for name in list_bundled_maps():
         for number, outline in enumerate(record_outline(load_map(name))):
             arrays[f"map/{name}/{number}"] = np.asarray(outline * _CENTIMETERS).round().astype(np.int16)

@@ -3,8 +3,8 @@
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Environment, Point
+from robocov.typing import FloatArray
 from robocov_app.toolkit.tools.snap_targets import Edges, SnapTargets, list_outline_edges
 from robocov_app.toolkit.tools.snapping import SnapKind, SnapSettings, snap_point
 
@@ -54,14 +54,14 @@ class MapSnapper:
         return snap_point(point, self._targets, settings).point
 
 
-def _build_targets(vertices: Array, edges: Edges) -> SnapTargets:
+def _build_targets(vertices: FloatArray, edges: Edges) -> SnapTargets:
     return SnapTargets(vertices=vertices, centers=np.empty((0, 2)), edges=edges)
 
 
 def _find_wall_ends(environment: Environment) -> Edges:
     """Return the short edges of obstacles between two corners that stick out into the free space."""
-    starts: list[Array] = []
-    ends: list[Array] = []
+    starts: list[FloatArray] = []
+    ends: list[FloatArray] = []
     for part in shapely.get_parts(environment.free):
         # The free space is to the left of every edge of an oriented polygon.
         for ring in shapely.get_rings(shapely.orient_polygons(part)):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.environment import Point
 from robocov.simulation import Simulation
+from robocov.typing import FloatArray
 
 STIFFNESS_PER_KG = 60.0
 """Stiffness of the spring divided by the mass of the robot, 1/s²."""
@@ -14,7 +14,7 @@ _MIN_MAGNITUDE = 1e-12
 """Avoids a division by zero."""
 
 
-def compute_spring_forces(simulation: Simulation, robot: int, target: Point) -> Array:
+def compute_spring_forces(simulation: Simulation, robot: int, target: Point) -> FloatArray:
     """Compute the force of a critically damped spring between a robot and the pointer.
 
     Parameters

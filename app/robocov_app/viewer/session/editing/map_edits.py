@@ -7,11 +7,11 @@ from itertools import groupby
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.density import Raster, sample_density
 from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import from_json, to_json
+from robocov.typing import FloatArray
 
 MIN_SHAPE_SIZE_M = 0.02
 """Drawn shapes that are smaller are considered accidental, and rejected."""
@@ -218,7 +218,7 @@ def paint_density(environment: Environment, dabs: Sequence[Point], radius: float
     return Raster(np.round(values, _DENSITY_DECIMALS), raster.extent)
 
 
-def _compute_cell_centers(low: float, high: float, count: int) -> Array:
+def _compute_cell_centers(low: float, high: float, count: int) -> FloatArray:
     """Return the center coordinates of `count` equal cells between two coordinates, (count,) m."""
     cell_size = (high - low) / count
     return np.asarray(low + (np.arange(count) + 0.5) * cell_size, dtype=np.float64)

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Environment, Point, find_narrow_gaps
+from robocov.typing import FloatArray
 
 _WIDTH_TOLERANCE = 1e-6
 """Relative amount by which a gap may be narrower than a robot and still count as wide enough."""
@@ -14,7 +14,7 @@ _QUARTER_SEGMENTS = 4
 
 
 def describe_passage_changes(
-    before: Environment, after: Environment, radius: float, robots: Array | Sequence[Point] = ()
+    before: Environment, after: Environment, radius: float, robots: FloatArray | Sequence[Point] = ()
 ) -> str:
     """Describe the areas that an edit cuts off from robots, and a gap that it makes too narrow for them.
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array
+from robocov.typing import FloatArray
 
 MAX_CURVE_SAMPLES = 3000
 """When a curve has this many samples, every second one of its older half is removed."""
@@ -45,12 +45,12 @@ class Curve:
         return len(self._times)
 
     @property
-    def times(self) -> Array:
+    def times(self) -> FloatArray:
         """Times of the samples, (k,) s."""
         return np.array(self._times)
 
     @property
-    def values(self) -> Array:
+    def values(self) -> FloatArray:
         """Values of the samples, (k,)."""
         return np.array(self._values)
 
@@ -148,8 +148,8 @@ class GhostCurve:
 
     controller: str
     description: str
-    times: Array
-    values: Array
+    times: FloatArray
+    values: FloatArray
     quantity: str = "distance"
     node: int = 0
 

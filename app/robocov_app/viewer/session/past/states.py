@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.conditions import Conditions
 from robocov.conditions.communication import Inbox
 from robocov.environment import CircleObstacle, Environment, Point
 from robocov.observation import Decision
 from robocov.simulation.team_state import TeamState
 from robocov.team import Team
+from robocov.typing import FloatArray, IntArray
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.session.setup.scenario import SessionScenario
@@ -122,7 +122,7 @@ class PaneSetup:
         return self.properties.build_team(self.numbers)
 
     @property
-    def speed_limits(self) -> Array | None:
+    def speed_limits(self) -> FloatArray | None:
         """Maximum speeds of the working robots, (n,) m/s; None if all robots have the same."""
         if "max_speed" not in self.properties.values_by_robot:
             return None
@@ -160,12 +160,12 @@ class PaneState(NamedTuple):
     """
 
     setup: PaneSetup
-    positions: Array
-    velocities: Array
+    positions: FloatArray
+    velocities: FloatArray
     memory: Any
     recorded: Decision | None = None
     inbox: Inbox | None = None
-    steering: Array | None = None
+    steering: FloatArray | None = None
     all_robots: TeamState | None = None
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
 from robocov.environment import Point
+from robocov.typing import FloatArray, IntArray
 from robocov_app.viewer.session.past.history import RunHistory
 from robocov_app.viewer.session.past.states import PaneSetup
 
@@ -41,8 +41,8 @@ class TrailSection:
 
     numbers: Numbers
     starts: Mapping[int, Point]
-    positions: Array
-    times: Array
+    positions: FloatArray
+    times: FloatArray
 
     def cut(self, start: float, end: float) -> "TrailSection":
         """Return a copy of the rows with start <= time < end, s."""
@@ -78,19 +78,19 @@ class Trail:
         self._starts: dict[int, Point] = {}
         self._closed_sections: list[TrailSection] = []
         self._section_start = 0
-        self._start_arrays: dict[Numbers, Array] = {}
+        self._start_arrays: dict[Numbers, FloatArray] = {}
         self._earlier_trail: _EarlierTrail | None = None
 
     def __len__(self) -> int:
         return self._count
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> FloatArray:
         """Positions of the current robots, (k, n, 2) m, oldest first; nan where they do not work."""
         return self._positions[: self._count]
 
     @property
-    def times(self) -> Array:
+    def times(self) -> FloatArray:
         """Times of the positions, (k,) s."""
         return self._times[: self._count]
 
@@ -101,7 +101,7 @@ class Trail:
             return -np.inf
         return float(self._times[self._count - 1])
 
-    def add(self, time: float, positions: Array, *, always: bool = False) -> None:
+    def add(self, time: float, positions: FloatArray, *, always: bool = False) -> None:
         """Append positions, unless the last row is too recent.
 
         Parameters
@@ -143,7 +143,7 @@ class Trail:
         self._section_start = self._count
         self.numbers = numbers
 
-    def get_until(self, time: float) -> tuple[Array, Array]:
+    def get_until(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return the trail of the robots that were in the team at a time, up to that time.
 
         Returns
@@ -155,7 +155,7 @@ class Trail:
         count = int(np.searchsorted(trail.times, time + _TIME_TOLERANCE_S, side="right"))
         return trail._positions[:count], trail._times[:count]
 
-    def get_starts(self, time: float, numbers: Sequence[int]) -> Array:
+    def get_starts(self, time: float, numbers: Sequence[int]) -> FloatArray:
         """Return the first positions of robots that are in the team at a time.
 
         Returns
@@ -200,7 +200,7 @@ class Trail:
             for first in range(0, len(later.times), chunk):
                 self._append_rows(later.positions[first : first + chunk], later.times[first : first + chunk])
 
-    def _append_rows(self, positions: Array, times: Array) -> None:
+    def _append_rows(self, positions: FloatArray, times: FloatArray) -> None:
         while self._count + len(times) > len(self._times):
             self._simplify()
         rows = slice(self._count, self._count + len(times))
@@ -208,7 +208,7 @@ class Trail:
         self._times[rows] = times
         self._count += len(times)
 
-    def _note_starts(self, positions: Array) -> None:
+    def _note_starts(self, positions: FloatArray) -> None:
         """Store the positions of robots that have just joined as their starts."""
         for row, number in enumerate(self.numbers[: len(positions)]):
             if number not in self._starts:
@@ -282,7 +282,7 @@ def merge_sections(sections: list[TrailSection], later: Iterable[TrailSection]) 
     return merged + [section for section in rest if len(section.times)]
 
 
-def _compute_deviations(positions: Array, rows: IntArray) -> Array:
+def _compute_deviations(positions: FloatArray, rows: IntArray) -> FloatArray:
     """Return the changes of the trajectories if single rows are removed, (r,) m.
 
     A row at which a robot joins or fails has an infinite deviation.
@@ -306,11 +306,11 @@ def _compute_deviations(positions: Array, rows: IntArray) -> Array:
     is_absent = np.isnan(positions[..., 0])
     is_change = (is_absent[rows] != is_absent[rows - 1]) | (is_absent[rows] != is_absent[rows + 1])
     distances[is_change] = np.inf
-    deviations: Array = np.nan_to_num(distances, nan=0.0, posinf=np.inf).max(axis=1, initial=0.0)
+    deviations: FloatArray = np.nan_to_num(distances, nan=0.0, posinf=np.inf).max(axis=1, initial=0.0)
     return deviations
 
 
-def select_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
+def select_robots(positions: FloatArray, before: Sequence[int], after: Sequence[int]) -> FloatArray:
     """Rearrange the columns of positions for another team.
 
     Parameters

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Self, TypeAlias
 import numpy as np
 from pydantic import ConfigDict, Field, WrapSerializer
 
-from robocov.arrays import Array
 from robocov.defaults import (
     DEFAULT_COMMUNICATION_RANGE_M,
     DEFAULT_MASS_KG,
@@ -20,6 +19,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.team import UNITS, Team
+from robocov.typing import FloatArray
 from robocov_app.viewer.session.files.fields import convert_field
 
 MAX_PROPERTY = 1e9
@@ -101,7 +101,7 @@ turning_rate : float
             If `Team` does not accept a value.
         """
         team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
-        changed = dict[str, Array]()
+        changed = dict[str, FloatArray]()
         for name, values in self.values_by_robot.items():
             common_value = getattr(self, name)
             changed[name] = np.array([values.get(number, common_value) for number in numbers])

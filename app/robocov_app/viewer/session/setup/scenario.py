@@ -6,12 +6,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_ROBOTS
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
 from robocov.scenario import Scenario
+from robocov.typing import FloatArray
 from robocov_app.viewer.session.files.fields import Position, Text, convert_field, keep_none
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice, FileController
 from robocov_app.viewer.session.setup.robot_properties import FileProperties, RobotProperties
@@ -97,12 +97,12 @@ class SessionScenario:
         Field(strict=True, alias="dt_s", ge=MIN_DT_S, le=MAX_DT_S, description="Control period in seconds"),
     ] = DEFAULT_DT_S
     given_starts: Annotated[
-        Array | None,
+        FloatArray | None,
         _ROWS,
         Field(alias="starts_m", description="[x, y] of each robot in meters; null to sample them"),
     ] = None
     velocities: Annotated[
-        Array | None,
+        FloatArray | None,
         _ROWS,
         Field(alias="start_velocities_m_per_s", description="Initial velocities [vx, vy] in m/s"),
     ] = None
@@ -129,7 +129,7 @@ class SessionScenario:
         return self.environment.start(self.start).name
 
     @property
-    def starts(self) -> Array:
+    def starts(self) -> FloatArray:
         """Starting positions of all robots, (n, 2) m.
 
         Raises
