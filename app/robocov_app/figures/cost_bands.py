@@ -41,7 +41,13 @@ class Band(NamedTuple):
 
 
 @plain_style()
-def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, unit: str) -> Figure:
+def plot_cost_bands(
+    bands: Sequence[Band],
+    size: tuple[int, int],
+    label: str,
+    unit: str,
+    value_range: tuple[float, float] | None = None,
+) -> Figure:
     """Plot the values of runs against time, with one color for each controller.
 
     Parameters
@@ -53,6 +59,8 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         Label of the value axis.
     unit : str
         Unit of the final values at the ends of the curves.
+    value_range : (low, high), optional
+        Range of the values for which the limits of the value axis are chosen; by default that of the bands.
 
     Returns
     -------
@@ -80,6 +88,7 @@ def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, un
         label=label,
         unit=unit,
         weight=weight,
+        value_range=value_range,
     )
     return page.figure
 

@@ -24,6 +24,7 @@ from robocov_app.figures.curves import (
     CurveMargins,
     TimeCurve,
     add_curve_axes,
+    compute_right_margin,
     draw_curves,
 )
 from robocov_app.figures.extent import Extent, enclose_maps
@@ -95,6 +96,8 @@ _BAR_INDENT = 14
 _BAR_LABEL_GAP = 12
 _BAR_LABEL_RISE = 4
 """Distance of the label above the middle of the row, at the height of the color scale."""
+_LAST_TICK_SPACE = 14
+"""Space to the right of a time axis for half of its last tick label."""
 _CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
 
 
@@ -177,6 +180,8 @@ class _Arrangement:
         Vertical middle of the color scale.
     bar_min_left : float
         Leftmost position of the color scale and its label.
+    footer_left : float
+        Leftmost position of the scale bar and the legend below the maps.
     is_below : bool
         Whether the maps are below the curves.
     """
@@ -185,6 +190,7 @@ class _Arrangement:
     maps: PageBox
     bar_row: float
     bar_min_left: float
+    footer_left: float
     is_below: bool
 
 
@@ -230,7 +236,7 @@ def plot_coverage(
     limit = _choose_limit(snapshots)
     handles = _build_handles(snapshots, theme)
     page, arrangement = _create_page(
-        theme, size, extent, handles, map_count=len(snapshots), has_curves=bool(curves)
+        theme, size, extent, handles, map_count=len(snapshots), end_curves=times or curves
     )
     bar_left = _draw_bar(page, limit, arrangement)
     title_end: float = page.size[0]
@@ -244,7 +250,7 @@ def plot_coverage(
         _draw_curves(page, curves, times, arrangement.curves, distance_label)
     boxes = _draw_maps(page, snapshots, extent, limit, arrangement.maps)
     zoom = boxes[0].width / extent.width
-    page.draw_footer(handles, boxes, zoom, arrangement.maps.left)
+    page.draw_footer(handles, boxes, zoom, arrangement.footer_left)
     return page.figure
 
 
@@ -255,7 +261,7 @@ def _create_page(
     handles: Sequence[Artist],
     *,
     map_count: int,
-    has_curves: bool,
+    end_curves: Sequence[TimeCurve],
 ) -> tuple[FigurePage, _Arrangement]:
     """Create a page, and arrange curves and maps on it.
 
@@ -269,8 +275,10 @@ def _create_page(
     handles : sequence of Artist
         Entries of the legend in the footer.
     map_count : int
-    has_curves : bool
+    end_curves : sequence of TimeCurve
+        Curves at the bottom of the page if there are curves next to a map.
     """
+    has_curves = bool(end_curves)
     is_beside = has_curves and map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE
     is_below = has_curves and not is_beside
     if size is None:
@@ -279,15 +287,23 @@ def _create_page(
     else:
         page = FigurePage(size, theme)
     maps_fraction = 0.5 if is_beside else 1.0
-    footer_start = (1.0 - maps_fraction) * page.size[0] + page.margin
-    footer_height = page.measure_footer(handles, footer_start)
+    footer_left = page.margin
+    if is_beside:
+        footer_left = _find_curves_end(page, end_curves)
+    footer_height = page.measure_footer(handles, footer_left)
     maps_width = maps_fraction * page.size[0] - 2 * page.margin
     if size is None:
         height = _choose_height(page, extent, map_count, maps_width, footer_height, is_below=is_below)
         page = FigurePage((page.size[0], height), theme, _DEFAULT_SCALE)
     if is_below:
         return page, _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
-    return page, _arrange_beside(page, maps_fraction, footer_height, has_curves=has_curves)
+    return page, _arrange_beside(page, maps_fraction, footer_height, footer_left, has_curves=has_curves)
+
+
+def _find_curves_end(page: FigurePage, curves: Sequence[TimeCurve]) -> float:
+    """Return the left edge of the space to the right of the time axis of curves next to a map, px."""
+    right = compute_right_margin(page, curves, _CURVE_MARGINS, 0.5 * page.size[0] - page.margin)
+    return 0.5 * page.size[0] - right + _LAST_TICK_SPACE * page.scale
 
 
 def _choose_height(
@@ -333,12 +349,13 @@ def _arrange_below(
         maps=PageBox(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
         bar_row=curves_end + _BAR_ROW_BELOW_CURVES * scale,
         bar_min_left=page.margin,
+        footer_left=page.margin,
         is_below=True,
     )
 
 
 def _arrange_beside(
-    page: FigurePage, maps_fraction: float, footer_height: float, *, has_curves: bool
+    page: FigurePage, maps_fraction: float, footer_height: float, footer_left: float, *, has_curves: bool
 ) -> _Arrangement:
     """Arrange one map to the right of the curves or, if there are no curves, maps over the whole page."""
     width, height = page.size
@@ -351,6 +368,7 @@ def _arrange_beside(
         maps=PageBox(maps_left, head, maps_width, height - head - footer_height),
         bar_row=_BAR_ROW * scale,
         bar_min_left=0.5 * width if has_curves else maps_left,
+        footer_left=footer_left,
         is_below=False,
     )
 

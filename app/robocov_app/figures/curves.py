@@ -176,12 +176,25 @@ def add_curve_axes(
     left = margins.left * scale
     top = margins.top * scale
     bottom = margins.bottom * scale
-    if label_width is None:
-        label_width = measure_end_labels(page, curves, unit)
-    right = min(margins.right * scale + label_width, margins.max_right_fraction * box.width)
+    right = compute_right_margin(page, curves, margins, box.width, unit=unit, label_width=label_width)
     width = box.width - left - right
     height = box.height - top - bottom
     return page.add_axes(PageBox(box.left + left, box.top + top, width, height))
+
+
+def compute_right_margin(
+    page: FigurePage,
+    curves: Sequence[TimeCurve],
+    margins: CurveMargins,
+    box_width: float,
+    *,
+    unit: str = "m",
+    label_width: float | None = None,
+) -> float:
+    """Return the width of the space to the right of the axes of curves in a box, px; see `add_curve_axes`."""
+    if label_width is None:
+        label_width = measure_end_labels(page, curves, unit)
+    return min(margins.right * page.scale + label_width, margins.max_right_fraction * box_width)
 
 
 def measure_end_labels(page: FigurePage, curves: Sequence[TimeCurve], unit: str = "m") -> float:
@@ -199,6 +212,7 @@ def draw_curves(
     label: str = DISTANCE,
     unit: str = "m",
     weight: float = 1.0,
+    value_range: tuple[float, float] | None = None,
 ) -> None:
     """Draw curves with labels at their ends; the first curve is at the bottom and has the widest line.
 
@@ -217,12 +231,15 @@ def draw_curves(
         Unit of the values at the ends.
     weight : float
         Factor by which line widths and marks are multiplied.
+    value_range : (low, high), optional
+        Range of the values for which the limits of the value axis are chosen; by default that of the curves
+        and bands.
     """
     if styles is None:
         styles = choose_curve_styles([curve.controller for curve in curves])
     if bands is None:
         bands = [None] * len(curves)
-    _set_axes(axes, curves, bands)
+    _set_axes(axes, curves, bands, value_range)
     style_axes(axes, theme, "time (s)", label, grid="y")
     for curve, style, band in zip(curves, styles, bands, strict=True):
         if band is not None:
@@ -239,9 +256,12 @@ def draw_curves(
 
 
 def _set_axes(
-    axes: Axes, curves: Sequence[TimeCurve], bands: Sequence[tuple[FloatArray, FloatArray] | None]
+    axes: Axes,
+    curves: Sequence[TimeCurve],
+    bands: Sequence[tuple[FloatArray, FloatArray] | None],
+    value_range: tuple[float, float] | None,
 ) -> None:
-    """Set the limits and ticks of axes for curves and bands."""
+    """Set the limits and ticks of axes for curves and bands, or for a range of values."""
     times = np.concatenate([curve.times for curve in curves])
     lines = [curve.values for curve in curves]
     for band in bands:
@@ -251,7 +271,8 @@ def _set_axes(
     # Limits must differ, even if there is a single time.
     axes.set_xlim(start, max(float(times.max()), start + 1e-9))
     set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
-    set_value_axis(axes.yaxis, np.concatenate([line[np.isfinite(line)] for line in lines]))
+    values = np.concatenate([line[np.isfinite(line)] for line in lines])
+    set_value_axis(axes.yaxis, values, value_range=value_range)
 
 
 def _draw_line(

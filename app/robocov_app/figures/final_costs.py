@@ -52,6 +52,7 @@ def plot_final_costs(
     scale: float,
     theme: Theme = LIGHT,
     origin: float = 0.0,
+    value_range: tuple[float, float] | None = None,
 ) -> Figure:
     """Plot samples in rows, grouped for example by map: a box with the quartiles, and values as points.
 
@@ -69,6 +70,8 @@ def plot_final_costs(
     theme : Theme
     origin : float
         Start of the axis, unless all values are far from it.
+    value_range : (low, high), optional
+        Range of the values for which the limits of the axis are chosen; by default that of the samples.
 
     Returns
     -------
@@ -83,7 +86,13 @@ def plot_final_costs(
         draw_box(axes, values, row, sample.style, theme)
     label_rows(axes, positions.rows, short_names, theme, label)
     draw_row_marks(axes, positions.rows, [sample.style for sample in samples], theme)
-    set_value_axis(axes.xaxis, np.concatenate(finite_values), margin=_MARGIN_FRACTION, origin=origin)
+    set_value_axis(
+        axes.xaxis,
+        np.concatenate(finite_values),
+        margin=_MARGIN_FRACTION,
+        origin=origin,
+        value_range=value_range,
+    )
     group_names = [name for name, _ in groups]
     _write_headings(axes, group_names, positions.headings, theme)
     return get_figure(axes)

@@ -43,6 +43,8 @@ _MAX_SCALE_BAR = 120
 _MAX_SCALE_BAR_FRACTION = 1 / 7
 """Maximum length of the scale bar, as a fraction of the page width."""
 _SCALE_BAR_LABEL = 80
+_MIN_SCALE_BAR_FRACTION = 0.5
+"""If the legend needs the space, the maximum length of the scale bar is reduced by up to this factor."""
 _PANEL_GAP = 14
 _LEGEND_GAP = 24
 # Heights of the footer, and distances below the maps in it.
@@ -112,11 +114,27 @@ def set_even_ticks(axis: Axis, max_intervals: int) -> None:
 
 
 def set_value_axis(
-    axis: Any, values: FloatArray, *, margin: float = VALUE_MARGIN, origin: float = 0.0
+    axis: Any,
+    values: FloatArray,
+    *,
+    margin: float = VALUE_MARGIN,
+    origin: float = 0.0,
+    value_range: tuple[float, float] | None = None,
 ) -> None:
-    """Set the limits and ticks of an axis for finite values, see `choose_value_limits`."""
-    low = float(values.min())
-    high = float(values.max())
+    """Set the limits and ticks of an axis for finite values, see `choose_value_limits`.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+    values : (m,) array
+    margin, origin : float
+        See `choose_value_limits`.
+    value_range : (low, high), optional
+        Range of the values, by default that of `values`. Panels with the same range have the same limits.
+    """
+    if value_range is None:
+        value_range = (float(values.min()), float(values.max()))
+    low, high = value_range
     limits = choose_value_limits(low, high, margin=margin, origin=origin)
     axis.axes.set(**{f"{axis.axis_name}lim": limits})
     set_even_ticks(axis, MAX_VALUE_INTERVALS)
@@ -395,7 +413,7 @@ class FigurePage:
         zoom : float, px/m
             Scale at which the maps are drawn.
         start : float, px
-            Left edge of the footer.
+            Left edge of the footer. To the left of the maps, it uses only the bottom of the page.
         """
         start = max(start, self.margin)
         end = self.size[0] - self.margin
@@ -406,15 +424,20 @@ class FigurePage:
         if self._fits_next_to_bar(legend, len(handles), start):
             y = bottom + _ONE_LINE_MIDDLE * self.scale
             # The bar starts below the left edge of the maps, or farther left if the legend needs the space.
-            bar_space = end - start - self._compute_legend_space(start)
-            max_bar_left = end - legend.width - bar_space
+            bar_space = end - start - legend.width - _SCALE_BAR_LABEL * self.scale
+            max_bar_length = min(self._max_bar_length, bar_space)
+            max_bar_left = end - legend.width - _SCALE_BAR_LABEL * self.scale - max_bar_length
             bar_left = max(min(left, max_bar_left), start)
-            bar_end = self._draw_scale_bar(bar_left, y, zoom)
+            if self.margin < start <= bar_left < left:
+                # To the left of the maps, only the bottom of the page is free.
+                y = self.size[1] - (_ONE_LINE_FOOTER - _ONE_LINE_MIDDLE) * self.scale
+            bar_end = self._draw_scale_bar(bar_left, y, zoom, max_bar_length)
             min_legend_right = bar_end + _LEGEND_GAP * self.scale + legend.width
             legend_right = min(max(right, min_legend_right), end)
             self._draw_legend(handles, legend.columns, "center right", (legend_right, y))
         else:
-            self._draw_scale_bar(left, bottom + _UPPER_LINE_MIDDLE * self.scale, zoom)
+            y = bottom + _UPPER_LINE_MIDDLE * self.scale
+            self._draw_scale_bar(left, y, zoom, self._max_bar_length)
             middle = ((start + end) / 2, bottom + _LEGEND_TOP * self.scale)
             self._draw_legend(handles, legend.columns, "upper center", middle)
 
@@ -423,13 +446,14 @@ class FigurePage:
         return legend.columns == entries and legend.width <= self._compute_legend_space(start)
 
     def _compute_legend_space(self, start: float) -> float:
-        """Return the width that a legend may have in the same line as the longest scale bar, px."""
+        """Return the width that a legend may have in the same line as a scale bar, px."""
         label_width = _SCALE_BAR_LABEL * self.scale
-        return self.size[0] - self.margin - start - self._max_bar_length - label_width
+        bar_length = _MIN_SCALE_BAR_FRACTION * self._max_bar_length
+        return self.size[0] - self.margin - start - bar_length - label_width
 
-    def _draw_scale_bar(self, left: float, y: float, zoom: float) -> float:
-        """Draw a scale bar of a round length; return the right end of its label, px."""
-        length = round_down(self._max_bar_length / zoom)
+    def _draw_scale_bar(self, left: float, y: float, zoom: float, max_length: float) -> float:
+        """Draw a scale bar of a round length up to a maximum, px; return the right end of its label, px."""
+        length = round_down(max_length / zoom)
         right = left + length * zoom
         half_tick = _HALF_TICK * self.scale
         self._draw_line((left, y), (right, y))

@@ -1,3 +1,4 @@
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -34,15 +35,29 @@ def build_curves(count):
     return [TimeCurve(f"Controller {k}", "rapf", T, 1.0 + k + np.exp(-T / 9)) for k in range(count)]
 
 
-def list_extents(figure):
-    """Return the extents of all words, whole axes with the words that belong to them, and legends."""
+def list_elements(figure):
+    """List the extents of each text, legend and map, and of each plot with its labels."""
     renderer = figure.canvas.get_renderer()
-    words = [text for text in figure.texts if text.get_text()]
-    extents = [part.get_window_extent(renderer) for part in (*words, *figure.legends)]
+    texts = [text for text in figure.texts if text.get_text()]
+    elements = [[part.get_window_extent(renderer)] for part in (*texts, *figure.legends)]
     for axes in figure.axes:
-        named = axes.axison
-        extents.append(axes.get_tightbbox(renderer) if named else axes.get_window_extent(renderer))
-    return extents
+        parts = [axes.get_window_extent(renderer)]
+        if axes.axison:
+            parts += [axis.get_tightbbox(renderer) for axis in (axes.xaxis, axes.yaxis)]
+            parts += [text.get_window_extent(renderer) for text in axes.texts]
+        elements.append([part for part in parts if part is not None])
+    return elements
+
+
+def check_layout(figure):
+    """Check that no element is cut off by the page or covers another one."""
+    page = figure.bbox
+    elements = list_elements(figure)
+    for k, boxes in enumerate(elements):
+        for box in boxes:
+            assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= page.x1 + 1 and box.y1 <= page.y1 + 1
+            for other in itertools.chain.from_iterable(elements[:k]):
+                assert not boxes_overlap(box, other)
 
 
 @pytest.mark.parametrize(
@@ -66,12 +81,7 @@ def list_extents(figure):
 def test_no_element_is_cut_or_covered(environment, size, count, with_curves):
     snapshots = [build_snapshot(environment, seed=k) for k in range(count)]
     figure = plot_coverage(build_curves(count if with_curves else 0), snapshots, size=size)
-    extents = list_extents(figure)
-    page = figure.bbox
-    for k, box in enumerate(extents):
-        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= page.x1 + 1 and box.y1 <= page.y1 + 1
-        for other in extents[:k]:
-            assert not boxes_overlap(box, other)
+    check_layout(figure)
     maps = [axes for axes in figure.axes if not axes.axison]
     assert len(maps) == count
     for axes in maps:
@@ -93,11 +103,7 @@ def test_mean_times_are_next_to_or_below_the_mean_distances(size, count):
     )
     labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
     assert labels == [DISTANCE, TIME]
-    extents = list_extents(figure)
-    for k, box in enumerate(extents):
-        assert box.x0 >= -1 and box.y0 >= -1 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1
-        for other in extents[:k]:
-            assert not boxes_overlap(box, other)
+    check_layout(figure)
 
 
 @pytest.mark.parametrize(
@@ -181,3 +187,14 @@ def test_moving_obstacles_have_a_path_and_a_legend_entry_of_their_own():
     assert "obstacle" in drawn["plain"][0]
     assert set(drawn["moving"][0]) - set(drawn["plain"][0]) == {"moving obstacle and its path"}
     assert len(drawn["moving"][1]) == len(drawn["plain"][1]) + 1
+
+
+def test_the_scale_bar_and_a_legend_of_four_entries_are_in_one_line():
+    figure = plot_coverage(build_curves(1), [build_snapshot(ROOMS)])
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == 4
+    renderer = figure.canvas.get_renderer()
+    box = legend.get_window_extent(renderer)
+    bar = figure.artists[0].get_window_extent(renderer)
+    assert bar.x1 < box.x0
+    assert box.y0 < bar.y0 < box.y1

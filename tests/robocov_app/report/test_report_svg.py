@@ -5,13 +5,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from reported_results import HOSTILE
+from reported_results import HOSTILE, build_recorded_result, build_run
 
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.figures.gains import GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
+from robocov_app.report.analysis.groups import choose_group_styles
+from robocov_app.report.plots.costs import build_cost_plots, build_final_cost_plots
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import list_css_colors
 
@@ -108,3 +110,19 @@ def test_the_same_figure_gives_the_same_bytes() -> None:
     first = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
     second = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
     assert first == second
+
+
+@pytest.mark.parametrize("build", [build_cost_plots, build_final_cost_plots])
+def test_panels_of_a_map_have_the_same_axis(build) -> None:
+    finals = {("rooms", 4): 4.0, ("rooms", 8): 5.0, ("hall", 4): 0.5, ("hall", 8): 0.7}
+    runs = [
+        build_run(seed=seed, final=final + 0.1 * seed, map_name=map_name, robots=robots)
+        for (map_name, robots), final in finals.items()
+        for seed in range(3)
+    ]
+    result = build_recorded_result(runs)
+    plots = {plot.title: plot.svg for plot in build(result, choose_group_styles(result), "k")}
+    ticks = {title: re.findall(r">([\d.]+)</text>", svg) for title, svg in plots.items()}
+    assert ticks["rooms, 4 robots"] == ticks["rooms, 8 robots"]
+    assert ticks["hall, 4 robots"] == ticks["hall, 8 robots"]
+    assert ticks["rooms, 4 robots"] != ticks["hall, 4 robots"]

@@ -18,6 +18,7 @@ from robocov_app.report.plots.plot import (
     PagePlot,
     Panel,
     build_panel_plot,
+    compute_map_ranges,
     list_panels,
 )
 from robocov_app.report.results.result import ReportedResult, ReportedRun
@@ -40,10 +41,12 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
     -------
     list of PagePlot
         First all settings together, as fractions of the values at the start, then each setting. Panels
-        without any known cost are left out.
+        without any known cost are left out. The panels of a map have the same axes.
     """
     times, distances = _sample_histories(result)
-    plots = []
+    panels = []
+    panel_bands = []
+    panel_values = []
     for panel in list_panels(result, key):
         bands = []
         for group in panel.groups:
@@ -53,8 +56,14 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
             if rows:
                 bands.append(Band(group.label, styles[group.label], times, np.array(rows)))
         if bands:
-            plots.append(_build_cost_plot(panel, bands))
-    return plots
+            panels.append(panel)
+            panel_bands.append(bands)
+            panel_values.append(np.concatenate([compute_quartiles(band.values) for band in bands]))
+    ranges = compute_map_ranges(panels, panel_values)
+    return [
+        _build_cost_plot(panel, bands, ranges[panel.map_name])
+        for panel, bands in zip(panels, panel_bands, strict=True)
+    ]
 
 
 def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[ReportedRun, FloatArray]]:
@@ -78,8 +87,8 @@ def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[Reported
     return times, distances
 
 
-def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
-    """Build the plot of the bands in a panel."""
+def _build_cost_plot(panel: Panel, bands: list[Band], value_range: tuple[float, float]) -> PagePlot:
+    """Build the plot of the bands in a panel, with an axis for a range of values."""
     if panel.is_together:
         label = "mean distance / initial mean distance"
         unit = ""
@@ -89,7 +98,7 @@ def _build_cost_plot(panel: Panel, bands: list[Band]) -> PagePlot:
     texts = "; ".join(_describe_band(band, unit) for band in bands)
     description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
     # The unit is in the label of the axis, because there is little space for the names of the curves.
-    draw = partial(plot_cost_bands, bands, label=label, unit="")
+    draw = partial(plot_cost_bands, bands, label=label, unit="", value_range=value_range)
     return build_panel_plot(panel, description, draw)
 
 
@@ -117,11 +126,13 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
     -------
     list of PagePlot
         First all settings together, divided by their medians, then each setting. Panels in which no group
-        has several runs are left out.
+        has several runs are left out. The panels of a map have the same axis.
     """
     medians = compute_medians(result)
     meters = dict.fromkeys(result.completed_runs, 1.0)
-    plots = []
+    panels = []
+    panel_samples = []
+    panel_values = []
     for panel in list_panels(result, key):
         scales = medians if panel.is_together else meters
         samples = []
@@ -130,12 +141,18 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
             if len(distances):
                 samples.append(Sample(group.label, styles[group.label], distances))
         if max((len(sample.values) for sample in samples), default=0) > 1:
-            plots.append(_build_final_cost_plot(panel, samples))
-    return plots
+            panels.append(panel)
+            panel_samples.append(samples)
+            panel_values.append(np.concatenate([sample.values for sample in samples]))
+    ranges = compute_map_ranges(panels, panel_values)
+    return [
+        _build_final_cost_plot(panel, samples, ranges[panel.map_name])
+        for panel, samples in zip(panels, panel_samples, strict=True)
+    ]
 
 
-def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
-    """Build the plot of the samples in a panel."""
+def _build_final_cost_plot(panel: Panel, samples: list[Sample], value_range: tuple[float, float]) -> PagePlot:
+    """Build the plot of the samples in a panel, with an axis for a range of values."""
     if panel.is_together:
         label = SCALED_DISTANCE_LABEL
         unit = ""
@@ -146,7 +163,7 @@ def _build_final_cost_plot(panel: Panel, samples: list[Sample]) -> PagePlot:
 
     def draw(size: tuple[int, int]) -> Figure:
         width, _ = size
-        return plot_final_costs([("", samples)], label, width=width, scale=1.0)
+        return plot_final_costs([("", samples)], label, width=width, scale=1.0, value_range=value_range)
 
     return build_panel_plot(panel, f"{label}. {texts}.", draw)
 

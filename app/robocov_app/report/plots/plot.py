@@ -1,10 +1,12 @@
 """The plots of a page, and their panels for several settings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from robocov.typing import FloatArray
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.report.analysis.groups import (
     RunGroup,
@@ -57,14 +59,19 @@ class Panel(NamedTuple):
         Start of the ids in the SVG of the panel.
     groups : list of RunGroup
         Groups reduced to the runs of the panel.
-    is_together : bool
-        Whether the panel shows several settings together.
+    map_name : str
+        Map that the panel shows; empty if it shows several settings together.
     """
 
     title: str
     key: str
     groups: list[RunGroup]
-    is_together: bool
+    map_name: str
+
+    @property
+    def is_together(self) -> bool:
+        """Whether the panel shows several settings together."""
+        return not self.map_name
 
 
 def list_panels(result: ReportedResult, key: str) -> list[Panel]:
@@ -73,15 +80,42 @@ def list_panels(result: ReportedResult, key: str) -> list[Panel]:
     settings = list_settings(result)
     panels = []
     if len(settings) > 1:
-        panels.append(Panel(TOGETHER_TITLE, f"{key}-all", groups, is_together=True))
+        panels.append(Panel(TOGETHER_TITLE, f"{key}-all", groups, map_name=""))
     if len(settings) <= MAX_PANELS:
         for number, setting in enumerate(settings):
             title = ""
             if len(settings) > 1:
                 title = format_setting(result, setting)
             setting_groups = [group.select(setting) for group in groups]
-            panels.append(Panel(title, f"{key}-{number}", setting_groups, is_together=False))
+            map_name, _, _ = setting
+            panels.append(Panel(title, f"{key}-{number}", setting_groups, map_name))
     return panels
+
+
+def compute_map_ranges(
+    panels: Sequence[Panel], panel_values: Sequence[FloatArray]
+) -> dict[str, tuple[float, float]]:
+    """Compute the range of the values on each map, so that the panels of a map have the same axis.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    panel_values : sequence of arrays
+        Values in each panel, at least one of them finite.
+
+    Returns
+    -------
+    dict of str to (low, high)
+        Ranges by `Panel.map_name`.
+    """
+    map_values: dict[str, list[FloatArray]] = {}
+    for panel, values in zip(panels, panel_values, strict=True):
+        map_values.setdefault(panel.map_name, []).append(values.ravel())
+    ranges = {}
+    for map_name, arrays in map_values.items():
+        values = np.concatenate(arrays)
+        ranges[map_name] = (float(np.nanmin(values)), float(np.nanmax(values)))
+    return ranges
 
 
 def build_panel_plot(panel: Panel, description: str, draw: Callable[[tuple[int, int]], Figure]) -> PagePlot:
