@@ -108,3 +108,12 @@ def test_an_open_help_page_covers_the_window_of_a_phone(small_window: Driver) ->
     controls = small_window.window.controls
     assert controls.is_covered
     assert controls.scroll_box == (0, 0, 900, 600)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.125, 1.25, 1.5])
+def test_a_page_that_fits_does_not_scroll(scale: float, tmp_path: Path) -> None:
+    with open_viewer(tmp_path, size=(2560, 1440), scale=scale) as driver:
+        driver.press_key("f1")
+        top = driver.copy_frame()
+        driver.press_key("end")
+        assert driver.shows_frame(top)

@@ -256,7 +256,7 @@ def _arrange_columns(screen: Surface, scale: float, hint: str, lines: Sequence[s
     hint_lines = _wrap_hint(hint, text_width, scale)
     space_around_rows = (_measure_top(hint_lines) + _BOTTOM_PX) * scale
     rows_height = max(cell.row + 1 for cell in cells) * _ROW_PX * scale
-    box_height = round(min(rows_height + space_around_rows, height - margin))
+    box_height = min(math.ceil(rows_height + space_around_rows) + 1, round(height - margin))
     box = Rect(0, 0, box_width, box_height)
     box.center = width // 2, height // 2
     return _Columns(count, cells, box, hint_lines, scale)
