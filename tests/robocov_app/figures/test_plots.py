@@ -95,7 +95,7 @@ def test_a_png_has_the_requested_size(tmp_path, size):
 
 
 class TestTrajectories:
-    def test_the_papers_colors_and_the_records_positions(self):
+    def test_colors_of_the_paper_and_positions_of_the_record(self):
         record = record_walk(ROOMS, 5)
         axes = plot_trajectories(record).axes[0]
         (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
@@ -122,7 +122,7 @@ class TestTrajectories:
         marks = next(line for line in axes.lines if line.get_marker() == "+")
         assert np.asarray(marks.get_xydata()) == pytest.approx(cells.centroids)
 
-    def test_no_centroid_peeps_out_from_under_a_robot(self):
+    def test_a_robot_hides_the_centroid_below_it(self):
         record = record_walk(ROOMS, 5)
         last = partition(record.positions[-1], ROOMS.region).centroids
         for _ in range(60):
@@ -144,7 +144,7 @@ class TestTrajectories:
         words = [text.get_text() for text in legend.get_texts()]
         assert words[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
 
-    def test_goals_of_another_kind_are_called_goals(self):
+    def test_other_goals_are_labeled_goals(self):
         record = record_walk(ROOMS, 5)
         goals = record.goals.copy()
         goals[-1] = record.positions[-1] + np.array([0.8, 0.3])
@@ -156,7 +156,7 @@ class TestTrajectories:
         words = [text.get_text() for text in legend.get_texts()]
         assert {"goal", "cell centroid"} < set(words)
 
-    def test_a_crowd_stays_readable(self):
+    def test_many_robots_stay_readable(self):
         record = record_walk(ROOMS, 120)
         last = record.positions[-1].copy()
         last[:100] = 2.0 + 0.12 * np.stack(np.meshgrid(np.arange(10), np.arange(10)), axis=-1).reshape(-1, 2)
@@ -216,7 +216,7 @@ class TestTrajectories:
         label = next(t.get_text() for t in figure.texts if re.fullmatch(r"[\d.]+ m", t.get_text()))
         assert pixels / (box.width / 16.0) == pytest.approx(float(label.split()[0]))
 
-    def test_on_axes_of_somebody_else(self):
+    def test_existing_axes_can_be_used(self):
         figure = Figure()
         axes = figure.subplots()
         assert plot_trajectories(record_walk(ROOMS, 3), axes) is figure
@@ -234,12 +234,12 @@ class TestText:
     @pytest.mark.parametrize(
         "draw", [plot_trajectories, lambda record, size: plot_comparison([record] * 3, size=size)]
     )
-    def test_it_grows_with_the_page(self, draw):
+    def test_text_grows_with_the_page(self, draw):
         small = draw(record_walk(ROOMS, 3), size=(960, 640))
         large = draw(record_walk(ROOMS, 3), size=(2880, 1920))
         assert min(self.heights(large)) == pytest.approx(3 * min(self.heights(small)), rel=0.35)
 
-    def test_a_comparison_is_read_when_it_is_shown_at_half_its_size(self):
+    def test_a_comparison_is_legible_at_half_its_size(self):
         figure = plot_comparison([record_walk(ROOMS, 3)] * 3)
         assert figure.bbox.width == pytest.approx(1600, abs=0.1)
         assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
@@ -355,7 +355,7 @@ assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
 
 
 @pytest.mark.slow
-def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
+def test_matplotlib_is_imported_late_and_pyplot_and_pygame_never():
     done = subprocess.run(
         [sys.executable, "-c", _LAZY, str(Path(__file__).parents[1])],
         capture_output=True,
@@ -387,7 +387,7 @@ def test_names_are_never_markup(tmp_path):
         (2.0, "", "RAPF  2.000"),
     ],
 )
-def test_the_end_of_a_curve_has_as_many_digits_as_are_read(value: float, unit: str, words: str) -> None:
+def test_final_values_are_rounded_for_reading(value: float, unit: str, words: str) -> None:
     curve = TimeCurve("RAPF", "rapf", np.arange(3.0), np.array([1.0, value, np.nan]))
     assert format_end_label(curve, unit) == words
 

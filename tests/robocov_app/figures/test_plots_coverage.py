@@ -171,7 +171,7 @@ def test_a_small_page_has_the_curves_alone(size):
     assert tuple(figure.canvas.get_width_height()) == size
 
 
-def test_no_snapshots_are_refused():
+def test_a_plot_without_snapshots_is_rejected():
     with pytest.raises(ParameterError, match="snapshots: expected at least one, got none"):
         plot_coverage(build_curves(1), [])
 

@@ -80,7 +80,7 @@ def test_numbers_of_a_grid_show_small_differences() -> None:
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_ink_can_be_read_on_all_colors_of_a_grid(theme) -> None:
+def test_text_is_legible_on_all_colors_of_a_grid(theme) -> None:
     colors = theme.muted_heat
     assert len(colors) == len(set(colors)) == HEAT_LEVELS
     assert min(compute_contrast(theme.ink, color) for color in colors) >= 4.5

@@ -2,7 +2,7 @@
 
     python hostile_files.py FILE ...
 
-prints a JSON object: for each file its CPU seconds and what was said, and by how many MB the peak of the
+prints a JSON object: for each file its CPU seconds and what was printed, and by how many MB the peak of the
 memory grew.
 """
 
@@ -45,10 +45,10 @@ def main(paths: list[str]) -> None:
             chosen = next(known, named[0])
             options = ReadOptions(scale=1.0) if "scale" in chosen.options else ReadOptions()
             chosen.read(path, options)
-            said = "taken"
+            message = "taken"
         except RobocovError as error:
-            said = str(error)
-        answer[path.name] = (time.process_time() - begin, said)
+            message = str(error)
+        answer[path.name] = (time.process_time() - begin, message)
     print(json.dumps({"files": answer, "grown_mb": read_peak_mb() - before}))
 
 

@@ -25,19 +25,19 @@ from robocov.errors import RobocovError
 from robocov_app.formats import import_map, ReadOptions
 import PIL.PngImagePlugin, yaml
 
-def told(path, cell):
+def import_map_file(path, cell):
     Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
     began = time.process_time()
     try:
         import_map(Path(path), options=ReadOptions(cell=cell))
     except RobocovError as error:
-        said = str(error)
+        answer = str(error)
     else:
-        said = "accepted"
+        answer = "accepted"
     status = Path("/proc/self/status").read_text()
-    return said, time.process_time() - began, 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
+    return answer, time.process_time() - began, 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 
-print(json.dumps([told(path, cell) for path, cell in json.loads(sys.argv[1])]))
+print(json.dumps([import_map_file(path, cell) for path, cell in json.loads(sys.argv[1])]))
 """
 
 
@@ -48,7 +48,7 @@ def measure_import(files: list[tuple[Path, float | None]]) -> list[tuple[str, fl
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-500:]
-    return [(said, seconds, memory) for said, seconds, memory in json.loads(done.stdout)]
+    return [(answer, seconds, memory) for answer, seconds, memory in json.loads(done.stdout)]
 
 
 def write_sparse_file(path: Path, head: bytes, size: int) -> Path:
@@ -147,12 +147,12 @@ def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
         else:
             (folder / file).write_bytes(content())
         files.append((folder / file, 1.0 if options == "cell" else None))
-    for (name, case), (path, _), (said, seconds, memory) in zip(
+    for (name, case), (path, _), (answer, seconds, memory) in zip(
         HOSTILE.items(), files, measure_import(files), strict=True
     ):
-        assert case[3] in said, name
-        assert said.startswith(str(path)), name
-        assert "\n" not in said, name
+        assert case[3] in answer, name
+        assert answer.startswith(str(path)), name
+        assert "\n" not in answer, name
         assert seconds < SECONDS, name
         assert memory < MEMORY, name
 
@@ -161,6 +161,6 @@ def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
 def test_a_valid_raster_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "a.pgm"
     path.write_bytes(build_pgm(draw_pixels(PLAN)))
-    ((said, _, memory),) = measure_import([(path, 1.0)])
-    assert said == "accepted"
+    ((answer, _, memory),) = measure_import([(path, 1.0)])
+    assert answer == "accepted"
     assert memory < MEMORY

@@ -160,10 +160,10 @@ def test_hostile_files_are_refused_within_seconds_and_200_mb(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stderr == ""
     answer = json.loads(done.stdout)
-    for name, (seconds, said) in answer["files"].items():
-        assert said.startswith(str(tmp_path / name)), f"{name}: {said}"
-        assert "\n" not in said
-        assert len(said) < 500
+    for name, (seconds, message) in answer["files"].items():
+        assert message.startswith(str(tmp_path / name)), f"{name}: {message}"
+        assert "\n" not in message
+        assert len(message) < 500
         assert seconds < SECONDS, f"{name}: {seconds:.2f} s"
     assert answer["grown_mb"] < 200, answer["grown_mb"]
 

@@ -31,7 +31,7 @@ def compute_obstacles(foreign: ForeignMap) -> shapely.Geometry:
     return SPACE - foreign.free
 
 
-def test_shapes_are_turned_and_moved_to_their_states(tmp_path: Path) -> None:
+def test_shapes_are_rotated_and_moved_to_their_states(tmp_path: Path) -> None:
     foreign = read(
         tmp_path,
         """
@@ -61,7 +61,7 @@ obstacle:
     assert foreign.boundary is not None and foreign.boundary.equals(SPACE)
 
 
-def test_the_last_of_a_list_stands_for_the_rest_of_a_group(tmp_path: Path) -> None:
+def test_the_last_item_of_a_list_applies_to_the_rest_of_a_group(tmp_path: Path) -> None:
     foreign = read(
         tmp_path,
         """
@@ -100,7 +100,7 @@ obstacle:
     assert compute_obstacles(foreign).symmetric_difference(expected).area < 1e-5
 
 
-def test_what_is_by_chance_or_collides_with_nothing_is_counted(tmp_path: Path) -> None:
+def test_random_and_non_colliding_shapes_are_counted(tmp_path: Path) -> None:
     text = """
 robot:
   - kinematics: {name: diff}
@@ -129,7 +129,7 @@ obstacle:
     assert environment.starts["robots"].positions == ((0.0, 3.0), (1.0, 3.0))  # type: ignore[union-attr]
 
 
-def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> None:
+def test_a_picture_fills_the_world_for_any_cell_size(tmp_path: Path) -> None:
     (tmp_path / "grid.pgm").write_bytes(build_pgm(draw_pixels("#...\n....\n...#")))
     foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")
     # cells of 2.5 x 2 m, the top row of the picture is the highest
@@ -172,21 +172,21 @@ def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
         ("obstacle: " + "[" * 20, "nested too deeply, expected at most 12 levels"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_values_are_reported_with_their_place(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "a.pgm").write_bytes(build_pgm(np.full((2, 2), 255, np.uint8)))
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
     assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
+def test_a_world_is_not_mistaken_for_a_map_of_ros(tmp_path: Path) -> None:
     # a generated map has a resolution, and comments speak of images
     path = tmp_path / "world.yaml"
     path.write_text(WORLD + "  obstacle_map:\n    name: perlin # or an image: a.png\n    resolution: 0.1\n")
     assert detect_format(path) is IMPORTER
 
 
-def test_turns_are_in_radians() -> None:
+def test_rotations_are_in_radians() -> None:
     from robocov_app.formats.geometry.frames import build_frame
 
     assert build_frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))

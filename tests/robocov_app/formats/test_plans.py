@@ -37,7 +37,7 @@ def draw_flat() -> Image.Image:
     return picture
 
 
-def test_a_plan_on_paper_is_taken_without_the_paper(tmp_path: Path) -> None:
+def test_the_paper_around_a_plan_is_removed(tmp_path: Path) -> None:
     area, report, _ = import_picture(tmp_path, draw_flat())
     assert area == pytest.approx(7.4 * 3.4 - 0.2 * 2.2, abs=0.05)
     (note,) = [note for note in report.notes if "paper around a plan" in note]

@@ -56,8 +56,8 @@ def test_lost_areas_are_on_the_left_and_opened_ones_on_the_right(theme: Any) -> 
     assert np.allclose([patch.get_path().get_extents().bounds for patch in opened], [(9, 6, 0.1, 0.1)])
     assert not find_marks(before, theme.start)
     assert not find_marks(after, theme.trajectory)
-    said = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert {"left out: 4 m² were free", "opened: 0.01 m² were solid", "narrowest passage, 0.6 m"} <= said
+    texts = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"left out: 4 m² were free", "opened: 0.01 m² were solid", "narrowest passage, 0.6 m"} <= texts
     assert_layout_is_clear(figure)
 
 

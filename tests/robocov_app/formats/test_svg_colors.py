@@ -116,7 +116,7 @@ def test_nested_outlines_within_a_named_boundary_begin_solid(tmp_path: Path) -> 
     assert read_free_space(tmp_path, body, outlines="nested") == pytest.approx(60 - 28 + 1)
 
 
-def test_a_plan_on_a_white_page_is_taken_without_the_page(tmp_path: Path) -> None:
+def test_a_white_page_around_a_plan_is_removed(tmp_path: Path) -> None:
     path = tmp_path / "plan.svg"
     walls = '<path d="M2 1H8V5H2Z" fill="none" stroke="#000" stroke-width="0.2"/>'
     path.write_text(build_svg('<rect width="10" height="6" fill="#fff"/>' + walls, PAGE))
@@ -195,12 +195,12 @@ def test_colors_are_read_as_they_are_seen(tmp_path: Path, paint: str, color: str
 
 
 @pytest.mark.parametrize("paint", ['fill="rgba(0,0,0,0)"', 'fill="#0000"', 'fill="transparent"'])
-def test_what_is_transparent_is_not_there(tmp_path: Path, paint: str) -> None:
+def test_transparent_shapes_are_omitted(tmp_path: Path, paint: str) -> None:
     shape = f'<rect x="1" y="1" width="3" height="2" {paint}/>'
     assert read_free_space(tmp_path, FLOOR + WALLS + shape) == pytest.approx(ROOM)
 
 
-def test_layers_are_left_out_by_their_names(tmp_path: Path) -> None:
+def test_layers_can_be_omitted_by_name(tmp_path: Path) -> None:
     layers = (
         '<g xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" inkscape:groupmode="layer" '
         'inkscape:label="Furniture"><rect x="1" y="1" width="1" height="1"/></g>'

@@ -60,11 +60,11 @@ def test_yaml_and_pixels_as_map_saver_writes_them(tmp_path: Path) -> None:
 @pytest.mark.parametrize("image", ["pgm", "png"])
 def test_a_written_map_can_be_read(tmp_path: Path, mode: str, image: str) -> None:
     report = export_map(CORNER, tmp_path / "c.yaml", options=WriteOptions(cell=0.25, mode=mode, image=image))  # type: ignore[arg-type]
-    environment, told, _ = import_map(tmp_path / "c.yaml", shaping=Shaping(simplify=0.0))
+    environment, conversion, _ = import_map(tmp_path / "c.yaml", shaping=Shaping(simplify=0.0))
     assert environment.free.equals(CORNER.free)
     assert set(environment.boundary) == set(CORNER.boundary)
     unknown = mode != "scale" or image == "png"
-    assert ("unknown" in told.notes[0]) == unknown
+    assert ("unknown" in conversion.notes[0]) == unknown
     assert bool(report.notes) == (not unknown)
     if unknown:
         cut, _, _ = import_map(

@@ -40,7 +40,7 @@ def open_cluster(*, processes: bool, workers: int = 1) -> Iterator[Any]:
         yield cluster
 
 
-def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cluster_gives_the_same_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     study = build_small_study(seeds=range(4), robots=(2, 500), gains={"rapf": {"k_rep": [0.1, 1.0]}})
     expected = Totals(12, 12, 0, False)
     assert sweep(study, tmp_path / "here", workers=1, quiet=True) == expected
@@ -56,7 +56,7 @@ def test_a_cluster_makes_the_same_table(tmp_path: Path, capsys: pytest.CaptureFi
     assert read_tables(tmp_path / "there") == read_tables(tmp_path / "here")
 
 
-def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
+def test_only_tasks_that_end_their_process_fail(tmp_path: Path) -> None:
     """Dask blames all tasks that were with a worker when it ended; only one of them is at fault."""
     dask = pytest.importorskip("dask")
     name = write_controller(tmp_path, "        os._exit(3)\n")
@@ -71,7 +71,7 @@ def test_processes_of_a_cluster_may_end(tmp_path: Path) -> None:
     assert ends == ["", "the process of its worker ended"] * 2
 
 
-def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_waits_for_workers_and_resumes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster_module, "_THREAD_COUNT_INTERVAL_S", 0.05)
     task = next(generate_tasks(build_small_study()))
     with open_cluster(processes=False, workers=0) as cluster, Cluster(cluster.scheduler_address) as executor:
@@ -86,25 +86,25 @@ def test_without_workers_it_waits_and_goes_on_when_some_come(monkeypatch: pytest
             pass
 
 
-def test_modules_that_a_controller_imports_reach_workers_without_its_disk(
+def test_imported_modules_reach_workers_without_access_to_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "weights_of_mine.py").write_text("PULL = 0.5\n")
     name = write_controller(tmp_path, "        from weights_of_mine import PULL\n        self = Mine(PULL)\n")
     (task, *_) = generate_tasks(build_small_study(controllers=(name,)))
-    here = perform(task)
+    local_outcome = perform(task)
     for path in tmp_path.iterdir():
         path.unlink()
     with open_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
         while (back := executor.wait_for_next(0.1)) is None:
             pass
-    assert back[1] == here
-    assert here.error is None
+    assert back[1] == local_outcome
+    assert local_outcome.error is None
 
 
-def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp_path: Path) -> None:
+def test_a_lost_scheduler_ends_the_sweep_and_the_same_call_resumes_it(tmp_path: Path) -> None:
     name = write_controller(tmp_path, "        time.sleep(0.02)\n")
     study = build_small_study(controllers=(name,), seeds=range(12))
     with open_cluster(processes=False) as cluster, Cluster(cluster.scheduler_address) as executor:
@@ -118,7 +118,7 @@ def test_a_scheduler_that_goes_away_ends_the_sweep_and_the_same_call_goes_on(tmp
                 executor.wait_for_next(0.1)
 
 
-def test_nobody_at_the_address_is_one_line(
+def test_a_missing_scheduler_is_reported_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster_module, "CONNECTION_TIMEOUT_S", 0.5)
@@ -141,14 +141,14 @@ def test_nobody_at_the_address_is_one_line(
     assert list((tmp_path / "out" / "runs").iterdir()) == []
 
 
-def test_without_dask_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_dask_the_message_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    wanted = r'--scheduler: distributed is not installed: pip install "robocov\[dask\]"'
-    with pytest.raises(RobocovError, match=wanted):
+    message = r'--scheduler: distributed is not installed: pip install "robocov\[dask\]"'
+    with pytest.raises(RobocovError, match=message):
         Cluster("tcp://127.0.0.1:9")
 
 
-def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_without_robocov_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def raise_missing(task: object) -> None:
         raise ModuleNotFoundError("No module named 'robocov_app'")
 
@@ -161,7 +161,7 @@ def test_workers_that_do_not_know_robocov_are_told_of(monkeypatch: pytest.Monkey
                 executor.wait_for_next(0.1)
 
 
-def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:
+def test_threads_of_a_worker_share_no_state() -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     tasks = list(generate_tasks(build_small_study(seeds=range(8))))
@@ -169,9 +169,7 @@ def test_threads_of_one_worker_do_not_share_what_they_compute_with() -> None:
         assert list(threads.map(perform, tasks)) == [perform(task) for task in tasks]
 
 
-def test_nothing_of_dask_is_loaded_without_a_scheduler(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_dask_is_not_imported_without_a_scheduler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     imported = builtins.__import__
 
     def watch(name: str, *rest: Any, **more: Any) -> Any:

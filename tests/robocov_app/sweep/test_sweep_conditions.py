@@ -15,7 +15,7 @@ from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import perform
 
 
-def test_every_combination_is_tried() -> None:
+def test_all_combinations_are_run() -> None:
     study = build_small_study(conditions={"loss": [0.0, 0.5], "fail": ["", "1@0.2"], "delay": 0.1})
     assert len(study.teams) == 4
     assert study.varied_parameters == ("loss", "fail")
@@ -28,7 +28,7 @@ def test_every_combination_is_tried() -> None:
     assert (row["loss"], row["fail"], row["delay_s"]) == (0.5, "1@0.2", 0.1)
 
 
-def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
+def test_empty_conditions_do_not_change_the_tasks() -> None:
     """What was done before there were conditions is not done again."""
     assert [task.input_hash for task in generate_tasks(build_small_study())] == [
         task.input_hash for task in generate_tasks(build_small_study(conditions={}))
@@ -36,7 +36,7 @@ def test_a_study_without_conditions_has_the_tasks_that_it_had() -> None:
     assert "loss" not in next(generate_tasks(build_small_study())).team
 
 
-def test_a_run_is_under_its_conditions() -> None:
+def test_conditions_apply_to_the_run() -> None:
     study = build_small_study(conditions={"loss": 0.5, "fail": "2@0.2"}, controllers=("rapf",), seeds=[3])
     (task,) = generate_tasks(study)
     assert build_conditions(task.team, task.seed, task.robots) == Conditions(
@@ -60,17 +60,17 @@ def test_a_run_is_under_its_conditions() -> None:
         ({"delay": "null"}, "conditions.delay: expected a number"),
     ],
 )
-def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None:
+def test_invalid_conditions_are_rejected_with_their_place(given: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         parse_condition_axes(given)
 
 
-def test_robots_that_are_not_there_cannot_fail() -> None:
+def test_a_failure_of_an_unknown_robot_is_rejected() -> None:
     with pytest.raises(ParameterError, match="expected a robot from 1 to 2, got robot 3"):
         build_small_study(conditions={"fail": "3@0.1"})
 
 
-def test_a_file_says_it_in_a_table() -> None:
+def test_conditions_are_read_from_a_table() -> None:
     document = {
         "maps": "rooms",
         "controllers": "rapf",

@@ -20,7 +20,7 @@ class Still:
     name = "still"
 
 
-def test_without_a_word_a_controller_has_its_defaults() -> None:
+def test_without_gains_a_controller_has_its_defaults() -> None:
     assert build_gains(Rpf, {}, None).choices == ({"k_rep": 3.0, "rho_0": 4.0},)
     assert build_gains(Still, {}, None).choices == ({},)
 
@@ -33,20 +33,20 @@ def test_lists_are_combined_in_order() -> None:
     assert all(list(choice) == list(get_gains(Rapf)) for choice in gains.choices)
 
 
-def test_sets_of_gains_are_taken_one_by_one() -> None:
+def test_sets_of_gains_are_not_combined() -> None:
     paper = {"k_rep": 1, "rho_0": 2, "k_att": 3, "attraction_limit": None}
     gains = build_gains(Rapf, [paper, {}], None)
     assert gains.choices == (get_gain_values(Rapf(**paper)), get_gain_values(Rapf()))
     assert build_gains(Rapf, gains, None) == gains
 
 
-def test_former_spellings_in_a_study_are_accepted() -> None:
+def test_former_names_in_a_study_are_accepted() -> None:
     gains = build_gains(Poduri, {"neighbours": [1, 2]}, None)
     assert [choice["neighbors"] for choice in gains.choices] == [1.0, 2.0]
 
 
 @pytest.mark.parametrize("word", ["null", float("inf")])
-def test_no_limit_has_words_where_a_file_has_none(word: object) -> None:
+def test_null_and_infinity_mean_no_limit(word: object) -> None:
     (choice,) = build_gains(Rapf, {"attraction_limit": word}, None).choices
     assert choice["attraction_limit"] is None
 
@@ -59,47 +59,47 @@ def test_no_limit_has_words_where_a_file_has_none(word: object) -> None:
     samples=st.integers(1, 70),
     seed=st.integers(0, 10**6),
 )
-def test_samples_are_inside_their_ranges_and_always_the_same(
+def test_samples_are_in_their_ranges_and_reproducible(
     low: float, factor: float, scale: str, method: SamplingMethod, samples: int, seed: int
 ) -> None:
-    wanted = {"k_rep": Range(low, low * factor, scale), "rho_0": Range(0.5, 4.0)}
-    gains = build_gains(Rpf, wanted, Sampling(method, samples, seed))
-    assert gains == build_gains(Rpf, wanted, Sampling(method, samples, seed))
-    assert gains.ranges == wanted
+    ranges = {"k_rep": Range(low, low * factor, scale), "rho_0": Range(0.5, 4.0)}
+    gains = build_gains(Rpf, ranges, Sampling(method, samples, seed))
+    assert gains == build_gains(Rpf, ranges, Sampling(method, samples, seed))
+    assert gains.ranges == ranges
     assert len(gains.choices) == samples
-    for name, each in wanted.items():
+    for name, each in ranges.items():
         values = [choice[name] for choice in gains.choices]
         assert all(each.low <= value <= each.high for value in values)
         assert len(set(values)) == samples
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_samples_fill_a_range_evenly_on_its_scale(method: SamplingMethod) -> None:
-    wanted = {"k_rep": Range(0.01, 100.0, "log"), "rho_0": Range(1.0, 3.0)}
-    gains = build_gains(Rpf, wanted, Sampling(method, 64, 3))
+def test_samples_are_evenly_spread_on_the_scale_of_a_range(method: SamplingMethod) -> None:
+    ranges = {"k_rep": Range(0.01, 100.0, "log"), "rho_0": Range(1.0, 3.0)}
+    gains = build_gains(Rpf, ranges, Sampling(method, 64, 3))
     decades = np.log10([choice["k_rep"] for choice in gains.choices])
     assert np.histogram(decades, bins=4, range=(-2, 2))[0] == pytest.approx(16, abs=2)
     reach = [choice["rho_0"] for choice in gains.choices]
     assert np.histogram(reach, bins=4, range=(1, 3))[0] == pytest.approx(16, abs=2)
 
 
-def test_rounding_leads_out_of_no_range() -> None:
+def test_rounding_does_not_leave_the_range() -> None:
     assert Range(1 / 3, 2 / 3).interpolate(np.array([0.0, 0.5, 1.0])) == [1 / 3, 0.5, 2 / 3]
 
 
 @pytest.mark.parametrize(("method", "grows"), [("sobol", True), ("halton", True), ("latin-hypercube", False)])
 def test_more_samples_keep_the_first_ones(method: SamplingMethod, grows: bool) -> None:
-    wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
-    few = build_gains(Rpf, wanted, Sampling(method, 5)).choices
-    many = build_gains(Rpf, wanted, Sampling(method, 40)).choices
+    ranges = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
+    few = build_gains(Rpf, ranges, Sampling(method, 5)).choices
+    many = build_gains(Rpf, ranges, Sampling(method, 40)).choices
     assert (many[:5] == few) is grows
 
 
 def test_controllers_with_the_same_ranges_get_the_same_samples() -> None:
-    wanted = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
+    ranges = {"k_rep": Range(0.1, 10.0), "rho_0": Range(1.0, 3.0)}
     sampling = Sampling(samples=7, seed=2)
     tried = [
-        [(choice["k_rep"], choice["rho_0"]) for choice in build_gains(kind, wanted, sampling).choices]
+        [(choice["k_rep"], choice["rho_0"]) for choice in build_gains(kind, ranges, sampling).choices]
         for kind in (Rapf, Rpf)
     ]
     assert tried[0] == tried[1]
@@ -153,20 +153,20 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "wanted", "message"), WRONG)
-def test_what_cannot_be_tried_is_named_with_its_place(kind: type, wanted: object, message: str) -> None:
+@pytest.mark.parametrize(("kind", "gains", "message"), WRONG)
+def test_invalid_gains_are_rejected_with_their_place(kind: type, gains: object, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        build_gains(kind, wanted, Sampling(samples=8), ("gains", "x"))
+        build_gains(kind, gains, Sampling(samples=8), ("gains", "x"))
     assert str(caught.value).startswith(message)
 
 
-def test_a_range_needs_a_way_to_sample_it() -> None:
+def test_a_range_without_sampling_is_rejected() -> None:
     with pytest.raises(ParameterError, match=r"^gains\.rpf\.k_rep: expected a table \[sampling\]"):
         build_gains(Rpf, {"k_rep": Range(1, 2)}, None, ("gains", "rpf"))
 
 
 @pytest.mark.parametrize(
-    ("said", "message"),
+    ("settings", "message"),
     [
         ({"method": "sobool"}, "sampling.method: unknown method 'sobool': did you mean 'sobol'?"),
         ({"samples": 0}, "sampling.samples: expected a whole number from 1 to 100000, got 0"),
@@ -174,7 +174,7 @@ def test_a_range_needs_a_way_to_sample_it() -> None:
         ({"seed": -1}, "sampling.seed: expected a whole number"),
     ],
 )
-def test_sampling_is_checked(said: dict, message: str) -> None:
+def test_invalid_sampling_is_rejected(settings: dict, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        Sampling(**said)
+        Sampling(**settings)
     assert str(caught.value).startswith(message)

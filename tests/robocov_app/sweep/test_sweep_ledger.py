@@ -195,7 +195,7 @@ def test_a_run_is_on_the_disk_before_its_folder_gets_its_name(
     assert list_run_folders(tmp_path) == [task.name]
 
 
-def test_a_full_disk_leaves_nothing_of_a_run(
+def test_a_full_disk_leaves_no_partial_run(
     tmp_path: Path, task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_bytes = Path.write_bytes
@@ -230,7 +230,7 @@ def test_incomplete_files_of_sweeps_are_removed(tmp_path: Path, task: Task) -> N
         assert [path.name for path in tmp_path.glob(".*.part.*")] == [".x.part.zip"], "not a file of a sweep"
 
 
-def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+def test_other_folders_are_not_changed(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with (
         pytest.raises(InputError, match="expected an empty folder or a sweep"),

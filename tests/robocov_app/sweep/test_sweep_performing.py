@@ -33,7 +33,7 @@ def load_record(outcome: Outcome, folder: Path) -> Record:
     return Record.load(folder)
 
 
-def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
+def test_a_run_follows_its_task(tmp_path: Path) -> None:
     task = get_first_task(build_small_study(duration=6.0, controllers=("lloyd",), record_hz=4.0, cost_hz=2.0))
     whole = simulate(task)
     outcome = perform(task)
@@ -54,7 +54,7 @@ def test_a_run_is_that_of_the_task(tmp_path: Path) -> None:
     assert len(history.time) == 6 * 2 + 1
 
 
-def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: Path) -> None:
+def test_figures_use_all_steps_and_not_only_saved_ones(tmp_path: Path) -> None:
     task = get_first_task(build_small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulate(task)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
@@ -72,12 +72,12 @@ def test_figures_are_those_of_all_moments_not_of_those_that_are_kept(tmp_path: P
     assert (content["record_hz"], content["cost_hz"], content["lattice"]) == (0.0, 2.0, 8)
 
 
-def test_the_same_task_gives_the_same_bytes() -> None:
+def test_equal_tasks_give_equal_bytes() -> None:
     for task in generate_tasks(build_small_study()):
         assert perform(task) == perform(task)
 
 
-def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
+def test_the_source_of_a_custom_controller_is_saved(tmp_path: Path) -> None:
     task = get_first_task(
         build_small_study(controllers=("mine.py:Mine",), folder=Path(write_controller(tmp_path, "")).parent)
     )
@@ -87,7 +87,7 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("law", "message"),
+    ("code", "message"),
     [
         (
             "        1 / 0\n",
@@ -108,12 +108,12 @@ def test_a_controller_of_ones_own_is_kept_with_its_text(tmp_path: Path) -> None:
         ("        pass\n\n1 / 0\n", "controller 'mine.py:Mine': mine.py cannot be run: ZeroDivisionError: "),
     ],
 )
-def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -> None:
+def test_errors_are_outcomes(tmp_path: Path, code: str, message: str) -> None:
     write_controller(tmp_path, "")
     task = get_first_task(build_small_study(controllers=("mine.py:Mine",), folder=tmp_path))
     # the file is well when the study is made
     assert task.source is not None
-    task = replace(task, source=task.source._replace(text=HEAD + law))
+    task = replace(task, source=task.source._replace(text=HEAD + code))
     outcome = perform(task)
     assert outcome.error is not None and outcome.error.startswith(message), outcome.error
     assert not outcome.figures
@@ -123,12 +123,12 @@ def test_what_goes_wrong_is_an_outcome(tmp_path: Path, law: str, message: str) -
     assert "Traceback" in content["traceback"]
 
 
-def test_a_start_without_room_is_an_outcome() -> None:
+def test_a_start_without_space_is_an_outcome() -> None:
     outcome = perform(get_first_task(build_small_study(robots=(500,))))
     assert outcome.error is not None and outcome.error.startswith("start 'corner': space for about")
 
 
-def test_costs_of_the_last_maps_are_remembered() -> None:
+def test_costs_of_the_last_maps_are_cached() -> None:
     maps = [StudyMap(f"room {k}", replace(ROOM, name=f"room {k}")) for k in range(6)]
     tasks = list(generate_tasks(build_small_study(maps=maps, controllers=("rapf",), seeds=(0,))))
     costs = [prepare_cost(task) for task in tasks]
@@ -138,9 +138,9 @@ def test_costs_of_the_last_maps_are_remembered() -> None:
     assert prepare_cost(again) is costs[-1]
 
 
-@pytest.mark.parametrize("law", ["", "        1 / (own.time == 0.0)\n"])
-def test_nothing_of_the_physics_outlives_a_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, law: str
+@pytest.mark.parametrize("code", ["", "        1 / (own.time == 0.0)\n"])
+def test_physics_objects_are_freed_after_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str
 ) -> None:
     """Another thread that came upon it would free it in the midst of the next run's steps."""
     alive: list[weakref.ref[object]] = []
@@ -156,19 +156,19 @@ def test_nothing_of_the_physics_outlives_a_run(
 
     for kind in (pymunk.Space, pymunk.Body, pymunk.Poly, pymunk.Circle):
         watch(kind)
-    perform(get_first_task(build_small_study(controllers=(write_controller(tmp_path, law),))))
+    perform(get_first_task(build_small_study(controllers=(write_controller(tmp_path, code),))))
     assert len(alive) > 8
     assert not [thing for thing in alive if thing() is not None]
     assert gc.isenabled()
 
 
-def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
-    law = "        ring = []\n        ring.append(ring)\n"
+def test_garbage_of_a_long_run_is_collected(tmp_path: Path) -> None:
+    code = "        ring = []\n        ring.append(ring)\n"
     task = get_first_task(
-        build_small_study(controllers=(write_controller(tmp_path, law),), duration=100.0, robots=(2,))
+        build_small_study(controllers=(write_controller(tmp_path, code),), duration=100.0, robots=(2,))
     )
     seen: list[int] = []
-    gc.callbacks.append(lambda phase, said: seen.append(said["collected"]) if phase == "stop" else None)
+    gc.callbacks.append(lambda phase, info: seen.append(info["collected"]) if phase == "stop" else None)
     try:
         assert perform(task).error is None
     finally:
@@ -177,7 +177,7 @@ def test_garbage_of_a_long_run_does_not_pile_up(tmp_path: Path) -> None:
     assert len(seen) == 2 + 1
 
 
-def test_runs_without_a_moment_but_the_first() -> None:
+def test_runs_of_duration_zero_have_one_step() -> None:
     outcome = perform(get_first_task(build_small_study(duration=0.0)))
     assert outcome.error is None
     with np.load(io.BytesIO(outcome.files["record.npz"])) as arrays:
@@ -187,7 +187,7 @@ def test_runs_without_a_moment_but_the_first() -> None:
     assert outcome.figures["stuck_robots"] is None
 
 
-def test_robots_that_differ_and_metrics_have_figures_of_their_own() -> None:
+def test_mixed_teams_and_metrics_have_further_figures() -> None:
     group = ({"count": 1, "max_speed": 1.0, "radius": 0.2}, {"count": 2, "max_speed": 0.4})
     study = build_small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
     outcome = perform(get_first_task(study))

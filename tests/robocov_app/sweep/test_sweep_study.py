@@ -16,7 +16,7 @@ from robocov_app.sweep.tasks import generate_tasks
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
 
-def test_a_study_takes_lists_and_single_values() -> None:
+def test_a_study_accepts_lists_and_single_values() -> None:
     study = build_small_study(robots=[1, 2], max_speed=[0.5, 1], radius=0.2, communication_range="null")
     assert study.robots == (1, 2)
     assert [team["max_speed"] for team in study.teams] == [0.5, 1.0]
@@ -31,7 +31,7 @@ def test_the_number_of_runs_counts_starts_and_gains() -> None:
     assert len(study) == 3 * 5 * (3 + 1)
 
 
-def test_by_default_the_first_start_of_each_map_is_taken() -> None:
+def test_the_first_start_of_each_map_is_the_default() -> None:
     study = build_small_study(maps=MAPS)
     assert [study.list_starts(each) for each in study.maps] == [("corner",), ("door",)]
     bare = StudyMap("bare", replace(ROOM, starts={}))
@@ -40,15 +40,15 @@ def test_by_default_the_first_start_of_each_map_is_taken() -> None:
     assert build_small_study(maps=MAPS, starts=("uniform",)).list_starts(MAPS[1]) == ("uniform",)
 
 
-def test_a_team_is_what_the_study_says() -> None:
-    (said,) = build_small_study(sensing_range=float("inf"), communication_range=2).teams
-    team = build_swept_team(3, said)
+def test_a_team_has_the_parameters_of_the_study() -> None:
+    (parameters,) = build_small_study(sensing_range=float("inf"), communication_range=2).teams
+    team = build_swept_team(3, parameters)
     assert len(team) == 3
     assert team.sensing_range.tolist() == [float("inf")] * 3
     assert team.communication_range.tolist() == [2.0] * 3
 
 
-def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path) -> None:
+def test_a_custom_controller_is_read_when_the_study_is_built(tmp_path: Path) -> None:
     write_controller(tmp_path, "")
     study = build_small_study(
         controllers=("mine.py:Mine",), folder=tmp_path, gains={"mine.py:Mine": {"pull": [1, 2]}}
@@ -60,7 +60,7 @@ def test_a_controller_of_ones_own_is_read_when_the_study_is_made(tmp_path: Path)
     assert len(study) == 4
 
 
-def test_the_study_is_written_whole(tmp_path: Path) -> None:
+def test_the_document_of_a_study_is_complete(tmp_path: Path) -> None:
     name = write_controller(tmp_path, "")
     study = build_small_study(
         controllers=("rpf", name),
@@ -133,7 +133,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("changes", "message"), WRONG)
-def test_what_cannot_be_run_is_named_with_its_place(changes: dict, message: str) -> None:
+def test_invalid_studies_are_rejected_with_their_place(changes: dict, message: str) -> None:
     with pytest.raises(InputError) as caught:
         build_small_study(**changes)
     assert str(caught.value).startswith(message)
@@ -174,7 +174,7 @@ def test_a_team_of_groups() -> None:
         build_small_study(group=(GROUPS[0], {"count": 2, "max_speed": -1.0}), robots=(3,))
 
 
-def test_metrics_are_another_task() -> None:
+def test_metrics_change_the_hash_of_a_task() -> None:
     tasks = [next(generate_tasks(build_small_study(metrics=value))) for value in (False, True)]
     assert [task.metrics for task in tasks] == [False, True]
     assert tasks[0].input_hash != tasks[1].input_hash
@@ -182,7 +182,7 @@ def test_metrics_are_another_task() -> None:
         build_small_study(metrics=1)
 
 
-def test_kinematics_are_swept_as_words() -> None:
+def test_kinematics_can_be_swept() -> None:
     study = build_small_study(kinematics=["point", "unicycle"], turning_rate=2.0)
     assert study.varied_parameters == ("kinematics",)
     assert [build_swept_team(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]

@@ -93,7 +93,7 @@ def test_a_study_file_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(study) == starts * 2 * 4 * 4 * (10 + 1 + 2)
 
 
-def test_little_needs_to_be_said(folder: Path) -> None:
+def test_missing_keys_have_defaults(folder: Path) -> None:
     study = read_study(write_study(folder, 'maps = "square"\ncontrollers = "rapf"\n'))
     assert len(study) == 1
     assert (study.robots, study.seeds, study.duration, study.lattice) == ((6,), (0,), 60.0, 64)
@@ -263,33 +263,35 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("part", "instead", "message"), WRONG)
-def test_mistakes_are_named_with_file_and_key(folder: Path, part: str, instead: str, message: str) -> None:
+def test_invalid_values_are_reported_with_file_and_key(
+    folder: Path, part: str, instead: str, message: str
+) -> None:
     assert part in STUDY
     path = write_study(folder, STUDY.replace(part, instead))
     with pytest.raises(InputError) as caught:
         read_study(path)
-    said = str(caught.value)
-    assert "\n" not in said
+    message_text = str(caught.value)
+    assert "\n" not in message_text
     if message == "Cannot overwrite":
-        assert said.startswith(f"{path}: not TOML: cannot overwrite a value")
+        assert message_text.startswith(f"{path}: not TOML: cannot overwrite a value")
     else:
-        assert said.startswith(f"{path}: {message}"), said
+        assert message_text.startswith(f"{path}: {message}"), message_text
 
 
-def test_only_the_first_mistake_is_told_and_how_many_more_there_are(folder: Path) -> None:
+def test_the_first_issue_is_reported_with_the_number_of_others(folder: Path) -> None:
     text = STUDY.replace("seeds = 4", "seeds = 4.5").replace("robots = [3, 6]", 'robot = "six"')
     with pytest.raises(InputError, match=r"unknown key 'robot'.*\(and 1 more\)$"):
         read_study(write_study(folder, text))
 
 
-def test_two_maps_of_one_name_cannot_be_told_apart(folder: Path) -> None:
+def test_maps_with_equal_names_are_rejected(folder: Path) -> None:
     save_map(HALL, folder / "rooms.json")
     text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'
     with pytest.raises(InputError, match=r"maps\[1\]: expected maps with different names, got a second "):
         read_study(write_study(folder, text))
 
 
-def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
+def test_invalid_maps_are_reported_with_their_file(folder: Path) -> None:
     (folder / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": "bad"}')
     with pytest.raises(
         InputError, match=r"study.toml: maps\[0\]: .*bad.json:1:1: boundary: missing, expected "
@@ -297,7 +299,7 @@ def test_a_mistake_in_a_map_is_named_with_its_file(folder: Path) -> None:
         read_study(write_study(folder, 'maps = ["bad.json"]\ncontrollers = ["rapf"]\n'))
 
 
-def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
+def test_other_files_are_rejected(folder: Path) -> None:
     with pytest.raises(InputError, match=r"none.toml: no such file"):
         read_study(folder / "none.toml")
     with pytest.raises(InputError, match=r": expected a file, got a folder"):
@@ -311,7 +313,7 @@ def test_what_is_no_study_file_is_said_to_be_none(folder: Path) -> None:
         read_study(path)
 
 
-def test_the_readme_way_of_writing_it_is_toml() -> None:
+def test_the_study_of_these_tests_is_toml() -> None:
     assert tomllib.loads(STUDY)["gains"]["mine.py:Mine"] == {"pull": [1, 2]}
 
 
@@ -357,14 +359,14 @@ def test_a_team_of_groups(folder: Path) -> None:
         ),
     ],
 )
-def test_groups_that_are_none(folder: Path, before: str, after: str, message: str) -> None:
+def test_invalid_groups_are_rejected(folder: Path, before: str, after: str, message: str) -> None:
     path = write_study(folder, GROUPS.replace(before, after))
-    with pytest.raises(InputError) as told:
+    with pytest.raises(InputError) as caught:
         read_study(path)
-    assert str(told.value).startswith(f"{path}: {message}")
+    assert str(caught.value).startswith(f"{path}: {message}")
 
 
-def test_a_group_that_is_no_table(folder: Path) -> None:
+def test_a_group_that_is_not_a_table_is_rejected(folder: Path) -> None:
     path = write_study(folder, 'maps = ["rooms"]\ncontrollers = ["rapf"]\n[team]\ngroup = 3\n')
     with pytest.raises(InputError, match=r"team.group: expected tables \[\[team.group\]\], got 3"):
         read_study(path)
@@ -401,7 +403,7 @@ TEAM_AXES = ["radius", "max_speed", "max_acceleration", "viscosity", "sensing_ra
     ],
     ids=["team", "gains", "conditions", "samples", "seeds", "digits"],
 )
-def test_studies_without_end_are_refused_before_they_are_made(tmp_path: Path, text: str, runs: str) -> None:
+def test_huge_studies_are_rejected_before_they_are_built(tmp_path: Path, text: str, runs: str) -> None:
     path = tmp_path / "study.toml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -412,7 +414,7 @@ def test_studies_without_end_are_refused_before_they_are_made(tmp_path: Path, te
     assert len(message) < len(str(path)) + 400
 
 
-def test_max_runs_says_how_many_runs_may_be(tmp_path: Path) -> None:
+def test_max_runs_limits_the_number_of_runs(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(f"{HEAD}seeds = 11\nmax_runs = 10\n")
     with pytest.raises(InputError, match=r"runs: expected at most 10, got 11 \(11 seeds\)"):
@@ -436,14 +438,14 @@ def test_max_runs_says_how_many_runs_may_be(tmp_path: Path) -> None:
     ],
     ids=["keys", "group", "table", "lists", "many", "inline"],
 )
-def test_what_is_nested_too_deeply_is_refused(tmp_path: Path, text: str) -> None:
+def test_deeply_nested_files_are_rejected(tmp_path: Path, text: str) -> None:
     path = tmp_path / "study.toml"
     path.write_text(text)
     with pytest.raises(InputError, match="nested too deeply, expected at most 32 levels"):
         read_study(path)
 
 
-def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
+def test_a_large_file_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text("#" * 4_000_001)
     with pytest.raises(InputError, match="expected at most 4 MB of TOML, got more"):

@@ -51,7 +51,7 @@ def write_table(folder: Path, study: Study, entries: list[Entry], *, parquet: bo
             table.add(build_row(task, entry))
 
 
-def test_the_columns_are_those_of_the_study() -> None:
+def test_the_columns_depend_on_the_study() -> None:
     study = build_small_study(max_speed=[0.5, 1], controllers=("rpf", "rapf"), starts=("*",))
     assert [column.name for column in build_columns(study)] == [
         *("map", "controller", "robots", "start", "seed"),
@@ -65,13 +65,13 @@ def test_the_columns_are_those_of_the_study() -> None:
     assert "max_speed_m_s" not in [column.name for column in build_columns(build_small_study())]
 
 
-def test_a_gain_that_is_called_as_another_column_gets_a_name_of_its_own() -> None:
+def test_a_gain_with_the_name_of_a_column_gets_a_prefix() -> None:
     assert get_gain_column("k_rep") == "k_rep"
     assert get_gain_column("seed") == "gain_seed"
     assert get_gain_column("radius_m") == "gain_radius_m"
 
 
-def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
+def test_the_table_contains_every_figure_exactly(tmp_path: Path) -> None:
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     entries = [FIGURED, FAILED, FIGURED, FIGURED]
     write_table(tmp_path, study, entries)
@@ -97,7 +97,7 @@ def test_the_table_holds_every_figure_exactly(tmp_path: Path) -> None:
     assert rows[1]["attraction_limit"] is None, "repulsion alone has none"
 
 
-def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: Path) -> None:
+def test_names_that_look_like_formulas_are_escaped(tmp_path: Path) -> None:
     study = build_small_study()
     task = replace(next(iter(generate_tasks(study))), map="=1+1", start="-1")
     with Table(tmp_path, build_columns(study), study_json(study), parquet=True) as table:
@@ -113,7 +113,7 @@ def test_a_map_with_the_name_of_a_formula_is_no_formula_in_the_table(tmp_path: P
     assert parquet.read_table(tmp_path / "results.parquet").to_pylist()[0]["map"] == "=1+1"
 
 
-def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path) -> None:
+def test_parquet_has_the_same_rows_and_described_columns(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     write_table(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
@@ -130,7 +130,7 @@ def test_parquet_holds_the_same_and_its_columns_say_what_they_are(tmp_path: Path
     assert str(schema.field("contacts").type) == "int64"
 
 
-def test_the_same_rows_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_rows_give_equal_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     monkeypatch.setattr(table_module, "ROW_GROUP_SIZE", 3)
     study = build_small_study(seeds=range(5))
@@ -149,27 +149,27 @@ def no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_pyarrow")
-def test_without_pyarrow_there_is_csv_and_parquet_is_refused_before_the_work(
+def test_without_pyarrow_parquet_is_rejected_before_the_first_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = build_small_study()
     write_table(tmp_path, study, [FIGURED] * len(study))
     assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
-    wanted = 'pyarrow is not installed: pip install "robocov[parquet]"'
+    message = 'pyarrow is not installed: pip install "robocov[parquet]"'
     for dry in ([], ["--dry-run"]):
         assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
-        assert capsys.readouterr().err == f"robocov: error: {wanted}\n"
+        assert capsys.readouterr().err == f"robocov: error: {message}\n"
     before = read_tables(tmp_path)
     (tmp_path / "results.parquet").touch()  # of an earlier version, say: it would not be of these rows
     for asked in (True, False):
-        refused = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {wanted}"))
-        with refused, Table(tmp_path, build_columns(study), parquet=asked):
+        error = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {message}"))
+        with error, Table(tmp_path, build_columns(study), parquet=asked):
             pass
     assert read_tables(tmp_path) == [*before, b""]
     assert not list(tmp_path.glob(".*"))
 
 
-def test_parquet_that_is_there_is_kept_up_to_date(tmp_path: Path) -> None:
+def test_an_existing_parquet_file_is_updated(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     for study in (build_small_study(), build_small_study(seeds=range(5))):
         write_table(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
@@ -201,7 +201,7 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
 
 @pytest.mark.parametrize("finished", [True, False])
 @pytest.mark.parametrize(("complete", "rows"), [(True, 3), (False, 3), (False, 4)])
-def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_complete(
+def test_a_table_is_only_replaced_by_a_complete_or_longer_one(
     tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
     study = build_small_study()
@@ -222,7 +222,7 @@ def test_a_table_is_replaced_whole_and_never_by_a_shorter_one_that_is_not_comple
     assert not list(tmp_path.glob(".*"))
 
 
-def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_that_was_killed(
+def test_a_growing_table_replaces_that_of_a_killed_sweep_of_equal_length(
     tmp_path: Path,
 ) -> None:
     study = build_small_study()
@@ -238,14 +238,14 @@ def test_a_table_that_grows_appears_when_it_is_as_long_as_the_one_of_a_sweep_tha
 
 
 @pytest.mark.parametrize("name", ["results.csv", "results.parquet"])
-def test_what_is_no_file_is_not_replaced(tmp_path: Path, name: str) -> None:
+def test_folders_are_not_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).mkdir()
-    told = pytest.raises(OutputError, match=f"{name}: expected a file, got a folder")
-    with told, Table(tmp_path, build_columns(build_small_study()), parquet=True):
+    error = pytest.raises(OutputError, match=f"{name}: expected a file, got a folder")
+    with error, Table(tmp_path, build_columns(build_small_study()), parquet=True):
         pass
 
 
-def test_an_error_leaves_no_half_of_a_table(tmp_path: Path) -> None:
+def test_an_error_leaves_no_partial_table(tmp_path: Path) -> None:
     study = build_small_study()
     with pytest.raises(ZeroDivisionError), Table(tmp_path, build_columns(study)) as table:
         table.add(build_row(next(generate_tasks(study)), FIGURED))
@@ -271,7 +271,7 @@ class Full:
         return getattr(self._file, name)
 
 
-def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_no_partial_row(tmp_path: Path) -> None:
     study = build_small_study()
     row = build_row(next(generate_tasks(study)), FIGURED)
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
@@ -290,7 +290,7 @@ def test_a_full_disk_leaves_no_half_of_a_row(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("broken", ["write_table", "__exit__"])
-def test_a_full_disk_leaves_no_half_of_parquet(
+def test_a_full_disk_leaves_no_partial_parquet_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
     def fail_as_disk_is_full(*_: object, **__: object) -> None:
@@ -298,21 +298,21 @@ def test_a_full_disk_leaves_no_half_of_parquet(
 
     pq = pytest.importorskip("pyarrow.parquet")
     study = build_small_study()
-    told = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
-    with told, Table(tmp_path, build_columns(study), parquet=True) as table:
+    error = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
+    with error, Table(tmp_path, build_columns(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, fail_as_disk_is_full)
         table.add(build_row(next(generate_tasks(study)), FIGURED))
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
 
-def test_no_table_can_be_made_where_there_is_no_folder(tmp_path: Path) -> None:
-    told = pytest.raises(OutputError, match=r"results.csv: cannot be written")
-    with told, Table(tmp_path / "none", build_columns(build_small_study())):
+def test_a_table_in_a_missing_folder_is_rejected(tmp_path: Path) -> None:
+    error = pytest.raises(OutputError, match=r"results.csv: cannot be written")
+    with error, Table(tmp_path / "none", build_columns(build_small_study())):
         pass
 
 
-def test_columns_have_different_names_whatever_gains_are_called(tmp_path: Path) -> None:
+def test_columns_have_unique_names_for_any_gains(tmp_path: Path) -> None:
     (tmp_path / "odd.py").write_text(
         "from dataclasses import dataclass\n"
         "@dataclass(frozen=True)\n"

@@ -28,7 +28,7 @@ MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
     k_rep=st.lists(st.floats(0.0, 5.0), min_size=1, max_size=3, unique=True),
     controllers=st.permutations(["rapf", "rpf", "lloyd"]),
 )
-def test_tasks_come_in_the_order_of_the_table(
+def test_tasks_are_in_the_order_of_the_table(
     maps: int,
     robots: list[int],
     speeds: list[float],
@@ -46,11 +46,13 @@ def test_tasks_come_in_the_order_of_the_table(
         controllers=controllers,
         gains={"rpf": {"k_rep": k_rep}},
     )
-    laws = [(name, k) for name in controllers for k in (k_rep if name == "rpf" else [None])]
+    variants = [(name, k) for name in controllers for k in (k_rep if name == "rpf" else [None])]
     expected = [
-        (each.name, n, speed, start, seed, *law)
+        (each.name, n, speed, start, seed, *variant)
         for each in MAPS[:maps]
-        for n, speed, start, seed, law in product(robots, speeds, study.list_starts(each), seeds, laws)
+        for n, speed, start, seed, variant in product(
+            robots, speeds, study.list_starts(each), seeds, variants
+        )
     ]
     found = [
         (
@@ -69,7 +71,7 @@ def test_tasks_come_in_the_order_of_the_table(
     assert len({task.name for task in generate_tasks(study)}) == len(found)
 
 
-def test_every_controller_begins_in_the_same_places() -> None:
+def test_all_controllers_start_at_the_same_positions() -> None:
     study = build_small_study(
         controllers=("rapf", "rpf", "lloyd"), gains={"rapf": {"k_rep": [0.1, 1.0]}}, duration=0.0
     )
@@ -82,7 +84,7 @@ def test_every_controller_begins_in_the_same_places() -> None:
     assert starts[0] != starts[1]
 
 
-def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
+def test_a_task_is_self_contained(tmp_path: Path) -> None:
     study = build_small_study(controllers=(write_controller(tmp_path, ""),))
     (tmp_path / "mine.py").unlink()
     task = next(generate_tasks(study))
@@ -91,7 +93,7 @@ def test_a_task_carries_all_that_it_needs(tmp_path: Path) -> None:
     assert len(simulate(task)) == 11
 
 
-def test_the_same_inputs_have_the_same_hash_and_others_do_not(tmp_path: Path) -> None:
+def test_equal_inputs_have_equal_hashes_and_others_do_not(tmp_path: Path) -> None:
     tasks = {task.name: task for task in generate_tasks(build_small_study())}
     assert set(tasks) == {task.name for task in generate_tasks(build_small_study())}
     for changes in (
@@ -112,20 +114,18 @@ def test_the_same_inputs_have_the_same_hash_and_others_do_not(tmp_path: Path) ->
         assert not others & set(tasks), changes
 
 
-def test_the_text_of_a_controller_counts_and_where_it_is_does_not(tmp_path: Path) -> None:
+def test_the_hash_depends_on_the_source_of_a_controller_but_not_on_its_path(tmp_path: Path) -> None:
     names = []
-    for folder, law in (("a", ""), ("b", ""), ("c", "        # another one\n")):
+    for folder, code in (("a", ""), ("b", ""), ("c", "        # another one\n")):
         (tmp_path / folder).mkdir()
-        write_controller(tmp_path / folder, law)
+        write_controller(tmp_path / folder, code)
         study = build_small_study(controllers=("mine.py:Mine",), folder=tmp_path / folder)
         names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
 
 
-def test_the_text_of_what_a_controller_imports_counts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_hash_depends_on_imported_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "part_of_mine.py").write_text("import rest_of_mine\n")
     name = write_controller(tmp_path, "        import part_of_mine\n")
@@ -136,27 +136,27 @@ def test_the_text_of_what_a_controller_imports_counts(
         names.append([task.name for task in generate_tasks(study)])
     assert names[0] == names[1]
     assert not set(names[0]) & set(names[2])
-    (said,) = study.to_json()["controllers"]
-    assert said["modules"] == {"part_of_mine": "import rest_of_mine\n", "rest_of_mine": "PULL = 2.0\n"}
+    (controller,) = study.to_json()["controllers"]
+    assert controller["modules"] == {"part_of_mine": "import rest_of_mine\n", "rest_of_mine": "PULL = 2.0\n"}
 
 
-def test_a_default_that_is_stated_is_the_same_run() -> None:
-    said = build_small_study(gains={"rapf": {"k_rep": 0.3}})
-    assert [task.name for task in generate_tasks(said)] == [
+def test_explicit_defaults_do_not_change_a_task() -> None:
+    study = build_small_study(gains={"rapf": {"k_rep": 0.3}})
+    assert [task.name for task in generate_tasks(study)] == [
         task.name for task in generate_tasks(build_small_study())
     ]
 
 
-def test_names_of_folders_are_fit_for_any_system() -> None:
-    odd = StudyMap("Büro/2: *?<>|" + "x" * 60, ROOM)
-    for task in generate_tasks(build_small_study(maps=(odd,))):
+def test_names_of_tasks_are_portable_folder_names() -> None:
+    unusual_map = StudyMap("Büro/2: *?<>|" + "x" * 60, ROOM)
+    for task in generate_tasks(build_small_study(maps=(unusual_map,))):
         assert task.name.isascii()
         assert not set(task.name) & set('/\\:*?"<>| ')
         assert len(task.name) < 120
         assert task.name.endswith(task.input_hash[:10])
 
 
-def test_a_bundled_map_is_carried_whole() -> None:
+def test_a_task_contains_its_bundled_map() -> None:
     rooms = load_map("rooms")
     (task, *_) = generate_tasks(build_small_study(maps=(StudyMap("rooms", rooms),)))
     assert '"corridor"' in task.document
