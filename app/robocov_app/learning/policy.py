@@ -240,12 +240,12 @@ class ControllerPolicy:
         dict or (n, 2) array, N or m/s
             Actions by agent for a parallel environment; otherwise an array.
         """
-        bare = env.unwrapped
-        actions = self._update_actions(bare.episode).copy()
-        if not hasattr(bare, "agents"):
+        unwrapped = env.unwrapped
+        actions = self._update_actions(unwrapped.episode).copy()
+        if not hasattr(unwrapped, "agents"):
             return actions
-        by_agent = dict(zip(bare.possible_agents, actions, strict=True))
-        return {agent: by_agent[agent] for agent in bare.agents}
+        actions_by_agent = dict(zip(unwrapped.possible_agents, actions, strict=True))
+        return {agent: actions_by_agent[agent] for agent in unwrapped.agents}
 
     def _update_actions(self, episode: Episode) -> FloatArray:
         """Return the actions of the current decision; ask the controller if it has not decided yet."""

@@ -203,7 +203,7 @@ def change_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Covera
     known = [attribute.name for attribute in fields(CoverageTask)]
     for name in changes:
         if name not in known:
-            raise ParameterError(describe_unknown_name("part of a task", name, known))
+            raise ParameterError(describe_unknown_name("attribute of a task", name, known))
     new_values = dict(changes)
     if "robots" in changes:
         new_values.setdefault("team", None)

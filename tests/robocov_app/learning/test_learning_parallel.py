@@ -162,5 +162,5 @@ def test_invalid_actions_and_options_are_rejected(empty: Environment) -> None:
             env.step({"robot_1": invalid})
     with pytest.raises(ParameterError, match="max_cycles: expected a whole number of at least 1, got 0"):
         build_environment(empty, max_cycles=0)
-    with pytest.raises(ParameterError, match="unknown part of a task 'map': did you mean 'maps'"):
+    with pytest.raises(ParameterError, match="unknown attribute of a task 'map': did you mean 'maps'"):
         CoverageParallelEnv(map="rooms")

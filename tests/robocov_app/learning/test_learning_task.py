@@ -58,5 +58,5 @@ def test_invalid_values_are_rejected(values: dict[str, Any], message: str) -> No
 
 
 def test_unknown_names_of_values_are_rejected() -> None:
-    with pytest.raises(ParameterError, match="unknown part of a task 'robot': did you mean 'robots'"):
+    with pytest.raises(ParameterError, match="unknown attribute of a task 'robot': did you mean 'robots'"):
         change_task(None, {"robot": 6})

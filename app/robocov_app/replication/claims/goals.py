@@ -126,26 +126,28 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     ]
     for other in select_strongest(contenders):
         pairs = outcomes.compare(key, other.key)
-        if pairs is None:
-            continue
-        own_medians = pairs.outcomes.compute_medians_by_map(key, "final")
-        other_medians = pairs.outcomes.compute_medians_by_map(other.key, "final")
-        ratios = {name: own_medians[name] / other_medians[name] for name in own_medians}
-        margin = format_amount(NEVER_WORSE - 1.0, "%")
-        goals.append(
-            _build_goal(
-                f"not-worse-{other.key}",
-                f"On no map {label}'s median is more than {margin} above that of {other.label}.",
-                Criterion(
-                    f"highest ratio of a map's medians to {other.label}",
-                    estimate_worst_ratio(pairs),
-                    high=NEVER_WORSE,
-                ),
-                _describe_highest(ratios, NEVER_WORSE),
-                finished,
-            )
-        )
+        if pairs is not None:
+            goals.append(_judge_comparison(pairs, own, other, finished))
     return goals
+
+
+def _judge_comparison(pairs: PairedComparison, own: Contender, other: Contender, finished: Outcomes) -> Claim:
+    """Judge whether a contender is on no map much worse than another one."""
+    own_medians = pairs.outcomes.compute_medians_by_map(own.key, "final")
+    other_medians = pairs.outcomes.compute_medians_by_map(other.key, "final")
+    ratios = {name: own_medians[name] / other_medians[name] for name in own_medians}
+    margin = format_amount(NEVER_WORSE - 1.0, "%")
+    return _build_goal(
+        f"not-worse-{other.key}",
+        f"On no map {own.label}'s median is more than {margin} above that of {other.label}.",
+        Criterion(
+            f"highest ratio of a map's medians to {other.label}",
+            estimate_worst_ratio(pairs),
+            high=NEVER_WORSE,
+        ),
+        _describe_highest(ratios, NEVER_WORSE),
+        finished,
+    )
 
 
 def _judge_rest_goals(finished: Outcomes, own: Contender, plan: Plan) -> list[Claim]:

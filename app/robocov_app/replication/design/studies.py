@@ -307,19 +307,26 @@ def build_beyond_contests(
 def _build_density_contests(plan: Plan) -> dict[str, Contest]:
     """Build the sweeps of RAPF with and without knowledge of the density, and those for the figure."""
     hospital = load_map(DENSITY_MAP)
-    weighted = (build_density_maps(plan), hospital)
-    plain = (build_generated_maps(plan.beyond.maps), replace(hospital, density=None))
+    # Maps of the sweep and map of the figure, by the suffix of their names.
+    variants = {
+        "": (build_density_maps(plan), hospital),
+        "-ignored": (build_generated_maps(plan.beyond.maps), replace(hospital, density=None)),
+    }
     contests = {}
-    for suffix, (maps, pictured) in (("", weighted), ("-ignored", plain)):
+    for suffix, (maps, figure_map) in variants.items():
         contests[f"density{suffix}"] = build_contest(
-            plan, maps, (RAPF_DEFAULT,), plan.beyond.map_starts, (0,)
+            plan,
+            maps,
+            participants=(RAPF_DEFAULT,),
+            starts=plan.beyond.map_starts,
+            seeds=(0,),
         )
         contests[f"density-picture{suffix}"] = build_contest(
             plan,
-            (StudyMap(DENSITY_MAP, pictured),),
-            (RAPF_DEFAULT,),
-            (DENSITY_START,),
-            (0,),
+            (StudyMap(DENSITY_MAP, figure_map),),
+            participants=(RAPF_DEFAULT,),
+            starts=(DENSITY_START,),
+            seeds=(0,),
             record_hz=5.0,
         )
     return contests

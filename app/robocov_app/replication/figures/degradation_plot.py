@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from robocov.errors import format_count
+from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.colors import mix
@@ -124,7 +125,7 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
 
 
 def _draw_curve(
-    axes: Axes, x: np.ndarray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
+    axes: Axes, x: FloatArray, degradations: Sequence[Degradation], style: CurveStyle, theme: Theme
 ) -> None:
     """Draw the median ratios of a controller, with error bars for their confidence intervals."""
     color = to_plot_color(style.get_color(theme))

@@ -109,15 +109,15 @@ def build_parameter_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     for number, parameter in enumerate(_list_team_parameters(result)):
         if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
             plots.append(_build_plot(parameter, groups, styles, map_axis, key=f"{key}-team-{number}"))
-    grid_number = 1
+    grid_plots: list[PagePlot] = []
     for group in groups:
         group_gains = [gains[name] for name, names in varying_gains.items() if group.controller in names]
         for first, second in combinations(group_gains, 2):
-            plot = _build_grid_plot(group, first, second, axis, key=f"{key}-grid-{grid_number}")
+            grid_key = f"{key}-grid-{len(grid_plots) + 1}"
+            plot = _build_grid_plot(group, first, second, axis, key=grid_key)
             if plot is not None:
-                grid_number += 1
-                plots.append(plot)
-    return [plot for plot in plots if plot is not None]
+                grid_plots.append(plot)
+    return [plot for plot in plots if plot is not None] + grid_plots
 
 
 def _choose_axis(

@@ -206,7 +206,8 @@ class Study:
         if not self.group:
             return
         size = len(build_team(list(self.group), ("team", "group")))
-        if self.robots not in (Study.robots, (size,)):
+        is_default = self.robots == Study.robots
+        if not is_default and self.robots != (size,):
             raise ParameterError(
                 f"robots: expected {size} as in the groups of the team, got {list(self.robots)}"
             )

@@ -280,9 +280,9 @@ def _find_island_cells(islands: NDArray[np.integer], chosen: IntArray, grid: Cel
     windows = ndimage.find_objects(islands)
     cells = []
     for island in chosen.tolist():
-        window = windows[island]
-        row, column = np.argwhere(islands[window] == island + 1)[0]
-        cells.append((column + window[1].start, row + window[0].start))
+        rows, columns = windows[island]
+        row, column = np.argwhere(islands[rows, columns] == island + 1)[0]
+        cells.append((column + columns.start, row + rows.start))
     return (np.array(cells, dtype=float).reshape(-1, 2) + 0.5) * grid.cell + grid.origin
 
 
