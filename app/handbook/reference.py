@@ -42,7 +42,11 @@ from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 if TYPE_CHECKING:
+    from docutils import nodes
+    from docutils.nodes import TextElement
+    from sphinx.addnodes import pending_xref
     from sphinx.application import Sphinx
+    from sphinx.environment import BuildEnvironment
 
 ARRAY_TYPES = ("FloatArray", "IntArray", "BoolArray", "Float32Array", "Int32Array", "AnyArray")
 """Types of arrays in signatures; names of ``robocov.typing``."""
@@ -78,6 +82,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register this module as a Sphinx extension, which writes the pages before sources are read."""
     app.connect("builder-inited", write_pages)
     app.connect("autodoc-process-signature", replace_signature)
+    app.connect("missing-reference", find_public_name)
     return {"parallel_read_safe": True}
 
 
@@ -119,6 +124,21 @@ def replace_signature(
     # Sphinx parses signatures as Python, in which the default of a field with a factory is no expression.
     text = parameters.replace("<factory>", "...").replace(ARRAY_LIKE, "ArrayLike")
     return None if text == parameters else (text, result)
+
+
+def find_public_name(
+    app: Sphinx, env: BuildEnvironment, node: pending_xref, content: TextElement
+) -> nodes.reference | None:
+    """Return a link to a name that another module mentions without its package, as in ``make_controller``."""
+    if node.get("refdomain") != "py":
+        return None
+    for package in ("robocov", "robocov_app.learning"):
+        link = env.domains.python_domain.resolve_xref(
+            env, node["refdoc"], app.builder, node["reftype"], f"{package}.{node['reftarget']}", node, content
+        )
+        if link is not None:
+            return link
+    return None
 
 
 # Commands and keys

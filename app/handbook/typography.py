@@ -1,4 +1,4 @@
-"""Line breaks: numbers stay next to their units, and options such as ``--radius`` in one piece."""
+"""Line breaks: numbers stay next to their units, and ranges and options such as ``--radius`` in one piece."""
 
 from __future__ import annotations
 
@@ -12,27 +12,9 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
-UNITS = (
-    "m",
-    "cm",
-    "mm",
-    "µm",
-    "m/s",
-    "m/s²",
-    "m²",
-    "m³",
-    "s",
-    "ms",
-    "kg",
-    "N",
-    "Hz",
-    "kB",
-    "MB",
-    "MiB",
-    "GB",
-    "J",
-)
-SPACE_BEFORE_UNIT = re.compile(rf"(?<=\d) (?=(?:{'|'.join(map(re.escape, UNITS))})(?![\w/²³]))")
+UNITS = r"[cmµ]?m|m[²³]|m/s²?|m?s|kg|N|J|Hz|[kMG]B|MiB"
+SPACE_BEFORE_UNIT = re.compile(rf"(?<=\d) (?=(?:{UNITS})(?![\w/²³]))")
+SPACE_IN_RANGE = re.compile(r"(?<=\d) to (?=\d)")
 MAX_UNBROKEN_CHARS = 32
 """A line of a phone has space for about 40 characters of code."""
 
@@ -53,10 +35,16 @@ class LineBreaks(SphinxPostTransform):
         """Change the tree of one page."""
         for text in list(self.document.findall(nodes.Text)):
             if not is_code(text):
-                text.parent.replace(text, nodes.Text(SPACE_BEFORE_UNIT.sub(NO_BREAK_SPACE, text.astext())))
+                text.parent.replace(text, nodes.Text(prevent_breaks(text.astext())))
         for literal in self.document.findall(nodes.literal):
             if max(map(len, literal.astext().split()), default=0) <= MAX_UNBROKEN_CHARS:
                 literal["classes"].append("unbroken")
+
+
+def prevent_breaks(text: str) -> str:
+    """Replace the spaces before units and within ranges of numbers by spaces that do not break."""
+    text = SPACE_BEFORE_UNIT.sub(NO_BREAK_SPACE, text)
+    return SPACE_IN_RANGE.sub(f"{NO_BREAK_SPACE}to{NO_BREAK_SPACE}", text)
 
 
 def is_code(text: nodes.Text) -> bool:

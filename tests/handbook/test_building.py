@@ -17,11 +17,14 @@ from robocov_app.commands import handbook
 
 
 @pytest.mark.skipif(not HAS_SPHINX, reason="needs robocov[docs]")
-def test_lines_do_not_break_before_a_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lines_do_not_break_before_a_unit_or_within_a_range(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(handbook.find_page_sources())
-    pattern = import_module("typography").SPACE_BEFORE_UNIT
-    text = "moves 5 cm within 4 s, at 1 m/s; 3 maps, 2 more"
-    assert pattern.sub("~", text) == "moves 5~cm within 4~s, at 1~m/s; 3 maps, 2 more"
+    text = import_module("typography").prevent_breaks(
+        "5 cm within 4 s, at 1 m/s; 3 maps, 2 to 4 more, up to 9"
+    )
+    assert (
+        text.replace("\N{NO-BREAK SPACE}", "~") == "5~cm within 4~s, at 1~m/s; 3 maps, 2~to~4 more, up to 9"
+    )
 
 
 def test_without_sphinx_the_error_says_what_to_install(
