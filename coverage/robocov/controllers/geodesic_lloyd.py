@@ -18,13 +18,13 @@ from robocov.controllers.base import is_plan_due
 from robocov.controllers.driving import compute_approach_velocities, compute_drive_forces
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_map import WholeMapController, build_configuration_space
-from robocov.cost import CoverageCost
+from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment, PolygonObstacle, find_nearest_inside
 from robocov.geodesic import Geodesics
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.team import Team
-from robocov.typing import FloatArray
+from robocov.typing import FloatArray, IntArray
 
 _MIN_FIRST_LENGTH_FRACTION = 0.25
 """Minimum distance to a first waypoint, as a fraction of the spacing of sites: a site at the position of a
@@ -118,6 +118,19 @@ class GeodesicLloyd(WholeMapController):
         return _build_cached_planner(self.get_environment(), clearance, int(self.lattice), team.min_radius)
 
 
+class _CellSites(NamedTuple):
+    """The s sites in the geodesic cells of some robots."""
+
+    owners: IntArray
+    """(s,) The robot whose cell contains each site."""
+    first_waypoints: FloatArray
+    """(s, 2) m, the first waypoint of the path from the robot to the site."""
+    distances: FloatArray
+    """(s,) m, the length of that path."""
+    densities: FloatArray | None
+    """(s,) The density at each site, or None if it is uniform."""
+
+
 class GeodesicPlanner:
     """Planner of goals and shortest paths on a known map. Immutable.
 
@@ -169,12 +182,9 @@ class GeodesicPlanner:
         """
         positions = find_nearest_inside(self.configuration_space, seen.positions)
         if seen.neighbors.is_complete:
-            goals = self._compute_goals(positions, exponent)
+            goals = self._compute_shared_goals(positions, exponent)
         else:
-            goals = np.empty_like(positions)
-            for i in range(len(positions)):
-                neighbors = find_nearest_inside(self.configuration_space, seen.get_neighbor_positions(i))
-                goals[i] = self._compute_goals(np.vstack([positions[i], neighbors]), exponent)[0]
+            goals = self._compute_individual_goals(seen, positions, exponent)
         waypoints = goals.copy()
         remaining_lengths = np.zeros(len(goals))
         lines = shapely.linestrings(np.stack([positions, goals], axis=1))
@@ -190,30 +200,73 @@ class GeodesicPlanner:
             remaining_lengths[i] = np.hypot(*np.diff(path[1:], axis=0).T).sum()
         return GeodesicPlan(goals=goals, waypoints=waypoints, remaining_lengths=remaining_lengths)
 
-    def _compute_goals(self, positions: FloatArray, exponent: float) -> FloatArray:
+    def _compute_shared_goals(self, positions: FloatArray, exponent: float) -> FloatArray:
+        """Return the goals, (n, 2) m, of robots at (n, 2) positions that all know each other."""
+        result = self.cost(positions)
+        sites = np.flatnonzero(result.owners >= 0)
+        cells = _select_sites(result, sites, result.owners[sites])
+        return self._compute_goals(positions, cells, exponent)
+
+    def _compute_individual_goals(
+        self, seen: Observations, positions: FloatArray, exponent: float
+    ) -> FloatArray:
+        """Return the goals, (n, 2) m, of robots at (n, 2) positions that each know some of the others.
+
+        The distances of all sites from a position do not depend on other robots. They are therefore computed
+        only once for all robots that know the position. Each robot uses those of its own position and of the
+        positions that it has received.
+        """
+        n = len(positions)
+        received_positions = [seen.get_neighbor_positions(i) for i in range(n)]
+        neighbor_positions = find_nearest_inside(self.configuration_space, np.vstack(received_positions))
+        all_positions = np.vstack([positions, neighbor_positions])
+        unique_positions, rows = np.unique(all_positions, axis=0, return_inverse=True)
+        results = self.cost.evaluate_teams(unique_positions[:, None])
+        distances = np.array([result.distances for result in results])
+        own_rows = rows[:n]
+        neighbor_ends = np.cumsum([len(received) for received in received_positions])
+        neighbor_rows = np.split(rows[n:], neighbor_ends[:-1])
+        goals = np.empty_like(positions)
+        for i in range(n):
+            own_distances = distances[own_rows[i]]
+            # A site at the same distance from another robot belongs to both cells.
+            limits = distances[neighbor_rows[i]].min(axis=0, initial=np.inf)
+            sites = np.flatnonzero((own_distances <= limits) & np.isfinite(own_distances))
+            cells = _select_sites(results[own_rows[i]], sites, np.zeros(len(sites), dtype=np.int64))
+            goals[i] = self._compute_goals(positions[i : i + 1], cells, exponent)[0]
+        return goals
+
+    def _compute_goals(self, positions: FloatArray, cells: _CellSites, exponent: float) -> FloatArray:
         """Return the goals, (k, 2) m, of robots at (k, 2) positions, from their geodesic cells.
 
         They are weighted means of first waypoints; see the notes of `GeodesicLloyd`.
         """
-        result = self.cost(positions)
-        sites = np.flatnonzero(result.owners >= 0)
-        owner = result.owners[sites]
-        first_waypoints = result.first_waypoints[sites]
-        distances = result.distances[sites]
-        first_lengths = np.hypot(*(first_waypoints - positions[owner]).T)
+        owners = cells.owners
+        first_waypoints = cells.first_waypoints
+        first_lengths = np.hypot(*(first_waypoints - positions[owners]).T)
         first_lengths = np.maximum(first_lengths, _MIN_FIRST_LENGTH_FRACTION * self.cost.spacing)
         # The weight d^(s-1) / |c - p| of each first waypoint c.
-        weights = np.maximum(distances, first_lengths) ** (exponent - 1.0) / first_lengths
-        if result.weights is not None:
-            weights *= result.weights[sites]
+        weights = np.maximum(cells.distances, first_lengths) ** (exponent - 1.0) / first_lengths
+        if cells.densities is not None:
+            weights *= cells.densities
         n = len(positions)
-        total = np.bincount(owner, weights, minlength=n)
-        x = np.bincount(owner, weights * first_waypoints[:, 0], minlength=n)
-        y = np.bincount(owner, weights * first_waypoints[:, 1], minlength=n)
+        total = np.bincount(owners, weights, minlength=n)
+        x = np.bincount(owners, weights * first_waypoints[:, 0], minlength=n)
+        y = np.bincount(owners, weights * first_waypoints[:, 1], minlength=n)
         has_cell = total > 0.0
         means = np.column_stack([x, y]) / np.where(has_cell, total, 1.0)[:, None]
         goals = np.where(has_cell[:, None], means, positions)
         return find_nearest_inside(self.configuration_space, goals)
+
+
+def _select_sites(result: CoverageResult, sites: IntArray, owners: IntArray) -> _CellSites:
+    """Return the sites with the given indices, (s,), of which each is in the cell of a robot, (s,)."""
+    return _CellSites(
+        owners=owners,
+        first_waypoints=result.first_waypoints[sites],
+        distances=result.distances[sites],
+        densities=None if result.weights is None else result.weights[sites],
+    )
 
 
 def _build_obstacle(polygon: Polygon) -> PolygonObstacle:

@@ -60,6 +60,24 @@ def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, expon
     assert costs[-1] < costs[0]
 
 
+def test_each_robot_divides_the_map_only_among_the_robots_that_it_hears() -> None:
+    rooms = load_map("rooms")
+    planner = GeodesicPlanner(rooms, 0.13, 32, radius=0.1)
+    positions = find_nearest_inside(planner.configuration_space, rooms.start("uniform").sample(5, seed=3))
+    heard_robots = ((1, 2), (0,), (), (2, 4), (0, 1, 2, 3))
+    neighbors = Neighbors(
+        5,
+        indptr=np.cumsum([0, *map(len, heard_robots)]),
+        indices=np.concatenate([np.array(heard, dtype=np.int64) for heard in heard_robots]),
+    )
+    seen = replace(observe(positions, rooms.region), neighbors=neighbors)
+    goals = planner.plan(seen, 2.0).goals
+    for i, heard in enumerate(heard_robots):
+        known_positions = positions[[i, *heard]]
+        expected = planner.plan(observe(known_positions, rooms.region), 2.0).goals[0]
+        assert goals[i].tolist() == expected.tolist()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rooms", "trap", "museum"])
 def test_the_final_cost_is_lower_than_that_of_lloyd(name: str) -> None:

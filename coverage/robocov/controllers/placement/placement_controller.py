@@ -94,7 +94,10 @@ class PlacementMap:
         return np.asarray(is_inside.argmax(axis=1))
 
     def find_nearest_candidates(self, positions: FloatArray, components: IntArray) -> IntArray:
-        """Find the nearest candidate to each position, without using any candidate twice.
+        """Find the candidate nearest to each position in a straight line, without using any candidate twice.
+
+        A wall may stand between a position and its candidate. Candidates only start a search, and most
+        positions are previous goals, which are candidates themselves.
 
         Parameters
         ----------
