@@ -29,6 +29,8 @@ from robocov.typing import FloatArray
 
 _WEIGHT_DECIMALS = 6
 """Decimal places of the weights that are read from an image. They keep the file short if the map is saved."""
+_BLANK_BYTES = b"\xef\xbb\xbf \t\r\n"
+"""A byte order mark and blanks, which may precede the content of a JSON file."""
 
 
 def load_map(source: str | Path) -> Environment:
@@ -63,7 +65,13 @@ def load_map(source: str | Path) -> Environment:
     'Rooms'
     """
     path = find_map_file(source)
-    return parse_map(read_bytes(path), str(path), path.parent)
+    content = read_bytes(path)
+    if path.suffix.lower() != ".json" and not content.lstrip(_BLANK_BYTES).startswith(b"{"):
+        raise MapError(
+            f"{to_one_line(str(path))}: expected a map of robocov, got a file of another kind. "
+            "Convert it with `robocov import`."
+        )
+    return parse_map(content, str(path), path.parent)
 
 
 def find_map_file(source: str | Path) -> Path:

@@ -329,6 +329,14 @@ def test_files_that_cannot_be_read_are_reported(tmp_path: Path, monkeypatch: pyt
         load_map(large)
 
 
+@pytest.mark.parametrize("content", [b"image: office.pgm\n", b"P5\n1 1\n255\n\xcd"])
+def test_for_a_file_of_another_kind_the_message_names_the_import(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "office.yaml"
+    path.write_bytes(content)
+    with pytest.raises(MapError, match=r"office\.yaml: expected a map of robocov, .* `robocov import`\."):
+        load_map(path)
+
+
 def test_bundled_maps_are_loaded_by_name() -> None:
     assert load_map("rooms") == load_map(list_bundled_maps()["rooms"])
     with pytest.raises(MapError, match=r"unknown map 'roms': did you mean 'rooms'\? \(known: .*rooms"):

@@ -284,6 +284,27 @@ def test_the_first_issue_is_reported_with_the_number_of_others(folder: Path) -> 
         read_study(write_study(folder, text))
 
 
+def test_a_pattern_selects_map_files_in_alphabetical_order(folder: Path) -> None:
+    (folder / "maps").mkdir()
+    for name in ("b", "c", "a"):
+        save_map(HALL, folder / f"maps/{name}.json")
+    (folder / "maps/readme.txt").write_text("no map")
+    study = read_study(write_study(folder, 'maps = ["maps/*.json", "rooms"]\ncontrollers = ["rapf"]\n'))
+    assert [each.name for each in study.maps] == ["a", "b", "c", "rooms"]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "expected"),
+    [
+        ("maps/*.json", r"maps\[0\]: no file matches 'maps/\*.json'"),
+        ("/maps/*.json", r"maps\[0\]: expected a pattern relative to the study file, got '/maps/\*.json'"),
+    ],
+)
+def test_a_pattern_without_files_is_rejected(folder: Path, pattern: str, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        read_study(write_study(folder, f'maps = ["{pattern}"]\ncontrollers = ["rapf"]\n'))
+
+
 def test_maps_with_equal_names_are_rejected(folder: Path) -> None:
     save_map(HALL, folder / "rooms.json")
     text = 'maps = ["rooms", "rooms.json"]\ncontrollers = ["rapf"]\n'

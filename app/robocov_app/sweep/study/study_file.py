@@ -170,7 +170,8 @@ _STUDY = _TableSchema(
     "a table",
     {
         "maps": _Key(
-            'Names of bundled maps, or paths relative to this file; `"*"` for all bundled maps',
+            'Names of bundled maps, or paths and patterns such as `"maps/*.json"` relative to this file; '
+            '`"*"` for all bundled maps',
             _accept_list("a list of names of maps, or of paths relative to this file", _TEXT),
         ),
         "controllers": _Key(
@@ -394,7 +395,7 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
     Parameters
     ----------
     entries : list of str
-        Names of bundled maps, and paths of map files relative to the folder; or `ALL_MAPS` alone.
+        Names of bundled maps, and paths or patterns of map files relative to the folder; or `ALL_MAPS` alone.
     folder : Path
         Folder of the study file.
     """
@@ -405,18 +406,46 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
     maps: dict[str, StudyMap] = {}
     for k, entry in enumerate(entries):
         try:
-            if entry in bundled:
-                name = entry
-                path = bundled[entry]
-            elif entry.endswith(".json"):
-                path = folder / entry
-                name = path.stem
-            else:
-                raise InputError(describe_unknown_name("map", entry, bundled))
-            environment = load_map(path)
+            files = _find_map_files(entry, folder, bundled)
+            found_maps = [StudyMap(name, load_map(path)) for name, path in files]
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
-        if name in maps:
-            raise InputError(f"maps[{k}]: expected maps with different names, got a second {quote(name)}")
-        maps[name] = StudyMap(name, environment)
+        for found in found_maps:
+            if found.name in maps:
+                raise InputError(
+                    f"maps[{k}]: expected maps with different names, got a second {quote(found.name)}"
+                )
+            maps[found.name] = found
     return list(maps.values())
+
+
+def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> list[tuple[str, Path]]:
+    """Return the name and the path of each map that an entry of a study stands for.
+
+    Parameters
+    ----------
+    entry : str
+        Name of a bundled map, or path or pattern of map files relative to the folder.
+    folder : Path
+        Folder of the study file.
+    bundled : Mapping of str to Path
+        Files of the bundled maps by name.
+
+    Raises
+    ------
+    InputError
+        If there is no bundled map of this name, no file matches the pattern, or the pattern is absolute.
+    """
+    if entry in bundled:
+        return [(entry, bundled[entry])]
+    if not entry.endswith(".json"):
+        raise InputError(describe_unknown_name("map", entry, bundled))
+    path = folder / entry
+    if "*" not in entry or path.is_file():
+        return [(path.stem, path)]
+    if Path(entry).is_absolute():
+        raise InputError(f"expected a pattern relative to the study file, got {quote(entry)}")
+    paths = sorted(folder.glob(entry))
+    if not paths:
+        raise InputError(f"no file matches {quote(entry)}")
+    return [(path.stem, path) for path in paths]
