@@ -81,6 +81,9 @@ def make_files_of_other_pages(page: Path) -> None:
     elif page.stem == "benchmark":
         controller = find_code(read_handbook_page("own-controller"), "python", "# mine.py\n")
         Path("mine.py").write_text(controller)
+    elif page.stem == "real-maps":
+        Path("downloads").mkdir()
+        Path("maps").mkdir()
     elif page.stem == "maps":
         Path("museum.zip").write_bytes(build_imdf_zip(IMDF))
 
