@@ -3,6 +3,8 @@
 Only the module of the called subcommand is imported, so that help appears at once.
 """
 
+import atexit
+import gc
 import importlib
 import io
 import os
@@ -64,6 +66,9 @@ def main(arguments: list[str] | None = None) -> int:
         The exit status.
     """
     _prepare_output()
+    if arguments is None:
+        # The operating system frees the memory of a process; collecting garbage at exit can take two seconds.
+        atexit.register(gc.freeze)
     words = sys.argv[1:] if arguments is None else arguments
     if not words:
         print(_FIRST_STEPS if sys.stdout.isatty() else _format_overview())

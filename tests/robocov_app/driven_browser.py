@@ -3,7 +3,7 @@
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 DRIVER = shutil.which("chromedriver")
 MAX_WAIT_S = 20.0
 POLL_INTERVAL_S = 0.03
+TOUCH_INTERVAL_S = 0.05
 MAX_PHONE_WIDTH_PX = 500
 ARGUMENTS = (
     "headless=new",
@@ -99,6 +100,34 @@ class Browser:
         from selenium.webdriver import ActionChains
 
         ActionChains(self.driver).send_keys(*keys).perform()
+
+    def drag(self, *points: tuple[float, float], modifiers: int = 0) -> None:
+        """Drag with the left button through points; a single point is clicked."""
+        event: dict[str, object] = {"button": "left", "clickCount": 1, "modifiers": modifiers}
+        for number, (x, y) in enumerate(points):
+            event |= {"type": "mouseMoved" if number else "mousePressed", "x": x, "y": y, "buttons": 1}
+            self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+            time.sleep(POLL_INTERVAL_S)
+        event |= {"type": "mouseReleased", "buttons": 0}
+        self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+
+    def touch(self, *steps: Sequence[tuple[float, float]]) -> None:
+        """Move fingers through steps, each of which has one point for each finger."""
+        for number, points in enumerate(steps):
+            touches = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(points)]
+            event = {"type": "touchMove" if number else "touchStart", "touchPoints": touches}
+            self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+            time.sleep(TOUCH_INTERVAL_S)
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    def measure(self, selector: str) -> tuple[float, float, float, float]:
+        """Return left, top, width and height of the first element that matches a selector, CSS px."""
+        script = (
+            "const box = document.querySelector(arguments[0]).getBoundingClientRect();"
+            "return [box.left, box.top, box.width, box.height]"
+        )
+        left, top, width, height = self.run_script(script, selector)
+        return left, top, width, height
 
     def wait_until(self, condition: Callable[[], object]) -> None:
         """Wait until a condition is true."""

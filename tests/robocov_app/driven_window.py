@@ -206,19 +206,19 @@ class Driver:
     def get_widget(self, kind: str, name: str) -> Widget:
         """Return a widget; if it is in the closed section or out of sight, first open that or scroll."""
         self.window.draw()
-        found = self.find_widget(kind, name)
+        widget = self.find_widget(kind, name)
         advanced = self.find_widget("section", "section:advanced")
-        if found is None and advanced is not None and not advanced.value:
+        if widget is None and advanced is not None and not advanced.value:
             self.scroll_to(advanced)
             self.click(*self.find_rect("section", "section:advanced").center)
-            found = self.find_widget(kind, name)
-        assert found is not None, f"no {kind} {name}"
-        return self.scroll_to(found)
+            widget = self.find_widget(kind, name)
+        assert widget is not None, f"no {kind} {name}"
+        return self.scroll_to(widget)
 
     def find_rect(self, kind: str, name: str) -> pygame.Rect:
-        found = self.find_widget(kind, name)
-        assert found is not None, f"no {kind} {name}"
-        return found.rect
+        widget = self.find_widget(kind, name)
+        assert widget is not None, f"no {kind} {name}"
+        return widget.rect
 
     def scroll_to(self, widget: Widget) -> Widget:
         """Scroll the panel down until a widget is visible, and return the widget as it is then."""
@@ -235,9 +235,9 @@ class Driver:
 
     def find_widget(self, kind: str, name: str) -> Widget | None:
         for part in self.window.parts:
-            found = part.ui.find(kind, name)
-            if found is not None and not part.hidden:
-                return found
+            widget = part.ui.find(kind, name)
+            if widget is not None and not part.hidden:
+                return widget
         return None
 
     def push_button(self, name: str) -> None:
@@ -258,15 +258,15 @@ class Driver:
     def choose_option(self, menu: str, option: str) -> None:
         """Open a menu of the panel, scroll to an option, and choose it."""
         self.click(*self.get_widget("menu", menu).rect.center)
-        found = self.window.panel.ui.open_list
-        assert found is not None
-        assert option in found.options, f"no {option} in {menu}"
-        item = found.get_item_rect(found.options.index(option))
+        open_list = self.window.panel.ui.open_list
+        assert open_list is not None
+        assert option in open_list.options, f"no {option} in {menu}"
+        item = open_list.get_item_rect(open_list.options.index(option))
         for _ in range(100):
-            if found.rect.contains(item):
+            if open_list.rect.contains(item):
                 break
-            self.turn_wheel(*found.rect.center, 1 if item.top < found.rect.top else -1)
-            item = found.get_item_rect(found.options.index(option))
+            self.turn_wheel(*open_list.rect.center, 1 if item.top < open_list.rect.top else -1)
+            item = open_list.get_item_rect(open_list.options.index(option))
         self.click(*item.center)
 
     def type_into(self, field: str, text: str) -> None:

@@ -1,4 +1,5 @@
 import contextlib
+import gc
 import io
 import json
 import re
@@ -40,6 +41,14 @@ def test_the_help_of_every_command_has_an_example(name: str, capsys: pytest.Capt
 def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"robocov {robocov.__version__}\n"
+
+
+def test_the_process_of_a_command_collects_no_garbage_at_exit(monkeypatch: pytest.MonkeyPatch) -> None:
+    functions_at_exit: list[object] = []
+    monkeypatch.setattr("atexit.register", functions_at_exit.append)
+    monkeypatch.setattr("sys.argv", ["robocov", "--version"])
+    main()
+    assert functions_at_exit == [gc.freeze]
 
 
 def test_maps_lists_every_bundled_map(capsys: pytest.CaptureFixture[str]) -> None:

@@ -232,14 +232,14 @@ def test_every_key_runs_its_command(shared: Driver, monkeypatch: pytest.MonkeyPa
 
 @given(st.text(max_size=30))
 def test_found_commands_contain_all_typed_words(commands: list[Command], typed: str) -> None:
-    found = find_commands(commands, typed)
+    matches = find_commands(commands, typed)
     for command in commands:
         text = f"{command.title} {command.name}".lower()
-        assert (command in found) == all(word in text for word in typed.lower().split())
+        assert (command in matches) == all(word in text for word in typed.lower().split())
 
 
 def test_titles_that_start_with_the_text_come_first(commands: list[Command]) -> None:
-    found = [command.title for command in find_commands(commands, "re")]
-    first = [title for title in found if title.lower().startswith("re")]
+    matches = [command.title for command in find_commands(commands, "re")]
+    first = [title for title in matches if title.lower().startswith("re")]
     assert first
-    assert found[: len(first)] == first
+    assert matches[: len(first)] == first

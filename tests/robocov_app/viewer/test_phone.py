@@ -246,9 +246,9 @@ def test_a_button_of_the_page_closes_what_covers_the_window(upright_phone: Drive
 
 def test_every_button_of_the_page_has_a_command(upright_phone: Driver) -> None:
     page = files("robocov_app.web").joinpath("page.html").read_text("utf-8")
-    found = re.search(r"const TOOLS = \{(.*?)\};\s*const MORE = \{(.*?)\};", page, re.DOTALL)
-    assert found is not None
-    tools, others = (re.findall(r'"?([\w:]+)"?: "', text) for text in found.groups())
+    lists = re.search(r"const TOOLS = \{(.*?)\};\s*const MORE = \{(.*?)\};", page, re.DOTALL)
+    assert lists is not None
+    tools, others = (re.findall(r'"?([\w:]+)"?: "', text) for text in lists.groups())
     commands = upright_phone.window.commands
     assert set(tools) == set(upright_phone.viewer.toolbox.by_name)
     assert all(f"tool:{name}" in commands for name in tools)

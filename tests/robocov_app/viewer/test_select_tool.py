@@ -97,7 +97,7 @@ def test_shift_drag_keeps_the_direction(driver: Driver) -> None:
     hold_keys("shift")
     driver.drag_at(PILLAR, (4.5, 1.25), (5.0, 1.35))
     hold_keys()
-    (pillar,) = [each for each in list_obstacles(driver) if isinstance(each, CircleObstacle)]
+    (pillar,) = [obstacle for obstacle in list_obstacles(driver) if isinstance(obstacle, CircleObstacle)]
     assert pillar.center[0] > 4.8
     assert pillar.center[1] == pytest.approx(1.2, abs=1e-6)
 
@@ -106,7 +106,7 @@ def test_the_menu_of_a_wall_changes_duplicates_and_deletes_it(driver: Driver) ->
     count = len(list_obstacles(driver))
     assert {"wider", "narrower", "duplicate", "delete"} <= set(open_menu(driver, WALL))
     choose(driver, "wider")
-    (wall,) = [each for each in list_obstacles(driver) if isinstance(each, WallObstacle)]
+    (wall,) = [obstacle for obstacle in list_obstacles(driver) if isinstance(obstacle, WallObstacle)]
     assert wall.width == pytest.approx(0.125)
     driver.press_key("[")
     assert len(driver.viewer.selected_obstacles) == 1
@@ -175,31 +175,31 @@ def test_shift_keeps_angles_of_walls_and_of_the_ruler() -> None:
     assert ruler.segment.end == pytest.approx((1.45, 3.95))
 
 
-def find(driver: Driver, kind: type[ObstacleT]) -> ObstacleT:
+def find_obstacle(driver: Driver, kind: type[ObstacleT]) -> ObstacleT:
     """Return the only obstacle of a kind."""
-    (found,) = [each for each in list_obstacles(driver) if isinstance(each, kind)]
-    return found
+    (match,) = [obstacle for obstacle in list_obstacles(driver) if isinstance(obstacle, kind)]
+    return match
 
 
 def test_the_rim_of_a_selected_circle_is_dragged(driver: Driver) -> None:
-    pillar = find(driver, CircleObstacle)
+    pillar = find_obstacle(driver, CircleObstacle)
     x, y = pillar.center
     driver.click_at(pillar.center)
     driver.drag_at((x + pillar.radius, y), (x + pillar.radius + 0.1, y), (x + 0.8, y))
-    changed = find(driver, CircleObstacle)
+    changed = find_obstacle(driver, CircleObstacle)
     assert changed.center == pillar.center
     assert changed.radius == pytest.approx(0.8, abs=0.03)
     assert driver.viewer.selected_obstacles == (changed,)
     driver.press_key("ctrl+z")
-    assert find(driver, CircleObstacle) == pillar
+    assert find_obstacle(driver, CircleObstacle) == pillar
 
 
 def test_the_end_of_a_selected_wall_is_dragged_and_snaps(driver: Driver) -> None:
-    wall = find(driver, WallObstacle)
+    wall = find_obstacle(driver, WallObstacle)
     first, last = wall.points
     driver.click_at(WALL)
     driver.drag_at(last, (last[0], 1.0), (last[0] + 0.02, 0.03))
-    changed = find(driver, WallObstacle)
+    changed = find_obstacle(driver, WallObstacle)
     assert changed.points[0] == first
     assert changed.points[-1] == pytest.approx((last[0] + 0.02, 0.0), abs=0.01)
     assert changed.width == wall.width
@@ -230,7 +230,7 @@ def test_points_of_a_polygon_are_dragged() -> None:
 
 
 def test_obstacles_in_a_box_are_moved_by_the_arrow_keys_and_deleted(driver: Driver) -> None:
-    pillar = find(driver, CircleObstacle)
+    pillar = find_obstacle(driver, CircleObstacle)
     x, y = pillar.center
     hold_keys("shift")
     driver.drag_at((x - 0.6, y - 0.6), (x, y), (x + 0.6, y + 0.6))
@@ -238,15 +238,15 @@ def test_obstacles_in_a_box_are_moved_by_the_arrow_keys_and_deleted(driver: Driv
     assert driver.viewer.selected_obstacles == (pillar,)
     driver.press_key("right")
     driver.press_key("shift+up")
-    moved = find(driver, CircleObstacle)
+    moved = find_obstacle(driver, CircleObstacle)
     assert (moved.center[0] - x, moved.center[1] - y) == pytest.approx((0.05, 0.5))
     assert driver.viewer.selected_obstacles == (moved,)
     driver.press_key("delete")
-    assert [type(each) for each in list_obstacles(driver)] == [WallObstacle]
+    assert [type(obstacle) for obstacle in list_obstacles(driver)] == [WallObstacle]
 
 
 def test_a_box_dragged_to_the_left_selects_what_it_touches(driver: Driver) -> None:
-    pillar = find(driver, CircleObstacle)
+    pillar = find_obstacle(driver, CircleObstacle)
     x, y = pillar.center
     hold_keys("shift")
     driver.drag_at((x + 0.9, y + 0.9), (x + 0.5, y + 0.3), (x, y))

@@ -56,12 +56,12 @@ def run_command(text: str, folder: Path) -> list[np.ndarray]:
     """Run a copied command, and return the last positions of its records, (n, 2) m each."""
     finals: list[np.ndarray] = []
     for number, line in enumerate(text.splitlines()):
-        program, *words = shlex.split(line)
+        program, *arguments = shlex.split(line)
         assert program == "robocov"
         out = folder / f"out-{number}"
-        if "--out" in words:
-            del words[words.index("--out") :][:2]
-        assert main([*words, "--out", str(out), "--no-figures", "--lattice", "16"]) == 0
+        if "--out" in arguments:
+            del arguments[arguments.index("--out") :][:2]
+        assert main([*arguments, "--out", str(out), "--no-figures", "--lattice", "16"]) == 0
         folders = sorted(path.parent for path in out.rglob("record.npz"))
         finals += [Record.load(path).positions[-1] for path in folders]
     return finals
@@ -93,8 +93,8 @@ def test_the_command_and_the_script_repeat_the_run(name: str, tmp_path: Path) ->
     assert command.startswith("robocov run rooms --controller rapf")
     (by_command,) = run_command(command, tmp_path)
     (by_script,) = run_python(script)
-    for found in (by_command, by_script):
-        assert np.array_equal(found, expected)
+    for positions in (by_command, by_script):
+        assert np.array_equal(positions, expected)
 
 
 def test_several_controllers_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -134,10 +134,10 @@ def test_changes_before_the_start_are_initial_conditions(tmp_path: Path) -> None
         expected = get_positions(driver)
     assert "--max-speed 0.4" in command
     assert "max_speed=0.4" in script
-    (found,) = run_command(command, tmp_path)
-    assert np.array_equal(found, expected)
-    (found,) = run_python(script)
-    assert np.array_equal(found, expected)
+    (positions,) = run_command(command, tmp_path)
+    assert np.array_equal(positions, expected)
+    (positions,) = run_python(script)
+    assert np.array_equal(positions, expected)
 
 
 def test_an_edited_map_is_saved_for_the_command(tmp_path: Path) -> None:
@@ -148,8 +148,8 @@ def test_an_edited_map_is_saved_for_the_command(tmp_path: Path) -> None:
         command = copy_text(driver, "share:command")
         expected = get_positions(driver)
         assert str(tmp_path / "hall-1.json") in driver.window.model.message
-    (found,) = run_command(command, tmp_path)
-    assert np.array_equal(found, expected)
+    (positions,) = run_command(command, tmp_path)
+    assert np.array_equal(positions, expected)
 
 
 def test_later_edits_are_in_the_session_that_the_command_runs(tmp_path: Path) -> None:
@@ -193,8 +193,8 @@ def test_the_script_repeats_robots_that_fail_and_join(name: str, tmp_path: Path)
         expected = get_positions(driver)
         assert driver.session.displayed.numbers == (1, 3, 4)
     assert "#" not in script
-    (found,) = run_python(script)
-    assert np.array_equal(found[[0, 2, 3]], expected)
+    (positions,) = run_python(script)
+    assert np.array_equal(positions[[0, 2, 3]], expected)
 
 
 def test_the_window_lets_the_last_robot_work_and_the_script_says_so(tmp_path: Path) -> None:
@@ -213,8 +213,8 @@ def test_robots_that_differ_are_in_the_script(tmp_path: Path) -> None:
         advance_session(driver.session, STEPS)
         script = copy_text(driver, "share:python")
         expected = get_positions(driver)
-    (found,) = run_python(script)
-    assert np.array_equal(found, expected)
+    (positions,) = run_python(script)
+    assert np.array_equal(positions, expected)
 
 
 def test_a_copy_opens_this_session_which_keeps_its_own_file(driver: Driver, tmp_path: Path) -> None:

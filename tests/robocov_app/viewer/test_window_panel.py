@@ -120,8 +120,8 @@ def test_an_open_menu_covers_the_buttons_below_it(driver: Driver) -> None:
     """A choice from the list presses none of the buttons under it."""
     fewer = driver.get_widget("button", "fewer").rect
     driver.click(*driver.get_widget("menu", "map").rect.center)
-    found = driver.window.panel.ui.open_list
-    name = found.options[found.find_item((driver.at[0], fewer.centery))]
+    open_list = driver.window.panel.ui.open_list
+    name = open_list.options[open_list.find_item((driver.at[0], fewer.centery))]
     driver.click(driver.at[0], fewer.centery)
     assert driver.session.timeline.scenario.robots == 3
     assert driver.viewer.files.map_name == name

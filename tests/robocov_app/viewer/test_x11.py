@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -129,3 +132,20 @@ def test_a_signal_closes_the_window_and_completes_its_video(display: str, tmp_pa
 
     assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "robocov-1.mp4"))[0] > 3
     assert json.loads((tmp_path / "settings/window.json").read_text())["theme"] == "dark"
+
+
+def test_a_window_is_opened_once_so_that_no_key_is_lost(display: str) -> None:
+    script = (
+        "import pygame\n"
+        "from robocov_app.toolkit.window.display import open_display, open_window\n"
+        "with open_display(headless=False, missing_message='no display'):\n"
+        "    open_window((900, 600))\n"
+        "    print([pygame.event.event_name(event.type) for event in pygame.event.get()])\n"
+    )
+    environment = {**os.environ, "DISPLAY": display}
+    environment.pop("SDL_VIDEODRIVER", None)
+    result = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
+    )
+    assert "WindowShown" in result.stdout
+    assert "WindowHidden" not in result.stdout

@@ -46,11 +46,6 @@ def _close_previous_page(browser):
     browser.read_console()
 
 
-def set_size(browser, width, height, ratio=1.0):
-    size = {"width": width, "height": height, "deviceScaleFactor": ratio, "mobile": width < 500}
-    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-
-
 def get_canvas_size(browser):
     return browser.run_script("const it = document.querySelector('canvas'); return [it.width, it.height]")
 
@@ -77,17 +72,14 @@ def wait_for_unchanged_picture(browser):
 
 
 def test_the_window_follows_input_the_page_size_and_the_color_scheme(browser, tmp_path):
-    set_size(browser, 1280, 720)
+    browser.resize(1280, 720)
     browser.set_preferences(color_scheme="light")
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         assert "token" not in browser.driver.current_url
         first = wait_for_unchanged_picture(browser)
-        mouse = {"button": "left", "buttons": 1, "clickCount": 1}
-        for kind, x in (("mousePressed", 60), ("mouseMoved", 160), ("mouseReleased", 160)):
-            event = {"type": kind, "x": x, "y": 240, **mouse}
-            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+        browser.drag((60, 240), (160, 240))
         browser.wait_until(lambda: read_picture(browser) != first)
         panned = wait_for_unchanged_picture(browser)
         browser.press_keys("f")
@@ -97,7 +89,7 @@ def test_the_window_follows_input_the_page_size_and_the_color_scheme(browser, tm
         typed = wait_for_unchanged_picture(browser)
         browser.press_keys(ENTER)
         browser.wait_until(lambda: read_picture(browser) != typed)
-        set_size(browser, 390, 844, 3.0)
+        browser.resize(390, 844, 3.0)
         browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
         light = wait_for_unchanged_picture(browser)
         browser.set_preferences(color_scheme="dark")
@@ -115,7 +107,7 @@ def press_with_control(browser, key, command=""):
 
 
 def test_a_class_watches_the_teacher_who_uploads_and_downloads_files(browser, tmp_path):
-    set_size(browser, 1280, 720)
+    browser.resize(1280, 720)
     (tmp_path / "down").mkdir()
     download = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
     browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", download)
@@ -142,11 +134,11 @@ def test_a_class_watches_the_teacher_who_uploads_and_downloads_files(browser, tm
         browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))
         teacher = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
-        set_size(browser, 1024, 900)
+        browser.resize(1024, 900)
         browser.driver.get(link)
         browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "saved", "watching"})
         browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900 - DOWNLOADS_HEIGHT])
-        set_size(browser, 1280, 720)
+        browser.resize(1280, 720)
         browser.wait_until(
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
@@ -166,7 +158,7 @@ def test_a_class_watches_the_teacher_who_uploads_and_downloads_files(browser, tm
 
 def test_the_invitation_shows_a_link_and_a_qr_code(browser, tmp_path):
     with serve_window("demo", "square", "--host", "0.0.0.0", cwd=tmp_path) as link:
-        set_size(browser, 1280, 720)
+        browser.resize(1280, 720)
         browser.driver.get(link)
         browser.wait_until(lambda: browser.find("summary").is_displayed())
         browser.find("summary").click()
@@ -196,14 +188,14 @@ def record_messages(browser):
 
 
 def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser, tmp_path):
-    set_size(browser, 1280, 720)
+    browser.resize(1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         assert not browser.find("#toast").is_displayed()
         projector = browser.driver.current_window_handle
         browser.driver.switch_to.new_window("tab")
-        set_size(browser, 390, 844, 2.0)
+        browser.resize(390, 844, 2.0)
         browser.set_touch(is_enabled=True)
         browser.driver.get(link)
         browser.wait_until(
@@ -239,7 +231,7 @@ def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser,
 
 
 def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
-    set_size(browser, 900, 600)
+    browser.resize(900, 600)
     with (
         serve_window("demo", "rooms", "--folder", str(tmp_path)) as link,
         SubPathProxy(urlsplit(link).port) as proxy,
@@ -272,7 +264,7 @@ def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
 
 
 def test_text_is_pasted_once_and_copied(browser, tmp_path):
-    set_size(browser, 1280, 720)
+    browser.resize(1280, 720)
     with serve_window("edit", "--folder", str(tmp_path)) as link:
         allowed = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
         origin = link.partition("/?")[0]
@@ -283,9 +275,7 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
 
         write_clipboard = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
         browser.driver.execute_async_script(write_clipboard)
-        for kind in ("mousePressed", "mouseReleased"):  # the field of the map's name
-            event = {"type": kind, "x": 1150, "y": 99, "button": "left", "clickCount": 1}
-            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+        browser.drag((1150, 99))  # Click the field of the map's name.
         press_with_control(browser, "a")
         press_with_control(browser, "v", "paste")
         wait_for_unchanged_picture(browser)
@@ -307,51 +297,34 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
 
 
 def test_drags_with_shift_select_and_with_alt_copy(browser, tmp_path):
-    set_size(browser, 1280, 720)
+    browser.resize(1280, 720)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         wait_for_unchanged_picture(browser)
-
-        def drag(modifiers, *points):
-            for number, (x, y) in enumerate(points):
-                kind = "mouseMoved" if number else "mousePressed"
-                event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "modifiers": modifiers}
-                browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event | {"clickCount": 1})
-                time.sleep(0.1)
-            event = {"type": "mouseReleased", "x": x, "y": y, "button": "left", "modifiers": modifiers}
-            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event | {"clickCount": 1})
 
         def wait_for_message(text):
             browser.wait_until(lambda: text in browser.find("#status").get_property("textContent"))
 
         alt = 1
         shift = 8
-        drag(alt, (738, 160), (729, 190), (719, 215))  # Copy the round table.
+        browser.drag((738, 160), (729, 190), (719, 215), modifiers=alt)  # Copy the round table.
         wait_for_message("copied")
-        drag(shift, (639, 90), (739, 200), (824, 248))  # Select from the floor of its room.
+        # Select from the floor of its room.
+        browser.drag((639, 90), (739, 200), (824, 248), modifiers=shift)
         wait_for_message("2 obstacles selected")
         assert browser.read_console() == []
 
 
 def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser, tmp_path):
     with browser.emulate_touch():
-        set_size(browser, 390, 844, 3.0)
+        browser.resize(390, 844, 3.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2376])
             narrow = wait_for_unchanged_picture(browser)
-            box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
-            assert browser.run_script(f"{box} return [box.left, box.top, box.width, box.height]") == [
-                0,
-                0,
-                390,
-                792,
-            ]
-            assert (
-                browser.run_script("return document.getElementById('touch').getBoundingClientRect().top")
-                == 792
-            )
+            assert browser.measure("canvas") == (0, 0, 390, 792)
+            assert browser.measure("#touch")[1] == 792
             browser.find("#panel").click()
             browser.wait_until(lambda: read_picture(browser) != narrow)
             browser.wait_until(lambda: browser.run_script("return scrollBox"))
@@ -359,15 +332,7 @@ def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser
 
             def touch(*steps):
                 """Move fingers through steps with their positions; return the sent messages."""
-                for number, positions in enumerate(steps):
-                    points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(positions)]
-                    event = {"type": "touchMove" if number else "touchStart"}
-                    browser.driver.execute_cdp_cmd(
-                        "Input.dispatchTouchEvent", event | {"touchPoints": points}
-                    )
-                    time.sleep(0.05)
-                event = {"type": "touchEnd", "touchPoints": []}
-                browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+                browser.touch(*steps)
                 messages = [message for message in take_messages() if message["kind"] in ("button", "wheel")]
                 return [
                     (message["kind"], message.get("button"), round(message["x"] / 3)) for message in messages
@@ -389,7 +354,7 @@ def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser
 
 def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
     with browser.emulate_touch():
-        set_size(browser, 390, 844, 2.0)
+        browser.resize(390, 844, 2.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: get_classes(browser) == {"phone"})
@@ -422,7 +387,7 @@ def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(brow
 
 def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
     with browser.emulate_touch():
-        set_size(browser, 390, 844, 2.0)
+        browser.resize(390, 844, 2.0)
         path = tmp_path / "plan.json"
         path.write_text(EMPTY_MAP)
         with serve_window("edit", str(path), "--folder", str(tmp_path)) as link:
@@ -436,13 +401,8 @@ def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
             assert all(min(button.size.values()) >= 48 for button in shown)
 
             def touch(*points):
-                for number, (x, y) in enumerate(points):
-                    event = {"type": "touchMove" if number else "touchStart"}
-                    event["touchPoints"] = [{"x": x, "y": y, "id": 0}]
-                    browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
-                    time.sleep(0.05)
-                event = {"type": "touchEnd", "touchPoints": []}
-                browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+                """Move a finger through points; the next touch is no double tap."""
+                browser.touch(*([point] for point in points))
                 time.sleep(0.6)
 
             def choose_tool(name):
@@ -483,34 +443,37 @@ def find_covering_elements(browser):
     return browser.run_script(script)
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "has_touch"), [(390, 844, True), (844, 390, True), (1280, 720, False)]
-)
-def test_saved_files_cover_the_window_only_when_the_user_opens_them(
-    browser, tmp_path, width, height, has_touch
-):
-    with browser.emulate_touch(is_enabled=has_touch):
-        set_size(browser, width, height)
-        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-            browser.driver.get(link)
-            browser.wait_until(lambda: "blank" not in get_classes(browser))
-            wait_for_unchanged_picture(browser)
-            browser.run_script("tell({kind: 'command', name: 'save:session'})")
-            browser.wait_until(lambda: "saved" in get_classes(browser))
-            wait_for_unchanged_picture(browser)
-            assert find_covering_elements(browser) == []
-            if not has_touch:
-                assert browser.find("#downloads a").is_displayed()
-                return
-            assert not browser.find("#downloads").is_displayed()
-            button = browser.find("#to-saved")
-            assert min(button.size.values()) >= 48
-            button.click()
-            assert browser.find("#saved a").text == "rooms-1.robocov"
-            assert find_covering_elements(browser) == ["#saved"]
-            button.click()
-            assert find_covering_elements(browser) == []
-            button.click()
-            browser.find("#to-tools").click()
-            assert find_covering_elements(browser) == [], "another sheet replaces it"
-            assert browser.read_console() == []
+def check_saved_files(browser, *, has_touch):
+    """Check that the saved files cover the window only after a tap on their button."""
+    wait_for_unchanged_picture(browser)
+    assert find_covering_elements(browser) == []
+    assert browser.find("#downloads").is_displayed() != has_touch
+    if not has_touch:
+        return
+    button = browser.find("#to-saved")
+    assert min(button.size.values()) >= 48
+    button.click()
+    assert browser.find("#saved a").text == "rooms-1.robocov"
+    assert find_covering_elements(browser) == ["#saved"]
+    button.click()
+    assert find_covering_elements(browser) == []
+    button.click()
+    browser.find("#to-tools").click()
+    assert find_covering_elements(browser) == [], "another sheet replaces it"
+
+
+def test_saved_files_cover_the_window_only_when_the_user_opens_them(browser, tmp_path):
+    browser.resize(1280, 720)
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.wait_until(lambda: "blank" not in get_classes(browser))
+        browser.run_script("tell({kind: 'command', name: 'save:session'})")
+        browser.wait_until(lambda: "saved" in get_classes(browser))
+        check_saved_files(browser, has_touch=False)
+        with browser.emulate_touch():
+            for width, height in ((390, 844), (844, 390)):
+                browser.resize(width, height)
+                browser.driver.refresh()
+                browser.wait_until(lambda: {"phone", "saved"} <= get_classes(browser))
+                check_saved_files(browser, has_touch=True)
+        assert browser.read_console() == []

@@ -106,7 +106,7 @@ def test_control_characters_are_removed_from_messages(message, field, expected):
 
 
 def has_control_characters(text, allowed=""):
-    return any(unicodedata.category(each) == "Cc" and each not in allowed for each in text)
+    return any(unicodedata.category(character) == "Cc" and character not in allowed for character in text)
 
 
 TEXTS_WITH_CONTROLS = st.text(

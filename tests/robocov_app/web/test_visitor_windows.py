@@ -60,10 +60,10 @@ def wait_for_window(page):
 
 def list_window_processes(server):
     """Return the ids of the processes of a server's windows."""
-    found = subprocess.run(
+    result = subprocess.run(
         ["pgrep", "-P", str(server.pid), "-f", "spawn_main"], capture_output=True, text=True
     )
-    return [int(line) for line in found.stdout.splitlines()]
+    return [int(line) for line in result.stdout.splitlines()]
 
 
 def is_running(pid):
@@ -138,7 +138,7 @@ def test_a_window_without_pages_is_closed_and_its_work_is_recovered_later(tmp_pa
             page.press_key("c")  # the circle tool
             page.drag((300, 300), (350, 300))
             (window,) = list_window_processes(link.process)
-            time.sleep(5.0)
+            time.sleep(4.0)
             assert is_running(window)  # A page is open.
         wait_until(lambda: not list_window_processes(link.process))
         assert len(list((tmp_path / "session-1" / SERVED_FOLDER).rglob("draft.json"))) == 1

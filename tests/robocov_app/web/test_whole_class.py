@@ -146,7 +146,6 @@ def test_a_class_watches_while_the_teacher_reloads_and_recovers_after_a_crash(tm
                 browser.press_keys("i", DELETE)  # Select and remove robot 1.
                 wait_until(lambda: all(np.greater(others.n_frames, n_frames_before)))
                 wait_until(lambda: has_draft_of_session(folder))
-                time.sleep(1.5)  # At most the last second may be lost.
                 os.kill(link.process.pid, signal.SIGKILL)
                 wait_until(lambda: others.n_lost == 59)
             wait_until(lambda: "Connection lost" in read_note(browser))
@@ -159,7 +158,6 @@ def test_a_class_watches_while_the_teacher_reloads_and_recovers_after_a_crash(tm
             with Viewers(read_watch_link(link), 60, (0.0, 0.05, 0.3)) as others:
                 wait_until(lambda: all(others.n_frames))
                 browser.press_keys(ENTER)  # Recover
-                time.sleep(1.0)
                 script = "for (const down of [true, false]) tell({kind: 'key', key: 's', down, held: 2})"
                 browser.run_script(script)
                 wait_until(lambda: list(folder.glob("*.robocov")))
@@ -190,7 +188,7 @@ def test_memory_is_bounded_and_freed_after_viewers_have_left(tmp_path):
         highest_mb = initial_mb
         for _ in range(2):
             with Viewers(watch_link, 100, delays) as viewers:
-                end_time = time.monotonic() + 8.0
+                end_time = time.monotonic() + 4.0
                 while time.monotonic() < end_time or not all(viewers.n_frames):
                     highest_mb = max(highest_mb, read_memory_mb(link.process))
                     time.sleep(0.2)

@@ -18,6 +18,7 @@ from robocov_app.toolkit.window.input import KEY_REPEAT_MS
 from robocov_app.toolkit.window.layout import MIN_SIZE_PX
 
 _DRIVER_VARIABLE = "SDL_VIDEODRIVER"
+_ACCELERATION_VARIABLE = "SDL_FRAMEBUFFER_ACCELERATION"
 _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", _DRIVER_VARIABLE)
 """Environment variables. On Linux, one of them must be set for a visible window."""
 _INVISIBLE_DRIVERS = ("offscreen", "dummy", "evdev")
@@ -88,6 +89,10 @@ def _start_display(missing_message: str, *, may_be_invisible: bool) -> None:
     except pygame.error:
         raise InputError(missing_message) from None
     driver = pygame.display.get_driver()
+    if driver == "x11":
+        # By default, SDL opens a window, closes it, and opens it again for OpenGL. Keys pressed meanwhile are
+        # lost, and without a graphics processor each frame takes longer.
+        os.environ.setdefault(_ACCELERATION_VARIABLE, "0")
     is_requested = may_be_invisible or driver == os.environ.get(_DRIVER_VARIABLE, "")
     if driver in _INVISIBLE_DRIVERS and not is_requested:
         pygame.display.quit()
@@ -162,6 +167,14 @@ def open_window(size: tuple[int, int]) -> Surface:
         warnings.simplefilter("ignore", DeprecationWarning)
         pygame.Window.from_display_module().minimum_size = MIN_SIZE_PX
     return screen
+
+
+def leave_full_screen() -> None:
+    """Let the window no longer fill the screen."""
+    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
+        # As in `open_window`.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pygame.Window.from_display_module().set_windowed()
 
 
 def set_title(title: str) -> None:

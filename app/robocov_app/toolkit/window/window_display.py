@@ -8,7 +8,7 @@ from pygame import Surface
 
 from robocov.files.writing import replace_file
 from robocov_app.terminal.output import find_free_path
-from robocov_app.toolkit.window.display import open_window
+from robocov_app.toolkit.window.display import leave_full_screen, open_window
 
 _MIN_SURFACE_PX = (320, 240)
 """Minimum size of the surface that is drawn, however small the window is."""
@@ -65,6 +65,8 @@ class WindowDisplay:
             self.surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             self.windowed_size = None
+            # A window that still fills the screen would keep its size.
+            leave_full_screen()
             self.surface = open_window(size)
 
     def save_screenshot(self, folder: Path) -> str:
