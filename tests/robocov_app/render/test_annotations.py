@@ -1,3 +1,5 @@
+"""Scale bar, status line, caption and legend."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -6,126 +8,152 @@ from drawn_pixels import SIZE, TWO, list_legend_texts, list_pixels, render_layer
 from drawn_run import HALL, ROOMS, SQUARE, build_row_scene, build_scene, record_walk
 
 from robocov.voronoi import partition
+from robocov_app.look.lengths import round_down
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.annotations.captions import fit_status
 from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.render.painter import Painter
 
-
-@pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda map_: map_.name)
-@pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
-def test_the_scale_bar_has_the_length_of_its_label(environment, size):
-    from robocov_app.look.lengths import round_down
-
-    pixels, painter = list_pixels(build_row_scene(record_walk(environment, 2)), "scale_bar", size=size)
-    rows, counts = np.unique(pixels[:, 1], return_counts=True)
-    bar = pixels[pixels[:, 1] == rows[counts.argmax()]]
-    run = np.split(np.sort(bar[:, 0]), np.nonzero(np.diff(np.sort(bar[:, 0])) > 1)[0] + 1)[0]
-    meters = (len(run) - 1) / painter.camera.zoom
-    assert meters == pytest.approx(round_down(meters * 1.02), rel=0.03)
-
-
-def test_the_status_line_contains_the_cost():
-    record = record_walk(SQUARE, 3)
-    frames = [
-        render_layers(build_row_scene(record, cost=cost), "status")[0]
-        for cost in ("mean 1.23 m", "mean 1.24 m")
-    ]
-    rows, columns = np.nonzero((frames[0] != frames[1]).any(axis=2))
-    assert len(rows) > 3
-    assert rows.min() > SIZE[1] - 34
-    assert np.ptp(columns) < 12  # one digit
+LEGEND_TEXTS = {
+    "cells": "Voronoi cell",
+    "centroids": "cell centroid",
+    "robots": "robot",
+    "goals": "goal",
+    "velocities": "velocity",
+    "links": "neighbors",
+    "sensing": "sensing range",
+    "communication": "communication range",
+    "obstacle_points": "nearest obstacle point",
+    "force_attraction": "attraction",
+    "force_repulsion_robots": "robot repulsion",
+    "force_repulsion_obstacle": "obstacle repulsion",
+    "force_viscosity": "viscosity",
+    "force_resultant": "resultant force",
+}
+"""Legend texts of layers that a scene without obstacles, starts and trail can have."""
 
 
-def test_a_narrow_status_omits_the_least_important_facts():
-    scene = build_row_scene(record_walk(SQUARE, 3), cost="mean distance 1.234 m")
-    size = 14
-    found = []
-    for room in range(600, 0, -5):
-        text = fit_status(scene, size, room)
-        assert measure_text(text, size) <= room
-        if not found or found[-1] != text:
-            found.append(text)
-    lead = "   ·   "
-    assert found[0] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m", "square"])
-    assert found[1] == lead + lead.join(["t = 3.9 s", "mean distance 1.234 m"])
-    assert found[2] == lead + "t = 3.9 s"
-
-
-def test_measured_texts_have_the_width_of_rendered_ones():
-    for text in ("", "RAPF", "mean distance 1.234 m · Museum", "…"):
-        for bold in (False, True):
-            assert measure_text(text, 17, bold) == render_text(text, 17, (0, 0, 0), bold).get_width()
-
-
-def test_a_caption_contains_the_facts_that_the_status_omits():
-    """In a pane, controller and cost stand above the arena, and nothing of them below it."""
-    record = record_walk(SQUARE, 3)
-    frames = []
-    for cost, label_ in (("1.23 m", "RAPF"), ("9.87 m", "RAPF"), ("1.23 m", "RPF")):
-        scene = replace(build_row_scene(record, cost=cost), label=label_)
-        frames.append(render_layers(scene, "caption", "status", layers=build_pane_layers())[0])
-    for frame, side in ((frames[1], slice(SIZE[0] // 2, None)), (frames[2], slice(0, SIZE[0] // 2))):
-        rows, columns = np.nonzero((frame != frames[0]).any(axis=2))
-        assert len(rows) > 5 and rows.max() < 34
-        assert set(columns.tolist()) <= set(range(SIZE[0])[side])
-
-
-def test_a_long_status_ends_before_the_scale_bar():
-    scene = build_row_scene(record_walk(SQUARE, 3), cost="word " * 60)
-    pixels, _ = list_pixels(scene, "status", "scale_bar")
-    alone, _ = list_pixels(scene, "scale_bar")
-    assert pixels[:, 0].max() < SIZE[0]
-    status = np.array(sorted({tuple(p) for p in pixels.tolist()} - {tuple(p) for p in alone.tolist()}))
-    assert status[:, 0].min() > alone[:, 0].max() + 8
-
-
-def test_the_legend_lists_the_visible_elements():
-    scene = build_scene(
+def build_full_scene():
+    """Return a scene with all observations and terms, but without obstacles, starts and trail."""
+    return build_scene(
         TWO,
         forces=np.ones((2, 2)),
         goals=partition(TWO, SQUARE.region).centroids,
         obstacle_points=TWO - 1,
         communication_range=5.0,
     )
+
+
+def measure_first_run(values):
+    """Return the number of consecutive integers that begin with the smallest one."""
+    ordered = np.sort(values)
+    gaps = np.flatnonzero(np.diff(ordered) > 1)
+    return int(gaps[0]) + 1 if len(gaps) else len(ordered)
+
+
+@pytest.mark.parametrize("environment", [ROOMS, HALL, SQUARE], ids=lambda environment: environment.name)
+@pytest.mark.parametrize("size", [(640, 480), (1920, 1080)])
+def test_the_scale_bar_has_a_round_length(environment, size):
+    scene = build_row_scene(record_walk(environment, 2))
+    pixels, painter = list_pixels(scene, "scale_bar", size=size)
+    rows, counts = np.unique(pixels[:, 1], return_counts=True)
+    bar_row = rows[counts.argmax()]
+    bar_columns = pixels[pixels[:, 1] == bar_row, 0]
+    length_m = (measure_first_run(bar_columns) - 1) / painter.camera.zoom
+    assert length_m == pytest.approx(round_down(length_m * 1.02), rel=0.03)
+
+
+def test_the_status_line_contains_the_cost():
+    record = record_walk(SQUARE, 3)
+    frame, _ = render_layers(build_row_scene(record, cost="mean 1.23 m"), "status")
+    other_frame, _ = render_layers(build_row_scene(record, cost="mean 1.24 m"), "status")
+    rows, columns = np.nonzero((frame != other_frame).any(axis=2))
+    assert len(rows) > 3
+    assert rows.min() > SIZE[1] - 34
+    width_of_digit_px = 12
+    assert np.ptp(columns) < width_of_digit_px
+
+
+def test_a_narrow_status_omits_the_least_important_facts():
+    scene = build_row_scene(record_walk(SQUARE, 3), cost="mean distance 1.234 m")
+    font_size = 14
+    texts = []
+    for width in range(600, 0, -5):
+        text = fit_status(scene, font_size, width)
+        assert measure_text(text, font_size) <= width
+        if text not in texts:
+            texts.append(text)
+    separator = "   ·   "
+    assert texts[0] == separator + separator.join(["t = 3.9 s", "mean distance 1.234 m", "square"])
+    assert texts[1] == separator + separator.join(["t = 3.9 s", "mean distance 1.234 m"])
+    assert texts[2] == separator + "t = 3.9 s"
+
+
+@pytest.mark.parametrize("text", ["", "RAPF", "mean distance 1.234 m · Museum", "…"])
+@pytest.mark.parametrize("is_bold", [False, True])
+def test_measured_widths_are_those_of_rendered_texts(text, is_bold):
+    surface = render_text(text, 17, (0, 0, 0), is_bold)
+    assert measure_text(text, 17, is_bold) == surface.get_width()
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_in_left_half"),
+    [
+        pytest.param({"cost": "9.87 m"}, False, id="cost"),
+        pytest.param({"label": "RPF"}, True, id="controller"),
+    ],
+)
+def test_controller_and_cost_of_a_pane_are_in_its_caption_only(changes, is_in_left_half):
+    scene = replace(build_row_scene(record_walk(SQUARE, 3), cost="1.23 m"), label="RAPF")
+    frame, _ = render_layers(scene, "caption", "status", layers=build_pane_layers())
+    changed_scene = replace(scene, **changes)
+    changed_frame, _ = render_layers(changed_scene, "caption", "status", layers=build_pane_layers())
+    rows, columns = np.nonzero((changed_frame != frame).any(axis=2))
+    assert len(rows) > 5
+    assert rows.max() < 34
+    middle = SIZE[0] // 2
+    assert ((columns < middle) == is_in_left_half).all()
+
+
+def test_a_long_status_ends_before_the_scale_bar():
+    scene = build_row_scene(record_walk(SQUARE, 3), cost="word " * 60)
+    pixels, _ = list_pixels(scene, "status", "scale_bar")
+    scale_bar_pixels, _ = list_pixels(scene, "scale_bar")
+    scale_bar_set = {tuple(pixel) for pixel in scale_bar_pixels.tolist()}
+    status = np.array([pixel for pixel in pixels.tolist() if tuple(pixel) not in scale_bar_set])
+    assert pixels[:, 0].max() < SIZE[0]
+    assert status[:, 0].min() > scale_bar_pixels[:, 0].max() + 8
+
+
+@pytest.mark.parametrize("layer", list(LEGEND_TEXTS))
+def test_the_legend_lists_a_visible_layer(layer):
     painter = Painter(SQUARE, SIZE)
-    words = {
-        "cells": "Voronoi cell",
-        "centroids": "cell centroid",
-        "robots": "robot",
-        "goals": "goal",
-        "velocities": "velocity",
-        "links": "neighbors",
-        "sensing": "sensing range",
-        "communication": "communication range",
-        "obstacle_points": "nearest obstacle point",
-        "force_attraction": "attraction",
-        "force_repulsion_robots": "robot repulsion",
-        "force_repulsion_obstacle": "obstacle repulsion",
-        "force_viscosity": "viscosity",
-        "force_resultant": "resultant force",
-    }
-    for name, word in words.items():
-        painter.show_only({name})
-        assert list_legend_texts(painter, scene) == [word]
+    painter.show_only({layer})
+    assert list_legend_texts(painter, build_full_scene()) == [LEGEND_TEXTS[layer]]
+
+
+def test_the_legend_lists_only_what_the_scene_has():
+    painter = Painter(SQUARE, SIZE)
     painter.show_only({layer.name for layer in build_standard_layers()})
-    # The scene has no obstacles, starts or trail.
-    assert sorted(list_legend_texts(painter, scene)) == sorted(words.values())
+    texts = list_legend_texts(painter, build_full_scene())
+    assert sorted(texts) == sorted(LEGEND_TEXTS.values())
+
+
+def test_the_legend_lists_obstacles_trajectories_and_starts():
+    painter = Painter(ROOMS, SIZE)
     painter.show_only({"obstacles", "starts", "trajectories"})
-    rooms = build_row_scene(record_walk(ROOMS, 2))
-    assert list_legend_texts(painter, rooms) == ["obstacle (unknown to robots)", "trajectory", "start"]
+    texts = list_legend_texts(painter, build_row_scene(record_walk(ROOMS, 2)))
+    assert texts == ["obstacle (unknown to robots)", "trajectory", "start"]
 
 
-def test_the_legend_is_above_the_arena_in_enough_rows():
+@pytest.mark.parametrize("size", [SIZE, (1920, 1080)])
+def test_a_long_legend_is_above_the_map_and_not_cut_at_the_right(size):
     scene = build_row_scene(record_walk(ROOMS, 6))
-    names = [layer.name for layer in build_standard_layers()]
-    for size in (SIZE, (1920, 1080)):
-        painter = Painter(ROOMS, size)
-        painter.show_only(names)
-        painter.render_frame(scene)
-        top = painter.camera.to_pixels(ROOMS.region.vertices)[:, 1].min()
-        frame = painter.render_frame(scene).astype(int)
-        strip = (frame[: int(top) - 4] != np.array(LIGHT.background)).any(axis=2)
-        assert strip.any()
-        assert not strip[:, -3:].any()  # nothing is cut at the right
+    painter = Painter(ROOMS, size)
+    painter.show_only([layer.name for layer in build_standard_layers()])
+    frame = painter.render_frame(scene).astype(int)
+    map_top = int(painter.camera.to_pixels(ROOMS.region.vertices)[:, 1].min())
+    is_drawn = (frame[: map_top - 4] != np.array(LIGHT.background)).any(axis=2)
+    assert is_drawn.any()
+    assert not is_drawn[:, -3:].any()
