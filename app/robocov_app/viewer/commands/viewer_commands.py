@@ -237,7 +237,7 @@ def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Comm
     group.add("preset:next", "Next preset of layers", viewer.view.use_next_preset, "shift+l")
     for number, preset in enumerate(LAYER_PRESETS, 1):
         key = f"alt+shift+{number}"
-        title = f"{preset.title}: {preset.description[0].lower()}{preset.description[1:]}"
+        title = f"{preset.title} · {preset.description}"
         group.add(f"preset:{preset.name}", title, partial(viewer.view.use_preset, preset), key)
     return group.commands
 
