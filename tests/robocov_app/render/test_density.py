@@ -1,4 +1,4 @@
-"""The density as colors and in words."""
+"""Shading and descriptions of the density."""
 
 import numpy as np
 import pytest
@@ -20,38 +20,64 @@ BOUNDS = (0.0, 0.0, 8.0, 8.0)
 SQUARE = Environment("square", ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)))
 
 
-def test_only_nonuniform_densities_are_described():
-    for density in (None, Uniform(3.0), Gaussians((), 2.0), Raster(np.ones((2, 2)), BOUNDS)):
-        assert describe_density(SQUARE.with_density(density)) == ""
-        assert get_cost_name(SQUARE.with_density(density)) == "mean distance"
-    assert describe_density(SQUARE.with_density(POLYGONS["rooms"])) == "density φ, 0.3 to 4"
-    assert get_cost_name(SQUARE.with_density(POLYGONS["rooms"])) == "mean distance weighted by φ"
+def shade(density, x, theme=LIGHT):
+    """Return the shading of a density on a grid with equal x and y in m, (k, k, 4) RGBA."""
+    return color_density(compute_density_fractions(density, BOUNDS, x, x), theme)
 
 
-def test_the_range_finds_narrow_hot_spots():
-    narrow = Gaussians((Gaussian((3.21, 4.56), 7.0, sigma=0.01), Gaussian((90.0, 0.0), 50.0, sigma=0.1)), 0.5)
-    low, high = compute_density_range(narrow, BOUNDS)
-    assert low == pytest.approx(0.5) and high == pytest.approx(7.5)
+@pytest.mark.parametrize(
+    "density", [None, Uniform(3.0), Gaussians((), 2.0), Raster(np.ones((2, 2)), BOUNDS)], ids=repr
+)
+def test_a_uniform_density_is_not_described(density):
+    environment = SQUARE.with_density(density)
+    assert describe_density(environment) == ""
+    assert get_cost_name(environment) == "mean distance"
+
+
+def test_a_nonuniform_density_is_described_with_its_range():
+    environment = SQUARE.with_density(POLYGONS["rooms"])
+    assert describe_density(environment) == "density φ, 0.3 to 4"
+    assert get_cost_name(environment) == "mean distance weighted by φ"
+
+
+def test_the_range_includes_narrow_peaks_inside_the_bounds():
+    peak = Gaussian((3.21, 4.56), 7.0, sigma=0.01)
+    peak_outside = Gaussian((90.0, 0.0), 50.0, sigma=0.1)
+    low, high = compute_density_range(Gaussians((peak, peak_outside), 0.5), BOUNDS)
+    assert low == pytest.approx(0.5)
+    assert high == pytest.approx(7.5)
+
+
+def test_the_range_of_a_map_without_density_is_one():
     assert get_density_range(SQUARE) == (1.0, 1.0)
 
 
-def test_the_more_the_stronger():
+def test_shading_is_stronger_where_the_density_is_higher():
     x = np.linspace(0.1, 7.9, 60)
-    picture = color_density(compute_density_fractions(GAUSSIANS["one"], BOUNDS, x, x), LIGHT)
-    assert picture.shape == (60, 60, 4) and (picture[..., :3] == LIGHT.density).all()
-    values = GAUSSIANS["one"].evaluate(np.column_stack([np.tile(x, 60), np.repeat(x, 60)])).reshape(60, 60)
-    order = np.argsort(values.ravel())
-    assert (np.diff(picture[..., 3].ravel()[order].astype(int)) >= 0).all()
-    assert picture[..., 3].min() == 0
-    assert picture[..., 3].max() == pytest.approx(255 * LIGHT.density_strength, abs=3)
-    flat = color_density(compute_density_fractions(Uniform(), BOUNDS, x, x), LIGHT)
-    assert not flat[..., 3].any()
+    opacity = shade(GAUSSIANS["one"], x)[..., 3].astype(int)
+    points_x, points_y = np.meshgrid(x, x)
+    values = GAUSSIANS["one"].evaluate(np.column_stack([points_x.ravel(), points_y.ravel()]))
+    opacity_by_density = opacity.ravel()[np.argsort(values)]
+    assert (np.diff(opacity_by_density) >= 0).all()
 
 
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_the_density_is_visible_and_hides_nothing(theme):
-    alpha = float(color_density(np.array([1.0]), theme)[0, 3]) / 255.0
-    full = mix(theme.background, theme.density, alpha)
-    assert compute_contrast(full, theme.background) > 1.4
-    assert compute_contrast(full, theme.ink) > 4.5
-    assert compute_contrast(full, theme.trajectory) > 1.3
+def test_shading_has_one_color_and_the_opacity_of_the_theme():
+    image = shade(GAUSSIANS["one"], np.linspace(0.1, 7.9, 60))
+    assert image.shape == (60, 60, 4)
+    assert (image[..., :3] == LIGHT.density).all()
+    assert image[..., 3].min() == 0
+    assert image[..., 3].max() == pytest.approx(255 * LIGHT.density_strength, abs=3)
+
+
+def test_a_uniform_density_has_no_shading():
+    image = shade(Uniform(), np.linspace(0.1, 7.9, 60))
+    assert not image[..., 3].any()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_the_strongest_shading_contrasts_with_the_background_and_with_marks(theme):
+    opacity = float(color_density(np.array([1.0]), theme)[0, 3]) / 255.0
+    shading = mix(theme.background, theme.density, opacity)
+    assert compute_contrast(shading, theme.background) > 1.4
+    assert compute_contrast(shading, theme.ink) > 4.5
+    assert compute_contrast(shading, theme.trajectory) > 1.3
