@@ -1,37 +1,68 @@
+"""Sheets of several maps."""
+
 from dataclasses import replace
+from itertools import combinations
 
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from robocov.environment import Environment
 from robocov_app.figures.runs import MAX_MAPS, plot_maps
 
 
-def list_texts(figure) -> list[str]:  # type: ignore[no-untyped-def]
+def list_texts(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.texts]
 
 
-def test_maps_are_side_by_side_at_one_scale(empty: Environment, cluttered: Environment) -> None:
+def compute_zooms(axes: Axes) -> tuple[float, float]:
+    """Return the zoom of axes in x and in y, px/m."""
+    box = axes.get_window_extent()
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    return box.width / (right - left), box.height / (top - bottom)
+
+
+@pytest.fixture
+def maps(empty: Environment, cluttered: Environment) -> list[Environment]:
+    """Three maps, of which the last one is wide and does not begin at the origin."""
     wide = replace(empty, name="wide", boundary=((5.0, 5.0), (25.0, 5.0), (25.0, 12.0), (5.0, 12.0)))
-    figure = plot_maps([empty, cluttered, wide])
-    panels = figure.axes
+    return [empty, cluttered, wide]
+
+
+def test_maps_have_the_same_scale_and_their_own_origin(maps: list[Environment]) -> None:
+    panels = plot_maps(maps).axes
     assert len(panels) == 3
-    boxes = [axes.get_window_extent() for axes in panels]
-    for axes, box in zip(panels, boxes, strict=True):
-        zoom = box.width / (axes.get_xlim()[1] - axes.get_xlim()[0])
-        assert zoom == pytest.approx(boxes[0].width / 20.0)
-        assert box.height / (axes.get_ylim()[1] - axes.get_ylim()[0]) == pytest.approx(zoom)
+    zoom = panels[0].get_window_extent().width / 20.0
+    for axes in panels:
+        assert compute_zooms(axes) == pytest.approx((zoom, zoom))
     assert panels[2].get_xlim() == (5.0, 25.0)
-    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
-    assert list_texts(figure)[:3] == ["empty", "cluttered", "wide"]
+
+
+def test_maps_do_not_overlap(maps: list[Environment]) -> None:
+    boxes = [axes.get_window_extent() for axes in plot_maps(maps).axes]
+    for box, other in combinations(boxes, 2):
+        assert not box.overlaps(other)
+
+
+def test_a_sheet_has_the_names_of_its_maps(maps: list[Environment]) -> None:
+    assert list_texts(plot_maps(maps))[:3] == ["empty", "cluttered", "wide"]
+
+
+def test_all_maps_are_on_the_page(empty: Environment) -> None:
+    figure = plot_maps([empty] * 7)
     assert round(figure.bbox.width) == 1600
-
-
-def test_all_is_on_the_page_and_the_dark_is_dark(empty: Environment) -> None:
-    figure = plot_maps([empty] * 7, "dark")
-    assert sum(figure.get_facecolor()[:3]) < 0.6
     for axes in figure.axes:
         box = axes.get_window_extent()
-        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= 1600 and box.y1 <= figure.bbox.height
+        assert box.x0 >= 0
+        assert box.y0 >= 0
+        assert box.x1 <= 1600
+        assert box.y1 <= figure.bbox.height
+
+
+def test_a_sheet_in_the_dark_theme_is_dark(empty: Environment) -> None:
+    red, green, blue, _ = plot_maps([empty], "dark").get_facecolor()
+    assert red + green + blue < 0.6
 
 
 @pytest.mark.slow

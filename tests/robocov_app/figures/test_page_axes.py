@@ -1,3 +1,5 @@
+"""Figures that a notebook shows for their axes."""
+
 import io
 import pickle
 
@@ -11,30 +13,42 @@ from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import DARK
 
 
-def test_the_page_is_shown_for_its_axes():
+def test_axes_are_shown_with_their_whole_page():
     figure = plot_trajectories(record_walk(ROOMS, 3), size=(1300, 900))
-    png, said = figure.axes[0]._repr_png_()
+    png, _ = figure.axes[0]._repr_png_()
     assert Image.open(io.BytesIO(png)).size == (1300, 900)
-    # as large as its texts were meant to be: a page of 960 x 640 has them at 100 dots an inch
-    assert said["width"] == pytest.approx(1300 / min(1300 / 960, 900 / 640), abs=1)
-    assert "RAPF  ·  rooms" in said["alt"] and "3 robots" in said["alt"]
 
 
-def test_later_drawing_on_page_axes_is_shown():
+def test_a_page_is_shown_in_the_size_for_which_its_texts_are_meant():
+    """A page of 960 x 640 pixels has texts for 100 dots per inch."""
+    figure = plot_trajectories(record_walk(ROOMS, 3), size=(1300, 900))
+    _, metadata = figure.axes[0]._repr_png_()
+    text_scale = min(1300 / 960, 900 / 640)
+    assert metadata["width"] == pytest.approx(1300 / text_scale, abs=1)
+
+
+def test_a_shown_page_has_an_alternative_text():
+    _, metadata = plot_trajectories(record_walk(ROOMS, 3)).axes[0]._repr_png_()
+    assert "RAPF  ·  rooms" in metadata["alt"]
+    assert "3 robots" in metadata["alt"]
+
+
+def test_lines_that_are_added_to_shown_axes_appear():
     axes = plot_trajectories(record_walk(ROOMS, 3)).axes[0]
-    before, _ = axes._repr_png_()
+    png, _ = axes._repr_png_()
     axes.plot([2, 8], [1, 9])
-    assert axes._repr_png_()[0] != before
+    png_with_line, _ = axes._repr_png_()
+    assert png_with_line != png
 
 
-def test_page_axes_do_not_depend_on_the_style_of_the_user():
+def test_shown_axes_do_not_depend_on_the_matplotlib_style_of_the_user():
     axes = FigurePage((400, 300), DARK).add_axes(PageBox(20, 20, 360, 260))
-    before = axes._repr_png_()
+    expected = axes._repr_png_()
     with matplotlib.rc_context({"savefig.facecolor": "red", "savefig.bbox": "tight", "savefig.dpi": 17}):
-        assert axes._repr_png_() == before
+        assert axes._repr_png_() == expected
 
 
-def test_a_page_can_be_pickled_as_other_figures_can():
+def test_a_page_can_be_pickled():
     figure = plot_trajectories(record_walk(ROOMS, 3))
-    again = pickle.loads(pickle.dumps(figure))
-    assert again.axes[0]._repr_png_() == figure.axes[0]._repr_png_()
+    unpickled = pickle.loads(pickle.dumps(figure))
+    assert unpickled.axes[0]._repr_png_() == figure.axes[0]._repr_png_()
