@@ -1,4 +1,6 @@
-"""Plots of many runs together."""
+"""Plots of many runs: bands of cost, final costs and ratios of pairs."""
+
+import re
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from page_layout import assert_layout_is_clear
 
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
@@ -43,10 +46,8 @@ SAMPLES = [
         RNG.normal(3.0, 0.6, 3),
     ),
 ]
-PAIRS = [
-    Pairs("RAPF / RPF", choose_style("rapf"), a / b, bootstrap(a / b))
-    for a, b in [(SAMPLES[0].values, SAMPLES[1].values)]
-]
+RATIOS = SAMPLES[0].values / SAMPLES[1].values
+PAIRS = Pairs("RAPF / RPF", choose_style("rapf"), RATIOS, bootstrap(RATIOS))
 
 
 def plot_bands(bands: list[Band], size: tuple[int, int] = (860, 360), unit: str = "m") -> Figure:
@@ -57,131 +58,163 @@ def plot_boxes(groups: list[tuple[str, list[Sample]]], width: int = 420) -> Axes
     return plot_final_costs(groups, "distance (m)", width=width, scale=1.0).axes[0]
 
 
-def plot_ratios(pairs: list[Pairs]) -> Axes:
-    return plot_pairs(pairs, "ratio", width=420, scale=1.0).axes[0]
+def plot_ratios(pairs: Pairs) -> Axes:
+    return plot_pairs([pairs], "ratio", width=420, scale=1.0).axes[0]
 
 
-def test_a_band_reaches_from_the_first_quartile_to_the_third() -> None:
-    axes = plot_bands(BANDS).axes[0]
-    assert len(axes.collections) == 3
-    for band, collection in zip(BANDS, axes.collections, strict=True):
-        corners = collection.get_paths()[0].vertices
-        last = np.sort(corners[corners[:, 0] == TIME[-1], 1])
-        assert (last[0], last[-1]) == pytest.approx(tuple(np.percentile(band.values[:, -1], [25, 75])))
-    lines = [line for line in axes.lines if len(line.get_xdata()) == len(TIME)]
-    for band, line in zip(BANDS, lines, strict=True):
-        assert line.get_ydata() == pytest.approx(np.median(band.values, axis=0))
-    low, high = axes.get_ylim()
-    assert low <= min(np.percentile(band.values, 25, axis=0).min() for band in BANDS)
-    assert high >= max(np.percentile(band.values, 75, axis=0).max() for band in BANDS)
+def list_curve_lines(axes: Axes) -> list[Line2D]:
+    """Return the lines of medians, without their end marks."""
+    return [line for line in axes.lines if len(line.get_xdata()) == len(TIME)]
 
 
-def test_a_single_run_is_a_line_without_a_band() -> None:
-    axes = plot_bands([build_band("RAPF", "rapf", 2.0, runs=1)]).axes[0]
-    assert not axes.collections
+def list_points(axes: Axes) -> list[Line2D]:
+    """Return the points of each sample."""
+    return [line for line in axes.lines if line.get_marker() == "o" and line.get_clip_on()]
 
 
-def test_labels_have_the_final_median() -> None:
-    axes = plot_bands(BANDS, unit="m").axes[0]
-    labels = {text.get_text() for text in axes.texts}
-    assert labels == {f"{band.label}  {np.median(band.values[:, -1]):.3f} m" for band in BANDS}
-
-
-@pytest.mark.parametrize("size", [(420, 290), (860, 360)])
-def test_bands_and_labels_fit_on_the_page(size) -> None:
-    figure = plot_bands(BANDS, size)
-    assert_layout_is_clear(figure)
+def assert_texts_end_on_page(figure: Figure) -> None:
+    """Check that no text of the first axes is cut off at the right."""
     renderer = figure.canvas.get_renderer()
     for text in figure.axes[0].texts:
         assert text.get_window_extent(renderer).x1 <= figure.bbox.x1 + 0.5
 
 
-@pytest.mark.parametrize("size", [(860, 360), (420, 290)])
-def test_long_names_are_shortened_and_values_are_not(size) -> None:
-    long_band = BANDS[0]._replace(label="TheControllerOfSomebodyWhoLikesLongNames" * 2)
-    figure = plot_bands([long_band, BANDS[1]], size)
-    renderer = figure.canvas.get_renderer()
-    shortened, whole = figure.axes[0].texts
-    assert whole.get_text().startswith("RPF  ")
-    assert (
-        shortened.get_text().startswith("TheCon")
-        and "…  " in shortened.get_text()
-        and shortened.get_text().endswith(" m")
+class TestBands:
+    def test_a_band_reaches_from_the_first_quartile_to_the_third(self) -> None:
+        axes = plot_bands(BANDS).axes[0]
+        for band, collection in zip(BANDS, axes.collections, strict=True):
+            corners = collection.get_paths()[0].vertices
+            y_at_end = corners[corners[:, 0] == TIME[-1], 1]
+            quartiles = np.percentile(band.values[:, -1], [25, 75])
+            assert (y_at_end.min(), y_at_end.max()) == pytest.approx(tuple(quartiles))
+
+    def test_the_line_of_a_band_is_the_median(self) -> None:
+        lines = list_curve_lines(plot_bands(BANDS).axes[0])
+        for band, line in zip(BANDS, lines, strict=True):
+            assert line.get_ydata() == pytest.approx(np.median(band.values, axis=0))
+
+    def test_the_axes_contain_all_bands(self) -> None:
+        low, high = plot_bands(BANDS).axes[0].get_ylim()
+        for band in BANDS:
+            assert low <= np.percentile(band.values, 25, axis=0).min()
+            assert high >= np.percentile(band.values, 75, axis=0).max()
+
+    def test_a_single_run_is_a_line_without_a_band(self) -> None:
+        axes = plot_bands([build_band("RAPF", "rapf", 2.0, runs=1)]).axes[0]
+        assert list_curve_lines(axes)
+        assert not axes.collections
+
+    def test_labels_have_the_final_median(self) -> None:
+        axes = plot_bands(BANDS, unit="m").axes[0]
+        labels = {text.get_text() for text in axes.texts}
+        assert labels == {f"{band.label}  {np.median(band.values[:, -1]):.3f} m" for band in BANDS}
+
+    @pytest.mark.parametrize("size", [(420, 290), (860, 360)])
+    def test_bands_and_labels_fit_on_the_page(self, size: tuple[int, int]) -> None:
+        figure = plot_bands(BANDS, size)
+        assert_layout_is_clear(figure)
+        assert_texts_end_on_page(figure)
+
+    @pytest.mark.parametrize("size", [(420, 290), (860, 360)])
+    def test_long_names_are_shortened_but_values_are_not(self, size: tuple[int, int]) -> None:
+        long_name = "TheControllerOfSomebodyWhoLikesLongNames" * 2
+        figure = plot_bands([BANDS[0]._replace(label=long_name), BANDS[1]], size)
+        long_label, short_label = (text.get_text() for text in figure.axes[0].texts)
+        assert short_label.startswith("RPF  ")
+        assert re.fullmatch(r"TheCon.*…  [\d.]+ m", long_label)
+        assert_texts_end_on_page(figure)
+
+
+class TestStyles:
+    def test_controllers_of_the_paper_have_their_colors(self) -> None:
+        styles = choose_controller_styles(["rpf", "mine", "rapf", "other", "mine"])
+        assert styles["rapf"].get_color(LIGHT) == LIGHT.controllers["rapf"]
+
+    def test_custom_controllers_have_further_colors_in_their_order(self) -> None:
+        styles = choose_controller_styles(["rpf", "mine", "rapf", "other", "mine"])
+        assert styles["mine"].get_color(DARK) == DARK.others[0]
+        assert styles["other"].get_color(LIGHT) == LIGHT.others[1]
+
+    def test_controllers_have_the_same_colors_in_all_plots(self) -> None:
+        expected = to_plot_color(LIGHT.controllers["rpf"])
+        for axes in (plot_bands(BANDS).axes[0], plot_boxes([("", SAMPLES)])):
+            assert expected in {line.get_color() for line in axes.lines}
+
+    @pytest.mark.parametrize(
+        "controllers", [["rapf"] * 6, ["mine", "rapf", "mine", "rpf", "rapf", "mine"]], ids=["equal", "mixed"]
     )
-    for text in (shortened, whole):
-        assert text.get_window_extent(renderer).x1 <= figure.bbox.x1 + 0.5
+    def test_curves_of_one_controller_differ_in_color_dashes_and_mark(self, controllers: list[str]) -> None:
+        styles = choose_curve_styles(controllers)
+        for values in zip(*styles, strict=True):
+            assert len({str(value) for value in values}) == len(controllers)
+        for theme in (LIGHT, DARK):
+            assert len({style.get_color(theme) for style in styles}) == len(controllers)
+
+    @given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
+    def test_eight_curves_have_different_styles(self, controllers: list[str]) -> None:
+        styles = choose_curve_styles(controllers)
+        assert len(set(styles)) == len(controllers)
+
+    @given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
+    def test_the_first_curve_of_a_controller_has_its_style(self, controllers: list[str]) -> None:
+        styles = choose_curve_styles(controllers)
+        for name, style in choose_controller_styles(controllers).items():
+            assert styles[controllers.index(name)] == style
 
 
-def test_controllers_keep_their_colors_in_all_plots() -> None:
-    known = choose_controller_styles(["rpf", "mine", "rapf", "other", "mine"])
-    assert known["rapf"].get_color(LIGHT) == LIGHT.controllers["rapf"]
-    assert known["mine"].get_color(DARK) == DARK.others[0]
-    assert known["other"].get_color(LIGHT) == LIGHT.others[1]
-    for axes in (plot_bands(BANDS).axes[0], plot_boxes([("", SAMPLES)])):
-        assert to_plot_color(LIGHT.controllers["rpf"]) in {line.get_color() for line in axes.lines}
+class TestFinalCosts:
+    @pytest.mark.parametrize("width", [420, 860])
+    def test_each_value_of_a_sample_is_a_point(self, width: int) -> None:
+        axes = plot_boxes([("Rooms", SAMPLES), ("Museum", SAMPLES[:2])], width)
+        points = [sorted(line.get_xdata()) for line in list_points(axes)]
+        assert points == [sorted(sample.values) for sample in [*SAMPLES, *SAMPLES[:2]]]
+
+    @pytest.mark.parametrize("width", [420, 860])
+    def test_groups_have_headings(self, width: int) -> None:
+        axes = plot_boxes([("Rooms", SAMPLES), ("Museum", SAMPLES[:2])], width)
+        assert {text.get_text() for text in axes.texts} == {"Rooms", "Museum"}
+
+    @pytest.mark.parametrize("width", [420, 860])
+    def test_texts_fit_on_a_page_of_the_requested_width(self, width: int) -> None:
+        axes = plot_boxes([("Rooms", SAMPLES), ("Museum", SAMPLES[:2])], width)
+        figure = get_figure(axes)
+        assert figure.bbox.width == pytest.approx(width, abs=0.1)
+        renderer = figure.canvas.get_renderer()
+        for text in [*axes.texts, *axes.get_yticklabels()]:
+            assert text.get_window_extent(renderer).x0 >= -0.5
+
+    def test_values_that_are_not_finite_are_not_drawn(self) -> None:
+        sample = Sample("RAPF", choose_style("rapf"), np.array([1.0, np.nan, 3.0]))
+        axes = plot_boxes([("", [sample])])
+        assert axes.lines[0].get_xdata().tolist() == [1.0, 3.0]
 
 
-@pytest.mark.parametrize("controllers", [["rapf"] * 6, ["mine", "rapf", "mine", "rpf", "rapf", "mine"]])
-def test_gains_of_one_controller_differ_in_color_dashes_and_mark(controllers) -> None:
-    styles = choose_curve_styles(controllers)
-    for part in zip(*styles, strict=True):
-        assert len(set(map(str, part))) == len(controllers)
-    for theme in (LIGHT, DARK):
-        assert len({style.get_color(theme) for style in styles}) == len(controllers)
+def test_quartiles_are_those_of_finite_values() -> None:
+    """The second column has no finite value."""
+    values = np.array([[1.0, np.nan], [3.0, np.nan], [np.inf, np.nan]])
+    quartiles = np.array(compute_quartiles(values))
+    assert quartiles[:, 0].tolist() == [1.5, 2.0, 2.5]
+    assert np.isnan(quartiles[:, 1]).all()
 
 
-@given(st.lists(st.sampled_from(["rapf", "lloyd", "mine", "other"]), max_size=8))
-def test_eight_curves_have_different_styles(controllers) -> None:
-    styles = choose_curve_styles(controllers)
-    assert len(set(styles)) == len(controllers)
-    for name, style in choose_controller_styles(controllers).items():
-        assert styles[controllers.index(name)] == style
+class TestPairs:
+    def test_pairs_have_their_confidence_interval(self) -> None:
+        axes = plot_ratios(PAIRS)
+        spans = [tuple(line.get_xdata()) for line in axes.lines]
+        assert (PAIRS.interval.low, PAIRS.interval.high) in spans
 
+    def test_ratios_have_a_logarithmic_axis_with_a_line_at_one(self) -> None:
+        axes = plot_ratios(PAIRS)
+        assert axes.get_xscale() == "log"
+        assert (1.0, 1.0) in [tuple(line.get_xdata()) for line in axes.lines]
 
-@pytest.mark.parametrize("width", [420, 860])
-def test_every_value_of_a_sample_is_a_point(width) -> None:
-    axes = plot_boxes([("Rooms", SAMPLES), ("Museum", SAMPLES[:2])], width)
-    figure = get_figure(axes)
-    points = [line for line in axes.lines if line.get_marker() == "o" and line.get_clip_on()]
-    samples = [*SAMPLES, *SAMPLES[:2]]
-    assert [sorted(line.get_xdata()) for line in points] == [sorted(sample.values) for sample in samples]
-    assert {text.get_text() for text in axes.texts} == {"Rooms", "Museum"}
-    assert figure.bbox.width == pytest.approx(width, abs=0.1)
-    renderer = figure.canvas.get_renderer()
-    for text in [*axes.texts, *axes.get_yticklabels()]:
-        assert text.get_window_extent(renderer).x0 >= -0.5
+    @pytest.mark.parametrize("controller", ["rapf", "mine"])
+    def test_pairs_have_the_color_of_their_style(self, controller: str) -> None:
+        style = choose_style(controller)
+        (points,) = list_points(plot_ratios(PAIRS._replace(style=style)))
+        assert points.get_color() == to_plot_color(style.get_color(LIGHT))
 
-
-def test_values_that_are_not_finite_are_left_out() -> None:
-    axes = plot_boxes([("", [Sample("RAPF", choose_style("rapf"), np.array([1.0, np.nan, 3.0]))])])
-    assert axes.lines[0].get_xdata().tolist() == [1.0, 3.0]
-    low, middle, high = compute_quartiles(np.array([[1.0, np.nan], [3.0, np.nan], [np.inf, np.nan]]))
-    assert (low[0], middle[0], high[0]) == (1.5, 2.0, 2.5)
-    assert np.isnan([low[1], middle[1], high[1]]).all()
-
-
-def test_pairs_have_their_interval_and_a_line_at_one() -> None:
-    axes = plot_ratios(PAIRS)
-    ratio = PAIRS[0].interval
-    spans = [tuple(line.get_xdata()) for line in axes.lines]
-    assert (ratio.low, ratio.high) in spans
-    assert any(span == (1.0, 1.0) for span in spans)
-    assert axes.get_xscale() == "log"
-
-
-def test_pairs_have_the_color_of_their_style() -> None:
-    mine = choose_style("mine")
-    for each, color in (
-        (PAIRS[0], LIGHT.controllers["rapf"]),
-        (PAIRS[0]._replace(style=mine), mine.get_color(LIGHT)),
-    ):
-        (points,) = (
-            line for line in plot_ratios([each]).lines if line.get_marker() == "o" and line.get_clip_on()
-        )
-        assert points.get_color() == to_plot_color(color)
-
-
-def test_a_single_pair_has_no_interval() -> None:
-    alone = Pairs("RAPF / RPF", choose_style("rapf"), np.array([0.5]), bootstrap([0.5]))
-    axes = plot_ratios([alone])
-    assert all(np.isfinite(np.asarray(line.get_xdata(), dtype=float)).all() for line in axes.lines)
+    def test_a_single_pair_has_no_interval(self) -> None:
+        pairs = Pairs("RAPF / RPF", choose_style("rapf"), np.array([0.5]), bootstrap([0.5]))
+        for line in plot_ratios(pairs).lines:
+            assert np.isfinite(np.asarray(line.get_xdata(), dtype=float)).all()
