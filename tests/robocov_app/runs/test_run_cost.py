@@ -1,3 +1,5 @@
+"""The cost of a run: its computation, progress and refinement for figures."""
+
 import sys
 
 import numpy as np
@@ -21,7 +23,7 @@ def test_the_cost_is_that_of_the_library(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("quiet", [False, True])
-def test_long_computations_report_their_progress(monkeypatch, capsys, quiet):
+def test_long_computations_report_their_progress_unless_quiet(monkeypatch, capsys, quiet):
     monkeypatch.setattr("robocov_app.terminal.progress.PATIENCE_S", -1.0)
     build_cost(ROOMS, 48, quiet=quiet)
     output = capsys.readouterr().err
@@ -44,11 +46,18 @@ def test_costs_of_large_maps_are_not_refined(monkeypatch):
 
 def test_coarse_costs_are_refined_for_figures():
     coarse = build_cost(ROOMS, 16)
-    fine = build_cost(ROOMS, 300)
     assert refine_cost_for_figures(ROOMS, coarse).lattice == run_cost.MIN_FIGURE_LATTICE
-    assert refine_cost_for_figures(ROOMS, coarse, 20).lattice == 20
+    refined = refine_cost_for_figures(ROOMS, coarse, 20)
+    assert refined.lattice == 20
+    assert refined(POSITION).value == build_cost(ROOMS, 20)(POSITION).value
+
+
+def test_fine_costs_are_not_refined():
+    fine = build_cost(ROOMS, 300)
     assert refine_cost_for_figures(ROOMS, fine) is fine
-    # The shortest paths do not depend on the lattice, and take long on large maps.
-    finer = refine_cost_for_figures(ROOMS, coarse, 20)
-    assert finer.geodesics is coarse.geodesics
-    assert finer(POSITION).value == build_cost(ROOMS, 20)(POSITION).value
+
+
+def test_a_refined_cost_uses_the_same_shortest_paths():
+    """They do not depend on the lattice, and take long on large maps."""
+    coarse = build_cost(ROOMS, 16)
+    assert refine_cost_for_figures(ROOMS, coarse, 20).geodesics is coarse.geodesics
