@@ -1,4 +1,4 @@
-"""Axes of curves: the same rule in windows, figures and replays."""
+"""Limits and ticks of axes in windows, figures and replays."""
 
 import numpy as np
 import pytest
@@ -56,25 +56,30 @@ def test_growing_axis_contains_all_values(low: float, difference: float, max_int
     assert axis.ticks[0] == pytest.approx(axis.start)
 
 
-def test_axis_without_values_is_possible() -> None:
-    assert choose_growing_value_axis(float("nan"), float("nan"), 4) == Axis(0.0, 1.0, 0.5)
-    assert choose_growing_value_axis(0.0, 0.0, 4) == Axis(0.0, 1.0, 0.5)
+@pytest.mark.parametrize("value", [float("nan"), 0.0])
+def test_axis_without_values_is_from_zero_to_one(value: float) -> None:
+    assert choose_growing_value_axis(value, value, 4) == Axis(0.0, 1.0, 0.5)
 
 
 @given(st.floats(0.0, 1e5))
-def test_axis_of_times_has_space_for_the_present_but_not_much_more(end: float) -> None:
+def test_growing_time_axis_ends_after_the_present_but_not_much(end: float) -> None:
     limit = choose_growing_time_limit(end)
     assert end < limit <= max(10.0, 2.0 * end)
 
 
 @given(st.floats(1e-6, 1e6), st.floats(1.0, 20.0))
-def test_ticks_are_few(span: float, max_intervals: float) -> None:
+def test_tick_step_gives_few_intervals(span: float, max_intervals: float) -> None:
     step = choose_tick_step(span, max_intervals)
     assert span / step <= max_intervals * 1.002
+
+
+@given(st.floats(1e-6, 1e6), st.floats(1.0, 20.0))
+def test_ticks_are_equidistant_up_to_the_end(span: float, max_intervals: float) -> None:
+    step = choose_tick_step(span, max_intervals)
     ticks = list_ticks(0.0, span, step)
     assert len(ticks) == int(span / step + 1e-9) + 1
     assert np.allclose(np.diff(ticks), step)
 
 
-def test_rounding_down() -> None:
+def test_numbers_are_rounded_down_to_1_2_or_5_times_a_power_of_ten() -> None:
     assert [round_down(number) for number in (0.7, 1.0, 3.9, 49.0)] == [0.5, 1.0, 2.0, 20.0]
