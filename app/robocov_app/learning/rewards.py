@@ -52,8 +52,10 @@ def share_reward(
         "shared": each robot gets the whole decrease of the mean distance. "own": each robot gets the decrease
         that its own motion caused, and an equal share of the rest. "level": each robot gets the negative mean
         distance times `elapsed_fraction`.
-    before, after : CoverageResult
-        Costs of the same n robots at the last reward and now.
+    before : CoverageResult
+        Cost of the n robots at the last reward.
+    after : CoverageResult
+        Cost of the same robots now.
     elapsed_fraction : float
         Time between the two costs, relative to the duration of the episode.
 

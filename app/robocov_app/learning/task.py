@@ -66,7 +66,7 @@ class CoverageTask:
         Kind of the actions: "force" (N) or "velocity" (m/s).
     reward : str
         How rewards are shared; see `robocov_app.learning.rewards.share_reward`. They are divided by the
-        reference distance of the whole team.
+        reference distance; see `robocov_app.learning.rewards.compute_reference_distance`.
     contact_penalty : float
         Penalty for each second in contact with a wall or another robot.
     lattice : int

@@ -160,8 +160,10 @@ def gain(
         Such as "N/m"; "1" for a dimensionless gain.
     meaning : str
         Description on one line.
-    low, high : float
-        Smallest and largest allowed values.
+    low : float
+        Smallest allowed value.
+    high : float
+        Largest allowed value.
     optional : bool
         Whether None is allowed, which means no limit.
     whole : bool
