@@ -1,4 +1,4 @@
-"""The display: visible or not, and the environment variables afterwards."""
+"""Visible and headless displays, and their environment variables."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ def test_a_headless_display_does_not_hide_later_windows(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a display")
-def test_a_visible_window_is_refused_after_a_headless_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_visible_window_needs_a_screen_after_a_headless_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
     with open_display(headless=True):

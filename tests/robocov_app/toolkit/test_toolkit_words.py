@@ -1,4 +1,4 @@
-"""Layout of a window, names of keys, and typed commands."""
+"""Layout and scale of a window, names of keys, and typed commands."""
 
 import pytest
 
@@ -7,10 +7,13 @@ from robocov_app.toolkit.window.input import format_key
 from robocov_app.toolkit.window.layout import build_layout, find_max_scale, is_inside
 
 
-def test_the_panel_is_to_the_right_of_the_arena() -> None:
+def test_the_panel_is_to_the_right_of_the_map() -> None:
     layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert layout.panel == (960, 44, 320, 676)
     assert layout.arena == (128, 44, 832, 506)
+
+
+def test_a_box_does_not_contain_its_right_edge() -> None:
     assert is_inside((10, 10, 5, 5), (14, 10))
     assert not is_inside((10, 10, 5, 5), (15, 10))
 
@@ -23,8 +26,24 @@ def test_the_scale_is_limited_by_the_window_size(size: tuple[int, int], scale: f
     assert find_max_scale(size) == scale
 
 
-def test_keys_are_formatted_and_commands_split() -> None:
-    keys = ("ctrl+shift+z", "page down", "f1", "space", "`", "left")
-    assert [format_key(key) for key in keys] == ["Ctrl+Shift+Z", "Page down", "F1", "Space", "`", "←"]
-    assert split_command("k_rep = 0.5") == ("k_rep", "0.5")
-    assert (split_command("map a=b.json"), split_command("robots")) == (("map", "a=b.json"), ("robots", ""))
+@pytest.mark.parametrize(
+    ("key", "text"),
+    [
+        ("ctrl+shift+z", "Ctrl+Shift+Z"),
+        ("page down", "Page down"),
+        ("f1", "F1"),
+        ("space", "Space"),
+        ("`", "`"),
+        ("left", "←"),
+    ],
+)
+def test_keys_have_readable_names(key: str, text: str) -> None:
+    assert format_key(key) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "argument"),
+    [("k_rep = 0.5", "k_rep", "0.5"), ("map a=b.json", "map", "a=b.json"), ("robots", "robots", "")],
+)
+def test_typed_commands_are_split_into_name_and_argument(text: str, name: str, argument: str) -> None:
+    assert split_command(text) == (name, argument)

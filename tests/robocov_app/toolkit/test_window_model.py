@@ -16,15 +16,19 @@ class PatientModel(WindowModel):
     error_message_s = 2 * MESSAGE_S
 
 
-def fail(error: Exception) -> None:
+def raise_error(error: Exception) -> None:
     raise error
 
 
-def test_errors_may_be_shown_longer_than_other_messages() -> None:
+def test_messages_disappear_after_some_seconds() -> None:
     model = PatientModel()
     model.show_message("saved")
     model.pass_time(MESSAGE_S + 0.1)
     assert model.message == ""
+
+
+def test_errors_can_be_shown_longer_than_other_messages() -> None:
+    model = PatientModel()
     model.show_message("not saved", is_error=True)
     model.pass_time(MESSAGE_S + 0.1)
     assert model.message == "Not saved"
@@ -32,54 +36,94 @@ def test_errors_may_be_shown_longer_than_other_messages() -> None:
     assert model.message == ""
 
 
-def test_an_empty_message_leaves_the_present_one() -> None:
+def test_an_empty_message_keeps_the_previous_one() -> None:
     model = WindowModel()
     model.show_message("saved")
     model.show_message("")
     assert model.message == "Saved"
 
 
-def test_actions_show_their_message_or_their_error() -> None:
-    model = WindowModel()
-    model.attempt(lambda: "done")
-    assert (model.message, model.has_error_message, model.revision) == ("Done", False, 1)
-    model.attempt(lambda: fail(MapError("map: too small")))
-    assert (model.message, model.has_error_message, model.revision) == ("Map: too small", True, 2)
-    model.attempt(lambda: fail(PermissionError(13, "Permission denied", "map.json")))
-    assert model.has_error_message
-    assert "map.json" in model.message
-    model.attempt(lambda: None)
-    assert "map.json" in model.message
+class TestActions:
+    def test_an_action_shows_the_message_that_it_returns(self) -> None:
+        model = WindowModel()
+        model.attempt(lambda: "done")
+        assert model.message == "Done"
+        assert not model.has_error_message
+
+    def test_an_error_of_an_action_is_shown(self) -> None:
+        model = WindowModel()
+        model.attempt(lambda: raise_error(MapError("map: too small")))
+        assert model.message == "Map: too small"
+        assert model.has_error_message
+
+    def test_an_error_of_the_operating_system_is_shown_with_its_file(self) -> None:
+        model = WindowModel()
+        model.attempt(lambda: raise_error(PermissionError(13, "Permission denied", "map.json")))
+        assert "map.json" in model.message
+        assert model.has_error_message
+
+    def test_each_action_increments_the_revision(self) -> None:
+        model = WindowModel()
+        model.attempt(lambda: "done")
+        assert model.revision == 1
+        model.attempt(lambda: raise_error(MapError("map: too small")))
+        assert model.revision == 2
+
+    def test_an_action_without_a_message_keeps_the_previous_one(self) -> None:
+        model = WindowModel()
+        model.attempt(lambda: "done")
+        model.attempt(lambda: None)
+        assert model.message == "Done"
 
 
-def test_messages_omit_the_hidden_folder_from_paths(tmp_path: Path) -> None:
-    model = WindowModel()
-    file = tmp_path / "lab" / "rooms-1.robocov"
-    model.show_message(f"session saved: {file}")
-    assert str(file) in model.message
-    model.hidden_folder = tmp_path
-    model.show_message(f"session saved: {file}")
-    assert model.message == "Session saved: lab/rooms-1.robocov"
-    model.attempt(lambda: fail(MapError(f"{file}: not found")))
-    assert model.message == "lab/rooms-1.robocov: not found"
+class TestHiddenFolder:
+    def test_messages_have_whole_paths_by_default(self, tmp_path: Path) -> None:
+        model = WindowModel()
+        path = tmp_path / "lab" / "rooms-1.robocov"
+        model.show_message(f"session saved: {path}")
+        assert str(path) in model.message
 
+    def test_messages_omit_the_hidden_folder(self, tmp_path: Path) -> None:
+        model = WindowModel()
+        model.hidden_folder = tmp_path
+        path = tmp_path / "lab" / "rooms-1.robocov"
+        model.show_message(f"session saved: {path}")
+        assert model.message == "Session saved: lab/rooms-1.robocov"
 
-def test_a_relative_hidden_folder_is_omitted_in_every_spelling(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    model = WindowModel()
-    for folder in (Path(), Path("lab"), tmp_path / "link"):
+    def test_errors_omit_the_hidden_folder(self, tmp_path: Path) -> None:
+        model = WindowModel()
+        model.hidden_folder = tmp_path
+        path = tmp_path / "lab" / "rooms-1.robocov"
+        model.attempt(lambda: raise_error(MapError(f"{path}: not found")))
+        assert model.message == "lab/rooms-1.robocov: not found"
+
+    @pytest.mark.parametrize(
+        ("name", "is_absolute"),
+        [("", False), ("lab", False), ("link", True)],
+        ids=["here", "lab", "absolute"],
+    )
+    def test_relative_absolute_and_resolved_paths_are_shortened(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, is_absolute: bool
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        folder = tmp_path / name if is_absolute else Path(name)
+        model = WindowModel()
         model.hidden_folder = folder
         for spelling in (folder, folder.absolute(), folder.resolve()):
             path = spelling / "rooms.json"
             assert model.shorten_paths(f"map opened: {path}") == "map opened: rooms.json"
-    model.hidden_folder = Path()
-    assert model.shorten_paths("../other/rooms.json") == "../other/rooms.json"
+
+    def test_paths_outside_the_hidden_folder_are_not_shortened(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        model = WindowModel()
+        model.hidden_folder = Path()
+        assert model.shorten_paths("../other/rooms.json") == "../other/rooms.json"
 
 
 @pytest.mark.parametrize(
-    ("text", "shown"),
+    ("text", "message"),
     [
         ("wall drawn; the team is split into 2 groups", "Wall drawn; the team is split into 2 groups"),
         ("undone: robot 2 failed", "Undone: robot 2 failed"),
@@ -89,7 +133,7 @@ def test_a_relative_hidden_folder_is_omitted_in_every_spelling(
         ("2 robots failed", "2 robots failed"),
     ],
 )
-def test_messages_are_in_sentence_case_but_names_are_not_changed(text: str, shown: str) -> None:
+def test_messages_are_in_sentence_case_but_names_are_not_changed(text: str, message: str) -> None:
     model = WindowModel()
     model.show_message(text)
-    assert model.message == shown
+    assert model.message == message
