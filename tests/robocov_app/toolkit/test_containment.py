@@ -251,10 +251,10 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
             editor.document.history.apply(add_circle(editor.sketch, (5.0, 5.0), 0.5))
             raise ZeroDivisionError("half-way")
 
-        monkeypatch.setattr(driver.window.play_mode, "start", apply_edit_and_fail)
-        monkeypatch.setattr(driver.window, "do", apply_edit_and_fail)
-        driver.press_key("f5")
-        monkeypatch.undo()
+        with monkeypatch.context() as patch:
+            patch.setattr(driver.window.play_mode, "start", apply_edit_and_fail)
+            patch.setattr(driver.window, "do", apply_edit_and_fail)
+            driver.press_key("f5")
         assert editor.sketch == sketch
         assert "Internal error" in editor.message
         assert editor.has_error_message

@@ -1,16 +1,18 @@
-"""Odd sizes, files, numbers and texts that once raised an error in a window or blocked it."""
+"""Sizes, files, numbers and texts that once raised an error in a window or blocked it."""
 
 from __future__ import annotations
 
 import math
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pygame
 import pytest
-from driven_editor import build_sheet, open_editor
-from driven_window import open_viewer, resize_window
+from driven_editor import EditorDriver, build_sheet, open_editor
+from driven_window import Driver, open_viewer, resize_window
 
 from robocov.environment import CircleObstacle
 from robocov_app.editor.edits.create import add_circle
@@ -30,44 +32,67 @@ def test_whole_notches_replace_a_wheel_value_that_is_not_finite(precise: float) 
     assert get_wheel_notches(event) == 2.0
 
 
+def press_keys(driver: Driver | EditorDriver, *keys: str) -> None:
+    for key in keys:
+        driver.press_key(key)
+
+
 @pytest.mark.parametrize("size", [(1, 1), (3, 700), (1300, 30)])
-def test_a_tiny_window_shows_a_part_of_a_larger_surface(size: tuple[int, int], tmp_path: Path) -> None:
-    with open_viewer(tmp_path) as driver:
-        resize_window(driver, size)
-        assert pygame.display.get_surface().get_size() == size
-        driver.press_key("ctrl+k")
-        driver.press_key("escape")
-        driver.press_key("f1")
-        resize_window(driver, (900, 600))
-        assert driver.window.screen is pygame.display.get_surface()
-    with open_editor(tmp_path) as driver:
-        resize_window(driver, size)
-        driver.press_key("ctrl+k")
-        driver.press_key("escape")
-        driver.press_key("f5")
-        driver.press_key("f5")
-        resize_window(driver, (900, 600))
-        assert driver.window.screen is pygame.display.get_surface()
+class TestTinyWindow:
+    def test_the_viewer_can_be_used(self, size: tuple[int, int], tmp_path: Path) -> None:
+        with open_viewer(tmp_path) as driver:
+            resize_window(driver, size)
+            assert pygame.display.get_surface().get_size() == size
+            press_keys(driver, "ctrl+k", "escape", "f1")
+            resize_window(driver, (900, 600))
+            assert driver.window.screen is pygame.display.get_surface()
+
+    def test_the_editor_can_be_used(self, size: tuple[int, int], tmp_path: Path) -> None:
+        with open_editor(tmp_path) as driver:
+            resize_window(driver, size)
+            press_keys(driver, "ctrl+k", "escape", "f5", "f5")
+            resize_window(driver, (900, 600))
+            assert driver.window.screen is pygame.display.get_surface()
+
+
+def create_pipe(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def create_loop_of_links(path: Path) -> None:
+    path.symlink_to(path)
 
 
 @posix_only
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("suffix", [".json", ".png", ".robocov"])
-def test_a_dropped_pipe_or_loop_of_links_is_refused(suffix: str, tmp_path: Path) -> None:
-    pipe = tmp_path / f"pipe{suffix}"
-    link = tmp_path / f"loop{suffix}"
-    os.mkfifo(pipe)
-    link.symlink_to(link)
-    with open_viewer(tmp_path / "viewer") as driver:
-        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a broken link")):
+@pytest.mark.parametrize(
+    ("create_file", "message"),
+    [
+        pytest.param(create_pipe, "got a pipe or a device", id="pipe"),
+        pytest.param(create_loop_of_links, "got a broken link", id="loop"),
+    ],
+)
+class TestDroppedFile:
+    def test_the_viewer_rejects_it(
+        self, create_file: Callable[[Path], None], message: str, suffix: str, tmp_path: Path
+    ) -> None:
+        path = tmp_path / f"file{suffix}"
+        create_file(path)
+        with open_viewer(tmp_path / "viewer") as driver:
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
-            assert expected in driver.viewer.message
-    with open_editor(tmp_path) as driver:
-        for path, expected in ((pipe, "got a pipe or a device"), (link, "got a broken link")):
+            assert message in driver.viewer.message
+
+    def test_the_editor_rejects_it(
+        self, create_file: Callable[[Path], None], message: str, suffix: str, tmp_path: Path
+    ) -> None:
+        path = tmp_path / f"file{suffix}"
+        create_file(path)
+        with open_editor(tmp_path) as driver:
             driver.post(pygame.DROPFILE, file=str(path))
             driver.settle()
-            assert expected in driver.message
+            assert message in driver.message
 
 
 @posix_only
@@ -111,10 +136,10 @@ def test_a_map_whose_file_name_is_not_text_has_drafts(tmp_path: Path) -> None:
     assert len(draft.read_sketch().obstacles) == 1
 
 
-def test_a_question_that_cannot_be_sent_is_reported(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_request_that_cannot_be_pickled_is_reported() -> None:
     worker = LatestWorker[object]("slow_service:Slow", "works")
     try:
-        worker.put(lambda: None)  # a lambda cannot be pickled
+        worker.put(lambda: None)
         for _ in range(2000):
             worker.poll()
             if not worker.is_busy:
@@ -127,10 +152,8 @@ def test_a_question_that_cannot_be_sent_is_reported(capfd: pytest.CaptureFixture
 
 
 def test_a_process_that_cannot_be_started_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(service: str) -> None:
-        raise OSError(11, "Resource temporarily unavailable")
-
-    monkeypatch.setattr("robocov_app.jobs.workers.start_process", refuse)
+    error = OSError(11, "Resource temporarily unavailable")
+    monkeypatch.setattr("robocov_app.jobs.workers.start_process", Mock(side_effect=error))
     worker = LatestWorker[object]("slow_service:Slow", "works")
     worker.put(1)
     assert not worker.is_busy

@@ -1,11 +1,11 @@
-"""Opening of both windows: sizes, scales, and the question about unsaved work."""
+"""Sizes and scales of windows, and the question about unsaved work."""
 
 from __future__ import annotations
 
 import pygame
 import pytest
 
-from robocov_app.toolkit.dialogs import create_recovery_question
+from robocov_app.toolkit.dialogs import Question, create_recovery_question
 from robocov_app.toolkit.window.display import choose_scale, find_suitable_scale
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 
@@ -20,10 +20,18 @@ def test_window_sizes_are_limited_for_settings(size: tuple[int, int], limited: t
     assert WindowSettings(width=width, height=height).width == width
 
 
-def test_a_requested_scale_has_priority_over_the_display() -> None:
-    assert choose_scale(1.5, has_display=True) == 1.5
-    assert choose_scale(None, has_display=False) == 1.0
-    assert choose_scale(None, has_display=True) is None
+@pytest.mark.parametrize(
+    ("requested", "has_display", "scale"),
+    [
+        pytest.param(1.5, True, 1.5, id="requested"),
+        pytest.param(None, False, 1.0, id="without a display"),
+        pytest.param(None, True, None, id="automatic"),
+    ],
+)
+def test_a_requested_scale_has_priority_over_the_display(
+    requested: float | None, has_display: bool, scale: float | None
+) -> None:
+    assert choose_scale(requested, has_display=has_display) == scale
 
 
 @pytest.mark.parametrize(
@@ -42,21 +50,33 @@ def test_the_scale_is_at_least_that_of_the_screen(monkeypatch: pytest.MonkeyPatc
     assert find_suitable_scale((1280, 720)) == 2.0
 
 
-@pytest.mark.parametrize(
-    ("other_count", "ending"),
-    [(0, "Draft."), (1, "\n1 more draft is available."), (3, "\n3 more drafts are available.")],
-)
-def test_the_recovery_question_counts_other_drafts(other_count: int, ending: str) -> None:
-    calls: list[str] = []
-    question = create_recovery_question(
+def create_question(calls: list[str], other_count: int = 0) -> Question:
+    """Return the question about a draft, whose answers append to `calls`."""
+    return create_recovery_question(
         "Draft.",
         other_count=other_count,
         recover=lambda: calls.append("recover"),
         discard=lambda: calls.append("discard"),
         postpone=lambda: calls.append("postpone"),
     )
-    assert question.text.endswith(ending)
-    for answer in question.answers:
+
+
+@pytest.mark.parametrize(
+    ("other_count", "ending"),
+    [(0, "Draft."), (1, "\n1 more draft is available."), (3, "\n3 more drafts are available.")],
+)
+def test_the_recovery_question_counts_other_drafts(other_count: int, ending: str) -> None:
+    assert create_question([], other_count).text.endswith(ending)
+
+
+def test_a_draft_is_recovered_discarded_or_postponed() -> None:
+    calls: list[str] = []
+    for answer in create_question(calls).answers:
         answer.call()
-    question.handle_cancel()
-    assert calls == ["recover", "discard", "postpone", "postpone"]
+    assert calls == ["recover", "discard", "postpone"]
+
+
+def test_cancelling_the_recovery_question_postpones_the_draft() -> None:
+    calls: list[str] = []
+    create_question(calls).handle_cancel()
+    assert calls == ["postpone"]

@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP end a process in time, after its drafts are written."""
+"""Processes that are ended by SIGTERM or SIGHUP, and their drafts."""
 
 from __future__ import annotations
 
@@ -49,11 +49,17 @@ with ending_on_signals():
 
 @contextmanager
 def run_program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Iterator[subprocess.Popen[str]]:
-    """Run the program until it has a change that is not saved."""
+    """Run the program until it has a change that is not saved.
+
+    `main` is the function of the program that runs then, and `prefix` is a command that starts the program.
+    """
     script = PROGRAM.replace("{main}", main)
-    pipe = subprocess.PIPE
     process = subprocess.Popen(
-        [*prefix, sys.executable, "-c", script, str(folder)], stdin=pipe, stdout=pipe, stderr=pipe, text=True
+        [*prefix, sys.executable, "-c", script, str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     try:
         assert process.stdout is not None
@@ -69,7 +75,8 @@ def run_program(folder: Path, main: str, *, prefix: tuple[str, ...] = ()) -> Ite
         process.communicate()
 
 
-def list_works(folder: Path) -> list[object]:
+def list_saved_work(folder: Path) -> list[object]:
+    """Return the content of all drafts."""
     return [record.content["work"] for record in find_drafts(folder, KIND, lambda record: record)]
 
 
@@ -80,19 +87,19 @@ def test_a_busy_process_ends_after_writing_its_draft(number: int, tmp_path: Path
         assert process.wait(HANG_LIMIT_S) == 128 + number
         assert process.stderr is not None
         assert process.stderr.read() == ""
-    assert list_works(tmp_path) == [1]
+    assert list_saved_work(tmp_path) == [1]
 
 
-def test_a_running_loop_closes_in_order(tmp_path: Path) -> None:
+def test_a_loop_that_checks_for_signals_ends_with_status_0(tmp_path: Path) -> None:
     with run_program(tmp_path, "run_loop") as process:
         process.send_signal(signal.SIGTERM)
         assert process.wait(HANG_LIMIT_S) == 0
         assert process.stdout is not None
         assert process.stdout.read() == "closed\n"
-    assert list_works(tmp_path) == [1]
+    assert list_saved_work(tmp_path) == [1]
 
 
-def test_ignored_signals_stay_ignored(tmp_path: Path) -> None:
+def test_a_signal_that_was_ignored_is_still_ignored(tmp_path: Path) -> None:
     with run_program(tmp_path, "run_loop", prefix=("nohup",)) as process:
         process.send_signal(signal.SIGHUP)
         with pytest.raises(subprocess.TimeoutExpired):
@@ -102,15 +109,16 @@ def test_ignored_signals_stay_ignored(tmp_path: Path) -> None:
 
 
 def test_previous_handlers_are_restored() -> None:
-    before = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    handlers = [signal.getsignal(number) for number in numbers]
     with ending_on_signals(), ending_on_signals():
         assert not is_ending()
-        assert signal.getsignal(signal.SIGTERM) is not before[0]
-    assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)) == before
+        assert signal.getsignal(signal.SIGTERM) is not handlers[0]
+    assert [signal.getsignal(number) for number in numbers] == handlers
     assert signal.set_wakeup_fd(-1) == -1
 
 
-def test_errors_are_passed_on() -> None:
+def test_exceptions_are_passed_on() -> None:
     with pytest.raises(ZeroDivisionError), ending_on_signals():
         _ = 1 / 0
     assert not is_ending()

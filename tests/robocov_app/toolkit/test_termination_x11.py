@@ -1,4 +1,4 @@
-"""Signals end real windows in any state without a question, after their drafts are written."""
+"""Windows on a display that are ended by SIGTERM or SIGHUP, and their drafts."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from called import COMMAND
 from served_window import serve_window
 from x11_hands import MARKS, Hands, run_window, start_display
 
-from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS
-from robocov_app.storage.settings import FOLDER_VARIABLE
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS_VARIABLE
+from robocov_app.storage.settings import FOLDER_VARIABLE as SETTINGS_VARIABLE
 
 pytestmark = MARKS
 
-HANG_LIMIT_S = 40.0  # it takes a second at most; machines of tests may be busy
+HANG_LIMIT_S = 40.0
+"""A window ends within a second, but the machine may be busy."""
 
 
 @pytest.fixture(scope="module")
@@ -29,20 +30,24 @@ def display() -> Iterator[str]:
 
 
 def build_environment(folder: Path, *, is_cold: bool) -> dict[str, str]:
-    """Return environment variables; with empty caches everything has to be compiled first."""
-    (folder / "settings").mkdir()
-    (folder / "settings/window.json").write_text("{}")  # not the first start, at which a lesson is offered
-    found = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
+    """Return environment variables with empty folders for drafts and, if cold, for compiled functions.
+
+    Settings exist, since the first start of a window offers a lesson.
+    """
+    settings = folder / "settings"
+    settings.mkdir()
+    (settings / "window.json").write_text("{}")
+    environment = {SETTINGS_VARIABLE: str(settings), DRAFTS_VARIABLE: str(folder / "drafts")}
     if is_cold:
-        found |= {"NUMBA_CACHE_DIR": str(folder / "kernels"), "ROBOCOV_CACHE": str(folder / "cache")}
-    return found
+        environment["NUMBA_CACHE_DIR"] = str(folder / "kernels")
+        environment["ROBOCOV_CACHE"] = str(folder / "cache")
+    return environment
 
 
 def end_process(process: subprocess.Popen[str], number: int) -> None:
-    began = time.monotonic()
+    """Send a signal to a process, which has to end soon."""
     process.send_signal(number)
     process.wait(HANG_LIMIT_S)
-    assert time.monotonic() - began < HANG_LIMIT_S
 
 
 def read_drafts(folder: Path) -> list[dict]:
@@ -70,15 +75,15 @@ def draw_circle(hands: Hands) -> None:
     hands.take_screenshot()
 
 
-def ask_to_save(hands: Hands) -> None:
+def open_save_question(hands: Hands) -> None:
     hands.press("ctrl+q")
 
 
-def choose_file(hands: Hands) -> None:
+def open_file_choice(hands: Hands) -> None:
     hands.press("ctrl+o")
 
 
-def show_palette(hands: Hands) -> None:
+def open_palette(hands: Hands) -> None:
     hands.press("ctrl+k")
 
 
@@ -88,8 +93,8 @@ def start_drag(hands: Hands) -> None:
     hands.move(430, 430)
 
 
-@pytest.mark.parametrize("act", [ask_to_save, choose_file, show_palette, start_drag])
-def test_an_editor_with_a_dialog_ends_and_keeps_its_draft(
+@pytest.mark.parametrize("act", [open_save_question, open_file_choice, open_palette, start_drag])
+def test_an_editor_with_an_open_dialog_or_drag_ends_and_keeps_its_draft(
     display: str, tmp_path: Path, act: Callable[[Hands], None]
 ) -> None:
     command = [*COMMAND, "edit", str(tmp_path / "m.json"), "--folder", str(tmp_path), "--size", "1000x640"]

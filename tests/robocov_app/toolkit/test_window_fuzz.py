@@ -1,4 +1,4 @@
-"""Thousands of random events for both windows: nothing is raised, and the windows stay usable."""
+"""Random events for both windows, which must neither raise exceptions nor become unusable."""
 
 from __future__ import annotations
 
@@ -20,44 +20,45 @@ from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.viewer.costs.costs import Costs
 
-EVENTS = 3_000
-FEW_EVENTS = 150
+N_EVENTS = 3_000
+N_EVENTS_IN_FAST_TESTS = 150
 SEED = 1
 
 
 @pytest.fixture(autouse=True)
-def _work_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Random events also type relative paths, and save maps there.
+def _change_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Change to a temporary folder, since random events also save maps to relative paths."""
     monkeypatch.chdir(tmp_path)
 
 
-def contain_faults(window: BaseWindow, folder: Path) -> ExceptionLog:
-    """Let a window continue after a fault, so that one run finds all faults."""
+def contain_exceptions(window: BaseWindow, folder: Path) -> ExceptionLog:
+    """Let a window continue after exceptions, so that one run finds all of them, and return their log."""
     window.guard.is_enabled = True
-    window.guard.log = ExceptionLog(folder / "faults")
+    window.guard.log = ExceptionLog(folder / "exceptions")
     return window.guard.log
 
 
-def assert_no_fault(log: ExceptionLog) -> None:
+def assert_no_exceptions(log: ExceptionLog) -> None:
     assert log.file is not None
     assert log.count == 0, log.file.read_text()
 
 
-def play_editor(folder: Path, seed: int, events: int) -> ExceptionLog:
+def play_editor(folder: Path, seed: int, n_events: int) -> ExceptionLog:
+    """Send random events to an editor, check that a circle can be added and removed, and return the log."""
     with open_editor(folder, drafts=folder / "drafts") as driver:
-        log = contain_faults(driver.window, folder)
-        fuzz = RandomEvents(driver.window, folder / "odd", seed)
+        log = contain_exceptions(driver.window, folder)
+        random_events = RandomEvents(driver.window, folder / "odd", seed)
 
         def stay_open() -> None:
             driver.window.documents.may_close = False
 
-        fuzz.play(events, stay_open)
-        leave_everything(driver)
+        random_events.play(n_events, stay_open)
+        restore_window(driver)
         history: UndoHistory = driver.editor.document.history
-        before = history.sketch
+        sketch = history.sketch
         driver.editor.apply(add_circle(history.sketch, (1.0, 1.0), 0.25))
         driver.press_key("ctrl+z")
-        assert history.sketch == before
+        assert history.sketch == sketch
     return log
 
 
@@ -72,23 +73,26 @@ class CostsOfSmallMaps(Costs):
             self._map_request = None
 
 
-def play_viewer(folder: Path, seed: int, events: int) -> ExceptionLog:
+def play_viewer(folder: Path, seed: int, n_events: int) -> ExceptionLog:
+    """Send random events to a viewer, check that the palette can be opened, and return the log."""
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         patch.setattr("driven_window.Costs", CostsOfSmallMaps)
         driver = stack.enter_context(open_viewer(folder, lattice=4, robots=2))
-        log = contain_faults(driver.window, folder)
-        fuzz = RandomEvents(driver.window, folder / "odd", seed)
+        log = contain_exceptions(driver.window, folder)
+        random_events = RandomEvents(driver.window, folder / "odd", seed)
 
         def keep_small() -> None:
             session = driver.session
             viewer = driver.viewer
-            is_large = len(session.displayed.numbers) > 6 or len(session.displayed.environment.obstacles) > 20
-            if is_large or session.timeline.scenario.robots > 6:
+            displayed = session.displayed
+            has_many_robots = max(len(displayed.numbers), session.timeline.scenario.robots) > 6
+            has_many_obstacles = len(displayed.environment.obstacles) > 20
+            if has_many_robots or has_many_obstacles:
                 viewer.attempt(lambda: viewer.files.open_map("square"))
                 viewer.attempt(lambda: viewer.playback.restart(robots=2))
 
-        fuzz.play(events, keep_small)
-        leave_everything(driver)
+        random_events.play(n_events, keep_small)
+        restore_window(driver)
         for pane in driver.session.timeline.panes:
             assert np.isfinite(pane.simulation.positions).all()
         driver.press_key("ctrl+k")
@@ -96,7 +100,7 @@ def play_viewer(folder: Path, seed: int, events: int) -> ExceptionLog:
     return log
 
 
-def leave_everything(driver: Driver | EditorDriver) -> None:
+def restore_window(driver: Driver | EditorDriver) -> None:
     """Release all buttons, cancel all actions, and restore the usual size of the window."""
     pygame.event.clear()
     pygame.key.set_mods(0)
@@ -115,20 +119,20 @@ def leave_everything(driver: Driver | EditorDriver) -> None:
 
 
 def test_the_editor_handles_a_few_random_events(tmp_path: Path) -> None:
-    assert_no_fault(play_editor(tmp_path, SEED + 1, FEW_EVENTS))
+    assert_no_exceptions(play_editor(tmp_path, SEED + 1, N_EVENTS_IN_FAST_TESTS))
 
 
 def test_the_viewer_handles_a_few_random_events(tmp_path: Path) -> None:
-    assert_no_fault(play_viewer(tmp_path, SEED + 1, FEW_EVENTS))
+    assert_no_exceptions(play_viewer(tmp_path, SEED + 1, N_EVENTS_IN_FAST_TESTS))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(580)
 def test_the_editor_handles_thousands_of_random_events(tmp_path: Path) -> None:
-    assert_no_fault(play_editor(tmp_path, SEED, EVENTS))
+    assert_no_exceptions(play_editor(tmp_path, SEED, N_EVENTS))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(580)
 def test_the_viewer_handles_thousands_of_random_events(tmp_path: Path) -> None:
-    assert_no_fault(play_viewer(tmp_path, SEED, EVENTS))
+    assert_no_exceptions(play_viewer(tmp_path, SEED, N_EVENTS))
