@@ -1,4 +1,4 @@
-"""Calls of the command, in this process or in one of its own."""
+"""Calls of the command in this process or in another one."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Simulated color vision, and the difference between colors as the eye sees it."""
+"""Simulated color vision, and perceived differences between colors."""
 
 import itertools
 from collections.abc import Sequence
@@ -32,8 +32,8 @@ def compute_lab(color: Sequence[int], vision: str = "normal") -> np.ndarray:
     """Return the CIELAB coordinates of a color as a viewer with this vision sees it."""
     channels = np.asarray(color, dtype=float) / 255
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-    seen = np.clip(VISIONS[vision] @ linear, 0.0, 1.0)
-    relative = _TO_XYZ @ seen / _WHITE
+    perceived = np.clip(VISIONS[vision] @ linear, 0.0, 1.0)
+    relative = _TO_XYZ @ perceived / _WHITE
     x, y, z = np.where(relative > 0.008856, np.cbrt(relative), 7.787 * relative + 16 / 116)
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
@@ -43,7 +43,10 @@ def measure_difference(first: Sequence[int], second: Sequence[int], vision: str 
     return float(np.linalg.norm(compute_lab(first, vision) - compute_lab(second, vision)))
 
 
-def find_least_difference(colors: Sequence[Sequence[int]]) -> float:
-    """Return the least difference between two of the colors, for the worst of all visions."""
-    pairs = list(itertools.combinations(colors, 2))
-    return min(measure_difference(*pair, vision) for vision in VISIONS for pair in pairs)
+def find_min_difference(colors: Sequence[Sequence[int]]) -> float:
+    """Return the minimum difference between two of the colors over all pairs and visions."""
+    differences = []
+    for vision in VISIONS:
+        for first, second in itertools.combinations(colors, 2):
+            differences.append(measure_difference(first, second, vision))
+    return min(differences)

@@ -14,11 +14,12 @@ TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
 
 def find_layer(name, layers=None):
     """Return a layer by its name."""
-    return next(layer for layer in layers or build_standard_layers() if layer.name == name)
+    (layer,) = [layer for layer in layers or build_standard_layers() if layer.name == name]
+    return layer
 
 
 def render_layers(scene, *names, size=SIZE, theme=LIGHT, layers=None):
-    """Render a frame with only these layers, and return it with its painter."""
+    """Return a frame with only these layers, (height, width, 3), and its painter."""
     painter = Painter(scene.environment, size, theme, layers)
     painter.show_only(names)
     return painter.render_frame(scene).astype(int), painter
@@ -30,7 +31,7 @@ def list_legend_texts(painter, scene):
 
 
 def list_pixels(scene, *names, size=SIZE):
-    """List the (x, y) pixels that these layers draw, and return the painter."""
+    """Return the (x, y) pixels that these layers draw, (n, 2), and the painter."""
     frame, painter = render_layers(scene, *names, size=size)
     rows, columns = np.nonzero((frame != np.array(LIGHT.background)).any(axis=2))
     return np.column_stack([columns, rows]), painter
@@ -42,7 +43,7 @@ def measure_error(frame, pixel, color):
     return int(np.abs(frame[y, x] - np.array(color)).max())
 
 
-def measure_least_error(frame, pixel, color, reach=1):
+def measure_min_error(frame, pixel, color, reach=1):
     """Return the minimum of `measure_error` over the pixels around a pixel."""
     x, y = np.rint(pixel).astype(int)
     return min(
@@ -53,7 +54,7 @@ def measure_least_error(frame, pixel, color, reach=1):
 
 
 def sample_inside(geometry, count, seed=0):
-    """Return random points in a geometry."""
+    """Return random points in a geometry, (count, 2) m."""
     low_x, low_y, high_x, high_y = geometry.bounds
     points = np.random.default_rng(seed).uniform((low_x, low_y), (high_x, high_y), size=(20 * count, 2))
     return points[shapely.contains_xy(geometry, points)][:count]

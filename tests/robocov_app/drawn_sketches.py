@@ -34,20 +34,21 @@ def renumber(sketch: Sketch) -> Sketch:
 
 
 tenths = st.integers(-20, 140).map(lambda k: k / 10)
-places = st.tuples(tenths, tenths)
+positions = st.tuples(tenths, tenths)
+"""Positions in and around the hall in steps of 0.1 m."""
 floats = st.floats(-1e6, 1e6, allow_nan=False).map(lambda x: x + 0.0)
-anywhere = st.tuples(floats, floats)
+any_positions = st.tuples(floats, floats)
 names = st.one_of(st.none(), st.sampled_from(["desk", "west wall", "süd", "“a”"]), st.text(max_size=6))
 
 
-def rings(points=places, least=0, most=7):
-    return st.lists(points, min_size=least, max_size=most).map(tuple)
+def rings(points=positions, min_size=0, max_size=7):
+    return st.lists(points, min_size=min_size, max_size=max_size).map(tuple)
 
 
 _sizes = st.integers(-2, 30).map(lambda k: k / 10)
 
 
-def shapes(points=places, sizes=_sizes):
+def shapes(points=positions, sizes=_sizes):
     """Return a strategy for obstacles, many of them invalid."""
     return st.one_of(
         st.builds(PolygonObstacle, rings(points), st.lists(rings(points), max_size=2).map(tuple), names),
@@ -59,7 +60,7 @@ def shapes(points=places, sizes=_sizes):
 @st.composite
 def valid_shapes(draw):
     """Draw obstacles that break no rule; they may overlap and extend beyond the boundary."""
-    x, y = draw(places)
+    x, y = draw(positions)
     size = draw(st.integers(2, 30)) / 10
     kind = draw(st.sampled_from(["box", "ring", "triangle", "star", "circle", "wall", "bent"]))
     name = draw(st.sampled_from([None, "desk", "pillar"]))
@@ -88,8 +89,8 @@ def valid_shapes(draw):
 
 
 starts = st.one_of(
-    st.builds(DiscStart, places, st.integers(0, 20).map(lambda k: k / 10)),
-    st.builds(PointsStart, rings(places, 0, 3)),
+    st.builds(DiscStart, positions, st.integers(0, 20).map(lambda k: k / 10)),
+    st.builds(PointsStart, rings(positions, max_size=3)),
     st.just(UniformStart()),
 )
 json_values = st.recursive(
@@ -104,7 +105,7 @@ backgrounds = st.builds(
     path=st.sampled_from(["plan.png", "../plan.jpg"]),
     pixels=st.tuples(st.integers(1, 4000), st.integers(1, 4000)),
     scale=st.floats(1e-4, 10.0),
-    corner=anywhere,
+    corner=any_positions,
     rotation_deg=st.floats(-180.0, 180.0).map(lambda x: x + 0.0),
     opacity=st.floats(0.0, 1.0).map(lambda x: x + 0.0),
     shown=st.booleans(),
@@ -131,9 +132,9 @@ def drafts(draw, shape_strategy=None):
 
 
 @st.composite
-def valid_sketches(draw, least=0, most=5):
+def valid_sketches(draw, min_size=0, max_size=5):
     """Draw sketches with valid obstacles in a hall; starts may be blocked."""
-    drawn_shapes = draw(st.lists(valid_shapes(), min_size=least, max_size=most))
+    drawn_shapes = draw(st.lists(valid_shapes(), min_size=min_size, max_size=max_size))
     return Sketch(
         name="Hall",
         boundary=HALL,
@@ -172,8 +173,8 @@ def changes(draw, sketch):
     selection = draw(selections(sketch))
     owners = [*(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
     owner = draw(st.sampled_from(owners)) if owners else BOUNDARY
-    a = draw(places)
-    b = draw(places)
+    a = draw(positions)
+    b = draw(positions)
     length = draw(_SOME_LENGTHS)
     dx = draw(_SHIFTS)
     dy = draw(_SHIFTS)

@@ -35,6 +35,7 @@ def load_sketch(name: str) -> Sketch:
 
 
 def rewrite_file(path: Path, text: str) -> None:
+    """Write a file whose modification time is later in any case."""
     path.write_text(text)
     stat = path.stat()
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 10_000_000))
@@ -66,14 +67,14 @@ def open_editor(
         try:
             yield driver
         finally:
-            if pygame.display.get_init():  # another window may have ended it
+            if pygame.display.get_init():  # Another window may have closed the display.
                 pygame.key.set_mods(0)
             driver.window.close()
             editor.document.close(discard=False)
 
 
 class EditorDriver(Driver):
-    """Uses the editor as people do; each action takes one or more frames."""
+    """Uses the editor with mouse and keys; each action takes one or more frames."""
 
     window: EditorWindow
 
@@ -81,7 +82,7 @@ class EditorDriver(Driver):
         self.window = window
         window.guard.is_enabled = False
         self.editor = window.editor
-        self.at = (5, 5)
+        self.pixel = (5, 5)
 
     def settle(self) -> None:
         """Handle the posted events, also during a trial."""
@@ -132,11 +133,11 @@ class EditorDriver(Driver):
         button = next(widget for widget in widgets if widget.kind == "button" and widget.text == text)
         self.click(*button.rect.center)
 
-    def read_refusal(self) -> str:
+    def read_dialog_error(self) -> str:
         """Return the error that the open dialog shows for the typed text, and close the dialog."""
         dialog = self.editor.dialogs.current
         assert isinstance(dialog, Choice)
-        assert dialog.error, "nothing was refused"
+        assert dialog.error, "the dialog shows no error"
         self.press_key("escape")
         assert self.editor.dialogs.current is None
         return dialog.error

@@ -27,21 +27,29 @@ from robocov_app.viewer.window.screen_video import copy_pixels
 from robocov_app.viewer.window.window import ViewerWindow
 
 SIZE = (900, 600)
-FRAME = 1 / 50
+FRAME_S = 1 / 50
 
-MAX_NOTCHES = 40  # of the wheel, to reach the end of the panel
+MAX_NOTCHES = 40
+"""Maximum number of notches of the wheel to reach the end of the panel."""
 MIN_VISIBLE_PX = 12
 
 MIDDLE = (0.6, 3.6)
 """A free position in the hall, m."""
 
 KEYS = {
-    **{
-        name: getattr(pygame, f"K_{name.upper()}")
-        for name in "space return escape tab delete home end".split()
-    },
-    **{name: getattr(pygame, f"K_{name.upper()}") for name in "left right up down backspace".split()},
-    **{f"f{k}": getattr(pygame, f"K_F{k}") for k in range(1, 13)},
+    "space": pygame.K_SPACE,
+    "return": pygame.K_RETURN,
+    "escape": pygame.K_ESCAPE,
+    "tab": pygame.K_TAB,
+    "delete": pygame.K_DELETE,
+    "backspace": pygame.K_BACKSPACE,
+    "home": pygame.K_HOME,
+    "end": pygame.K_END,
+    "left": pygame.K_LEFT,
+    "right": pygame.K_RIGHT,
+    "up": pygame.K_UP,
+    "down": pygame.K_DOWN,
+    **{f"f{number}": pygame.K_F1 + number - 1 for number in range(1, 13)},
     "page up": pygame.K_PAGEUP,
     "page down": pygame.K_PAGEDOWN,
     "enter": pygame.K_KP_ENTER,
@@ -79,11 +87,11 @@ def open_viewer(
 
 def build_key_event(name: str) -> dict[str, Any]:
     """Return the attributes of the event of a key, by its name in the list of commands."""
-    *held, last = split_key_name(name)
-    text = last if len(last) == 1 and "ctrl" not in held else ""
-    modifiers = sum(MODIFIERS[modifier] for modifier in held)
-    code = KEYS.get(last) or pygame.key.key_code(last)
-    return {"key": code, "mod": modifiers, "unicode": text, "scancode": 0}
+    *modifiers, key = split_key_name(name)
+    text = key if len(key) == 1 and "ctrl" not in modifiers else ""
+    mod = sum(MODIFIERS[modifier] for modifier in modifiers)
+    code = KEYS.get(key) or pygame.key.key_code(key)
+    return {"key": code, "mod": mod, "unicode": text, "scancode": 0}
 
 
 def build_command_table(viewer: Presenter) -> CommandTable:
@@ -102,19 +110,25 @@ def run_text(viewer: Presenter, text: str) -> None:
 
 
 class Driver:
-    """Uses a window as people do; each action takes one or more frames."""
+    """Uses a window with mouse and keys; each action takes one or more frames.
+
+    Attributes
+    ----------
+    pixel : tuple of int
+        Position of the pointer.
+    """
 
     def __init__(self, window: ViewerWindow) -> None:
         self.window = window
         window.guard.is_enabled = False
         self.viewer = window.viewer
-        self.at = (5, 5)
+        self.pixel = (5, 5)
 
     @property
     def session(self) -> Session:
         return self.viewer.session
 
-    def run_frames(self, count: int = 1, seconds: float = FRAME) -> None:
+    def run_frames(self, count: int = 1, seconds: float = FRAME_S) -> None:
         for _ in range(count):
             self.window.run_frame(seconds)
 
@@ -127,26 +141,27 @@ class Driver:
     def post(self, kind: int, **attributes: Any) -> None:
         pygame.event.post(pygame.event.Event(kind, **attributes))
 
-    # mouse
+    # Mouse
 
     def move(self, x: float, y: float, *, held: int = 0, settled: bool = True) -> None:
-        at = round(x), round(y)
-        rel = at[0] - self.at[0], at[1] - self.at[1]
-        buttons = tuple(int(held == k) for k in (1, 2, 3))
-        pygame.mouse.set_pos(at)
-        pygame.event.clear(pygame.MOUSEMOTION)  # posted by the line above
-        self.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=buttons)
-        self.at = at
+        """Move the pointer to a pixel, with a button held down if `held` is not 0."""
+        pixel = (round(x), round(y))
+        shift = (pixel[0] - self.pixel[0], pixel[1] - self.pixel[1])
+        buttons = tuple(int(held == button) for button in (1, 2, 3))
+        pygame.mouse.set_pos(pixel)
+        pygame.event.clear(pygame.MOUSEMOTION)  # Setting the position has posted an event, too.
+        self.post(pygame.MOUSEMOTION, pos=pixel, rel=shift, buttons=buttons)
+        self.pixel = pixel
         if settled:
             self.settle()
 
     def press(self, x: float, y: float, button: int = 1) -> None:
         self.move(x, y)
-        self.post(pygame.MOUSEBUTTONDOWN, pos=self.at, button=button)
+        self.post(pygame.MOUSEBUTTONDOWN, pos=self.pixel, button=button)
         self.settle()
 
     def release(self, button: int = 1) -> None:
-        self.post(pygame.MOUSEBUTTONUP, pos=self.at, button=button)
+        self.post(pygame.MOUSEBUTTONUP, pos=self.pixel, button=button)
         self.settle()
 
     def click(self, x: float, y: float, button: int = 1) -> None:
@@ -165,7 +180,7 @@ class Driver:
         self.post(pygame.MOUSEWHEEL, x=0, y=amount, precise_x=0.0, precise_y=float(amount), flipped=False)
         self.settle()
 
-    # positions in the arena
+    # Positions on the map
 
     def find_pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
         return self.window.canvas.to_pixel(point, pane)
@@ -181,7 +196,7 @@ class Driver:
     def drag_at(self, *points: tuple[float, float], pane: int = 0) -> None:
         self.drag(*(self.find_pixel(point, pane) for point in points))
 
-    # keys
+    # Keys
 
     def press_key(self, name: str, times: int = 1) -> None:
         """Press a key by its name in the list of commands, as in ``ctrl+shift+z``."""
@@ -201,7 +216,7 @@ class Driver:
             self.post(pygame.KEYUP, key=code, mod=0, unicode=character, scancode=0)
         self.settle()
 
-    # the panel
+    # Panel
 
     def get_widget(self, kind: str, name: str) -> Widget:
         """Return a widget; if it is in the closed section or out of sight, first open that or scroll."""
@@ -274,10 +289,10 @@ class Driver:
         self.click(*self.get_widget("entry", field).rect.center)
         self.type(text)
 
-    def drag_slider(self, name: str, part: float) -> None:
+    def drag_slider(self, name: str, fraction: float) -> None:
         """Drag a slider's knob to a fraction of its range."""
-        knob, free = self.find_knob(name)
-        x = self.get_widget("slider", name).rect.left + knob.width / 2 + part * free
+        knob, free_width = self.find_knob(name)
+        x = self.get_widget("slider", name).rect.left + knob.width / 2 + fraction * free_width
         self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
 
     def find_knob(self, name: str) -> tuple[pygame.Rect, float]:

@@ -48,21 +48,21 @@ def show_tour(window) -> None:
 
 
 SCENES: dict[str, tuple[str, Callable[[object], None]]] = {
-    "compared-light": ("light", show_comparison),
-    "asked-dark": ("dark", inspect_robot),
+    "comparison-light": ("light", show_comparison),
+    "robot-dark": ("dark", inspect_robot),
     "past-light": ("light", show_past),
-    "helped-dark": ("dark", show_help),
-    "toured-light": ("light", show_tour),
+    "help-dark": ("dark", show_help),
+    "tour-light": ("light", show_tour),
 }
 
 
-def play_frames(window, frames: int) -> None:
-    for _ in range(frames):
+def play_frames(window, count: int) -> None:
+    for _ in range(count):
         window.run_frame(1.0 / FPS)
 
 
-def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
-    """Render a scene. `spoil` changes its window before, to test the tolerance."""
+def draw_scene(name: str, modify: Callable[[object], None] = lambda window: None) -> np.ndarray:
+    """Return the pixels of a scene, (height, width, 3), whose window is modified before it is played."""
     from robocov_app.viewer.launch import ViewerLauncher
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.session.setup.scenario import SessionScenario
@@ -74,12 +74,13 @@ def draw_scene(name: str, spoil: Callable[[object], None] = lambda window: None)
         session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32
     )
     with launcher.window() as window:
-        spoil(window)
+        modify(window)
         play(window)
         return copy_pixels(window.screen).copy()
 
 
 def read_golden(name: str) -> np.ndarray:
+    """Return the pixels of the reference image of a scene, (height, width, 3)."""
     return np.asarray(Image.open(FOLDER / f"{name}.png").convert("RGB"))
 
 

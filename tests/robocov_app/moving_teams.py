@@ -1,4 +1,4 @@
-"""Teams that move a lot, and the hues of their cells in the data of a replay."""
+"""Teams whose cells change a lot, and the hues of their cells in the data of a replay."""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -29,22 +29,23 @@ def wait_until(condition: Callable[[], object]) -> None:
 
 
 def decode_frame(data: bytes, previous: NDArray[np.uint32] | None) -> NDArray[np.uint32]:
-    """Return the picture that a page shows after a frame, as its script computes it.
+    """Return the image that a page shows after a frame, as its script computes it.
 
     Parameters
     ----------
     data : bytes
         The encoded frame.
     previous : (height, width) array of uint32 or None
-        The picture that the page showed before.
+        The image that the page showed before.
     """
     _, width, height, left, top, box_width, box_height, starts_from_black = HEADER.unpack_from(data)
-    picture = np.zeros((height, width), np.uint32)
-    if previous is not None and previous.shape == picture.shape and not starts_from_black:
-        picture = previous.copy()
+    image = np.zeros((height, width), np.uint32)
+    has_same_size = previous is not None and previous.shape == image.shape
+    if has_same_size and not starts_from_black:
+        image = previous.copy()
     box = np.frombuffer(zlib.decompress(data[HEADER.size :]), np.uint32).reshape(box_height, box_width)
-    picture[top : top + box_height, left : left + box_width] ^= box
-    return picture
+    image[top : top + box_height, left : left + box_width] ^= box
+    return image
 
 
 def find_controller(state: dict[str, Any]) -> int | None:
@@ -64,13 +65,13 @@ class PageClient:
 
     Attributes
     ----------
-    picture : (height, width) array of uint32 or None
-        What the page shows; None before the first frame.
+    image : (height, width) array of uint32 or None
+        Displayed image; None before the first frame.
     """
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
-        self.picture: NDArray[np.uint32] | None = None
+        self.image: NDArray[np.uint32] | None = None
 
     # Input
 
@@ -109,7 +110,7 @@ class PageClient:
         for start in range(0, len(content), UPLOAD_PIECE_BYTES):
             self.socket.send(content[start : start + UPLOAD_PIECE_BYTES])
 
-    # What the server sends
+    # Output of the server
 
     def receive_message(self) -> dict[str, Any]:
         """Return the next message other than a frame."""
@@ -130,14 +131,14 @@ class PageClient:
         return self.receive_message_until(lambda message: message["kind"] == "notice")["text"]
 
     def receive_frame(self) -> NDArray[np.uint32]:
-        """Show and confirm the next frame; return the picture."""
+        """Show and confirm the next frame, and return the image."""
         while True:
             data = self.socket.recv(MAX_WAIT_S)
             if isinstance(data, bytes):
                 break
-        self.picture = decode_frame(data, self.picture)
+        self.image = decode_frame(data, self.image)
         self.send(kind="shown", number=HEADER.unpack_from(data)[0])
-        return self.picture
+        return self.image
 
     def wait_for_close(self) -> tuple[int, str] | None:
         """Return the code and the reason with which the server closes the connection.

@@ -1,4 +1,4 @@
-"""Random events for a window: keys, text, mouse, fingers, files, sizes and focus, as of a clumsy user."""
+"""Random events for a window: keys, text, mouse, fingers, files, sizes and focus."""
 
 from __future__ import annotations
 
@@ -37,46 +37,85 @@ RARE_COMMANDS = {
 
 SIZES = ((1, 1), (2, 1), (3, 700), (200, 200), (460, 600), (640, 480), (900, 600), (1300, 30), (2000, 700))
 SCALES = (0.25, 0.5, 1.0, 1.0, 1.5, 3.0, 8.0)
+EXTREME_COORDINATES = (-(2**15), -1, 0, 10**5)
 BUTTONS = (1, 1, 1, 1, 1, 2, 3, 3, 4, 5, 8, 20)
-SECONDS = (0.0, 0.001, 0.01, 0.02, 0.05, 0.3)
-STORM_KEYS = ("a", "space", "tab", "return", "escape", "backspace", "delete", "left", "ctrl+z")
+FRAME_DURATIONS_S = (0.0, 0.001, 0.01, 0.02, 0.05, 0.3)
+REPEATED_KEYS = ("a", "space", "tab", "return", "escape", "backspace", "delete", "left", "ctrl+z")
 STRANGE_KEYS = (0, 1, 127, pygame.K_CAPSLOCK, pygame.K_F15, 2**30 + 250, -1)
-WORDS = (
-    *("a\x00b", "\x00", "\x1b[31mred", "\r\n", "\u202eabc", "\udcff", "\ud83e", "\u2028", "𝔸 é ñ 中 🤖"),
-    *("nan", "inf", "-inf", "1e309", "-1", "0", "1e-320", "9" * 400, "٣", "½", "1,5", "2 x 3", "@1<45"),
-    *("%s {x}", "..", "/", "~", "~nobody/x", "a/../../b", "C:\\x", "x" * 3000, "robots 3", "seed 9"),
-    *("radius 0.3", "map square", "map nowhere", "controller lloyd", "k_rep nan", "speed 0", "time 1e308"),
-    *(
-        "branch 9",
-        "open .",
-        "open odd.json",
-        "save a\x00b",
-        "grid 0",
-        "move 1e308 1",
-        "rotate nan",
-        "scale 0",
-    ),
+TEXTS = (
+    "a\x00b",
+    "\x00",
+    "\x1b[31mred",
+    "\r\n",
+    "\u202eabc",
+    "\udcff",
+    "\ud83e",
+    "\u2028",
+    "𝔸 é ñ 中 🤖",
+    "nan",
+    "inf",
+    "-inf",
+    "1e309",
+    "-1",
+    "0",
+    "1e-320",
+    "9" * 400,
+    "٣",
+    "½",
+    "1,5",
+    "2 x 3",
+    "@1<45",
+    "%s {x}",
+    "..",
+    "/",
+    "~",
+    "~nobody/x",
+    "a/../../b",
+    "C:\\x",
+    "x" * 3000,
+    "robots 3",
+    "seed 9",
+    "radius 0.3",
+    "map square",
+    "map nowhere",
+    "controller lloyd",
+    "k_rep nan",
+    "speed 0",
+    "time 1e308",
+    "branch 9",
+    "open .",
+    "open odd.json",
+    "save a\x00b",
+    "grid 0",
+    "move 1e308 1",
+    "rotate nan",
+    "scale 0",
 )
+"""Texts with control characters, unpaired surrogates, odd numbers, odd paths, and commands."""
+
 POLYGON = {"kind": "polygon", "vertices": [[0, 0], [1, 1], [0, 1], [1, 0]]}
 CIRCLE: dict[str, Any] = {"kind": "circle", "center": [5, 5], "radius": 0.5}
 MAP: dict[str, Any] = {"format": "robocov-map", "version": 1}
-PASTED = (
-    *(
-        "",
-        " ",
-        "\x00",
-        "{",
-        "[" * 2000,
-        "[[0,0],[1,0],[1,1]]",
-        "[[0,0],[1,0]]",
-        "[null]",
-        "NaN",
-        "x" * 50_000,
-    ),
+PASTED_TEXTS = (
+    "",
+    " ",
+    "\x00",
+    "{",
+    "[" * 2000,
+    "[[0,0],[1,0],[1,1]]",
+    "[[0,0],[1,0]]",
+    "[null]",
+    "NaN",
+    "x" * 50_000,
     '{"kind": "circle", "center": [5, 5], "radius": 0.4, "note": "a\\u0000b\\ud800"}',
     "\udcff" * 10,
-    *map(json.dumps, (POLYGON, [POLYGON, CIRCLE], {"kind": "circle"}, CIRCLE | {"radius": 1e308})),
-    *map(json.dumps, (CIRCLE | {"name": "a\x00b"}, CIRCLE | {"note": "\x00\x1b"}, MAP | {"name": "\x00"})),
+    json.dumps(POLYGON),
+    json.dumps([POLYGON, CIRCLE]),
+    json.dumps({"kind": "circle"}),
+    json.dumps(CIRCLE | {"radius": 1e308}),
+    json.dumps(CIRCLE | {"name": "a\x00b"}),
+    json.dumps(CIRCLE | {"note": "\x00\x1b"}),
+    json.dumps(MAP | {"name": "\x00"}),
     json.dumps(MAP | {"format": "robocov-clipboard", "obstacles": [{"kind": "wall", "points": []}]}),
     json.dumps(MAP | {"name": "odd", "boundary": [[0, 0]], "obstacles": [CIRCLE], "starts": {"": 1}}),
 )
@@ -91,13 +130,34 @@ MESSAGES: tuple[dict[str, Any], ...] = (
     {"kind": "move", "x": 1e5, "y": -1e5, "button": 3},
     {"kind": "button", "button": 3, "down": True, "x": 10.5, "y": 10.2},
 )
-KINDS = (
-    *("WINDOWLEAVE", "WINDOWENTER", "WINDOWFOCUSLOST", "WINDOWFOCUSGAINED", "WINDOWMINIMIZED", "USEREVENT"),
-    *("WINDOWRESTORED", "WINDOWMOVED", "WINDOWSHOWN", "WINDOWHIDDEN", "WINDOWCLOSE", "CLIPBOARDUPDATE"),
-    *("DROPBEGIN", "DROPCOMPLETE", "KEYMAPCHANGED", "LOCALECHANGED", "AUDIODEVICEREMOVED", "WINDOWEXPOSED"),
-    *("RENDER_TARGETS_RESET", "APP_LOWMEMORY", "APP_TERMINATING", "WINDOWDISPLAYCHANGED", "ACTIVEEVENT"),
+OTHER_EVENTS = (
+    "WINDOWLEAVE",
+    "WINDOWENTER",
+    "WINDOWFOCUSLOST",
+    "WINDOWFOCUSGAINED",
+    "WINDOWMINIMIZED",
+    "USEREVENT",
+    "WINDOWRESTORED",
+    "WINDOWMOVED",
+    "WINDOWSHOWN",
+    "WINDOWHIDDEN",
+    "WINDOWCLOSE",
+    "CLIPBOARDUPDATE",
+    "DROPBEGIN",
+    "DROPCOMPLETE",
+    "KEYMAPCHANGED",
+    "LOCALECHANGED",
+    "AUDIODEVICEREMOVED",
+    "WINDOWEXPOSED",
+    "RENDER_TARGETS_RESET",
+    "APP_LOWMEMORY",
+    "APP_TERMINATING",
+    "WINDOWDISPLAYCHANGED",
+    "ACTIVEEVENT",
 )
-BOMB = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x02" + bytes(3)
+"""Names in pygame of events of the window and of the system."""
+
+DECOMPRESSION_BOMB = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x02" + bytes(3)
 ODD_FILES: dict[str, bytes] = {
     "empty.json": b"",
     "odd.json": b'{"format": "robocov-map", "version": 1, "name": "odd", "boundary": [[0,0],[1,0]]}',
@@ -107,7 +167,7 @@ ODD_FILES: dict[str, bytes] = {
     "nul.json": b'{"format": "robocov-map", "version": 1, "name": "a\\u0000b"}',
     "new\nline.json": b"{}",
     "cut.png": b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR",
-    "bomb.png": BOMB,
+    "bomb.png": DECOMPRESSION_BOMB,
     "text.png": b"hello",
     "x.svg": b"<svg xmlns='http://www.w3.org/2000/svg'><path d='M0 0 L1e400 nan z'/></svg>",
     "x.dxf": b"0\nSECTION\n",
@@ -145,7 +205,7 @@ def write_odd_files(folder: Path) -> list[str]:
 
 
 class RandomEvents:
-    """Posts events to a window and lets it run.
+    """Posts random events to a window, and runs its frames.
 
     Parameters
     ----------
@@ -163,7 +223,7 @@ class RandomEvents:
         self.files = write_odd_files(folder)
         self.clipboard = Clipboard()
         self.page = page_events.EventTranslator(self.clipboard)
-        self.at = (5, 5)
+        self.pixel = (5, 5)
         self.held: list[int] = []
         self.pressed: dict[str, int] = {}
 
@@ -171,7 +231,7 @@ class RandomEvents:
         """Post a number of events, with a frame after every `EVENTS_PER_FRAME` events."""
         kinds: list[tuple[float, Callable[[], None]]] = [
             (0.24, self.press_key_of_command),
-            (0.05, self.storm_keys),
+            (0.05, self.repeat_key),
             (0.06, self.type_text),
             (0.02, self.compose_text),
             (0.04, self.paste),
@@ -191,7 +251,7 @@ class RandomEvents:
         for number in range(count):
             self.random.choices(actions, weights)[0]()
             if number % EVENTS_PER_FRAME == 0:
-                self.window.run_frame(self.random.choice(SECONDS))
+                self.window.run_frame(self.random.choice(FRAME_DURATIONS_S))
                 self.window.closed = False
                 after_frame()
 
@@ -199,6 +259,7 @@ class RandomEvents:
         pygame.event.post(pygame.event.Event(kind, **content))
 
     def post_key(self, name: str) -> None:
+        """Post the press of a key and, mostly, its release."""
         content = build_key_event(name)
         self.post(pygame.KEYDOWN, **content)
         if content["unicode"]:
@@ -207,6 +268,7 @@ class RandomEvents:
             self.post(pygame.KEYUP, **content)
 
     def press_key_of_command(self) -> None:
+        """Press the key of a command, except for rare commands that were used often enough."""
         commands: Any = (self.window.replacement or self.window).commands  # type: ignore[attr-defined]
         pairs = [(command.name, key) for command in commands.commands for key in command.keys]
         name, key = self.random.choice(pairs)
@@ -214,8 +276,9 @@ class RandomEvents:
         if self.pressed[name] <= RARE_COMMANDS.get(name, math.inf):
             self.post_key(key)
 
-    def storm_keys(self) -> None:
-        content = build_key_event(self.random.choice(STORM_KEYS))
+    def repeat_key(self) -> None:
+        """Press a key many times without releasing it, and then a key that hardly exists."""
+        content = build_key_event(self.random.choice(REPEATED_KEYS))
         for _ in range(self.random.randint(2, 25)):
             self.post(pygame.KEYDOWN, **content)
             if content["unicode"]:
@@ -225,7 +288,7 @@ class RandomEvents:
         self.post(pygame.KEYDOWN, key=code, mod=mod, unicode="\x00", scancode=0)
 
     def type_text(self) -> None:
-        text = self.random.choice(WORDS)
+        text = self.random.choice(TEXTS)
         if self.random.random() < 0.5:
             self.post(pygame.TEXTINPUT, text=text)
         else:
@@ -237,42 +300,45 @@ class RandomEvents:
             self.post_key("return")
 
     def compose_text(self) -> None:
-        self.post(pygame.TEXTEDITING, text=self.random.choice((*WORDS, "", "")), start=0, length=0)
+        self.post(pygame.TEXTEDITING, text=self.random.choice((*TEXTS, "", "")), start=0, length=0)
 
     def paste(self) -> None:
-        self.clipboard.put(self.random.choice((*PASTED, *WORDS)))
+        self.clipboard.put(self.random.choice((*PASTED_TEXTS, *TEXTS)))
         self.post_key(self.random.choice(("ctrl+v", "ctrl+shift+v")))
 
     def drop_file(self) -> None:
         self.post(pygame.DROPFILE, file=self.random.choice(self.files))
 
-    def choose_position(self) -> tuple[int, int]:
+    def choose_pixel(self) -> tuple[int, int]:
+        """Return a pixel in, near or far from the window, or on a widget of the panel."""
         width, height = self.window.screen.get_size()
-        dice = self.random.random()
-        if dice < 0.04:
-            return self.random.choice((-(2**15), -1, 0, 10**5)), self.random.choice((-(2**15), -1, 0, 10**5))
+        probability = self.random.random()
+        if probability < 0.04:
+            x = self.random.choice(EXTREME_COORDINATES)
+            y = self.random.choice(EXTREME_COORDINATES)
+            return x, y
         panel = getattr(self.window.replacement or self.window, "panel", None)
-        if dice < 0.45 and panel is not None and panel.ui.widgets:
+        if probability < 0.45 and panel is not None and panel.ui.widgets:
             box = self.random.choice(list(panel.ui.widgets.values())).rect
             return self.random.randint(box.left, box.right), self.random.randint(box.top, box.bottom)
         return self.random.randint(-10, width + 10), self.random.randint(-10, height + 10)
 
     def move(self) -> None:
-        before = self.at
-        self.at = self.choose_position()
-        rel = self.at[0] - before[0], self.at[1] - before[1]
+        x, y = self.pixel
+        self.pixel = self.choose_pixel()
+        shift = (self.pixel[0] - x, self.pixel[1] - y)
         buttons = tuple(int(k in self.held) for k in (1, 2, 3))
-        self.post(pygame.MOUSEMOTION, pos=self.at, rel=rel, buttons=buttons, touch=False)
+        self.post(pygame.MOUSEMOTION, pos=self.pixel, rel=shift, buttons=buttons, touch=False)
 
     def press_button(self) -> None:
         if self.held and self.random.random() < 0.7:
-            self.post(pygame.MOUSEBUTTONUP, pos=self.at, button=self.held.pop(), touch=False)
+            self.post(pygame.MOUSEBUTTONUP, pos=self.pixel, button=self.held.pop(), touch=False)
             return
         self.move()
         button = self.random.choice(BUTTONS)
         self.held.append(button)
         for _ in range(self.random.choice((1, 1, 2))):
-            self.post(pygame.MOUSEBUTTONDOWN, pos=self.at, button=button, touch=False)
+            self.post(pygame.MOUSEBUTTONDOWN, pos=self.pixel, button=button, touch=False)
 
     def turn_wheel(self) -> None:
         amount = self.random.choice((-1, 1, 1, 3, -3, 10**6, -(10**6), 0))
@@ -310,12 +376,14 @@ class RandomEvents:
             self.window.set_appearance(appearance)
 
     def post_other(self) -> None:
+        """Post an event of the window or of the system, with random modifier keys."""
         pygame.key.set_mods(self.random.choice((0, 0, 0, *MODIFIERS.values())))
-        kind = getattr(pygame, self.random.choice(KINDS), None)
+        kind = getattr(pygame, self.random.choice(OTHER_EVENTS), None)
         if kind is not None:
             self.post(kind)
 
     def send_message(self) -> None:
+        """Post the events of a message from a browser."""
         message = page_events.MESSAGES.validate_python(self.random.choice(MESSAGES))
         for event in self.page.translate(message):  # type: ignore[arg-type]
             pygame.event.post(event)
@@ -327,5 +395,5 @@ class RandomEvents:
 
     def use_palette(self) -> None:
         self.post_key("ctrl+k")
-        self.post(pygame.TEXTINPUT, text=self.random.choice(WORDS))
+        self.post(pygame.TEXTINPUT, text=self.random.choice(TEXTS))
         self.post_key("return")

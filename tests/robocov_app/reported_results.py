@@ -1,4 +1,4 @@
-"""Results for the tests of reports: made up in memory, or saved in folders."""
+"""Results for the tests of reports: synthetic ones in memory, or saved ones in folders."""
 
 from html.parser import HTMLParser
 from pathlib import Path
@@ -24,7 +24,7 @@ from robocov_app.runs.saved_runs import SavedRun
 from robocov_app.terminal.output import replace_non_finite, write_json
 
 HOSTILE = "</script><!--\u2028'\"><img src=x onerror=alert(1)>&amp;{{7*7}}"
-"""A name that would like to be more than a name."""
+"""A name that would add elements and scripts to a page that did not escape it."""
 
 LABELS = {"rapf": "RAPF", "rpf": "RPF", "lloyd": "Lloyd"}
 
@@ -40,7 +40,7 @@ def build_record(
     seed: int = 0,
     gains: dict[str, float | None] | None = None,
 ) -> Record:
-    """Return a made-up record: every robot moves on a bent path between two free positions."""
+    """Return a synthetic record, in which each robot moves along an arc between two free positions."""
     start = environment.start("spread").sample(robots, seed)
     end = environment.start("spread").sample(robots, seed + 1000)
     time = np.arange(round(seconds * hz) + 1) / hz
@@ -70,7 +70,7 @@ def build_record(
 
 
 def build_history(record: Record, final: float, hz: float = 10.0) -> CostHistory:
-    """Return a made-up cost that falls from 6 m to `final`."""
+    """Return a synthetic cost that falls from 6 m to `final`, m."""
     time = record.time[:: max(round(1.0 / record.dt / hz), 1)]
     if time[-1] != record.time[-1]:
         time = np.append(time, record.time[-1])
@@ -137,7 +137,7 @@ def build_result(
 def build_recorded_result(
     runs: list[ReportedRun], environment: Environment = ROOMS, **options: float
 ) -> ReportedResult:
-    """Return a result whose runs have made-up records and costs; the options are those of the records."""
+    """Return a result whose runs have synthetic records and costs, with options of `build_record`."""
     loaded = {}
     for run in runs:
         if run.error is not None:
@@ -175,36 +175,43 @@ def save_comparison(folder: Path, controllers: tuple[str, ...] = ("rapf", "rpf")
 
 
 class Page(HTMLParser):
-    """The elements of a page with their attributes, and its texts."""
+    """A parsed page: its elements with their attributes, its texts and its scripts.
+
+    Raises AssertionError if tags are not nested correctly or attributes are repeated.
+    """
 
     VOID = frozenset("area base br col embed hr img input link meta source track wbr".split())
 
     def __init__(self, html: str) -> None:
         super().__init__(convert_charrefs=True)
         self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
+        self.texts: list[str] = []
         self.scripts: list[str] = []
-        self.open: list[str] = []
+        self.open_tags: list[str] = []
         self.feed(html)
         self.close()
-        assert self.open == [], self.open
+        assert self.open_tags == []
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         assert len(dict(attributes)) == len(attributes), (tag, attributes)
         self.elements.append((tag, dict(attributes)))
         if tag not in self.VOID:
-            self.open.append(tag)
+            self.open_tags.append(tag)
 
     def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         self.elements.append((tag, dict(attributes)))
 
     def handle_endtag(self, tag: str) -> None:
-        assert self.open, tag
-        assert self.open[-1] == tag, (tag, self.open)
-        self.open.pop()
+        assert self.open_tags, tag
+        assert self.open_tags.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        (self.scripts if self.open and self.open[-1] in ("script", "style") else self.words).append(data)
+        is_script = bool(self.open_tags) and self.open_tags[-1] in ("script", "style")
+        if is_script:
+            self.scripts.append(data)
+        else:
+            self.texts.append(data)
 
-    def all(self, tag: str) -> list[dict[str, str | None]]:
+    def find_all(self, tag: str) -> list[dict[str, str | None]]:
+        """Return the attributes of all elements with a tag."""
         return [attributes for name, attributes in self.elements if name == tag]

@@ -65,21 +65,26 @@ def list_texts(report: RobotReport) -> list[str]:
 
 
 def get_line(report: RobotReport, kind: str) -> ReportLine:
+    """Return the only line of a kind."""
     (line,) = [line for line in report.lines if line.kind == kind]
     return line
 
 
 def assert_forces_sum_up(report: RobotReport) -> None:
+    """Check that the resultant force is the sum of all terms."""
     total = np.array(get_line(report, "resultant").vector)
-    parts = [one.vector for one in report.lines if one.vector is not None and one.kind != "resultant"]
-    scale = max((np.abs(part).max() for part in parts), default=0.0)
-    assert np.sum(parts or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
+    terms = [line.vector for line in report.lines if line.vector is not None and line.kind != "resultant"]
+    scale = max((np.abs(term).max() for term in terms), default=0.0)
+    assert np.sum(terms or [(0.0, 0.0)], axis=0) == pytest.approx(total, abs=1e-5 + 1e-8 * scale)
 
 
 def assert_consistent(report: RobotReport) -> None:
+    """Check that texts have no placeholders or raw numbers, and that forces are finite and sum up."""
     for text in (report.title, report.verdict, *list_texts(report)):
-        assert text == " ".join(text.split()) != ""
+        assert text
+        assert text == " ".join(text.split())
         assert not re.search(r"nan|inf|None|\de[+-]?\d|-0\.00|\bj\b", text), text
-    assert all(np.isfinite(one.vector).all() for one in report.lines if one.vector is not None)
+    vectors = [line.vector for line in report.lines if line.vector is not None]
+    assert np.isfinite(vectors).all()
     assert report.lines[0].vector is None
     assert_forces_sum_up(report)

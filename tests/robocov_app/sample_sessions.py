@@ -64,7 +64,7 @@ def get_positions(session: Session) -> list[np.ndarray]:
 
 
 def describe_state(session: Session) -> list[object]:
-    """Return everything about the state of a session, so that it can be compared."""
+    """Return all values of the state of a session, for comparisons."""
     timeline = session.timeline
     state: list[object] = [
         timeline.scenario,
@@ -101,8 +101,8 @@ def describe_state(session: Session) -> list[object]:
 
 
 def compute_penetration(session: Session) -> float:
-    """Return the largest overlap of a robot with a wall or an obstacle, m; inf for a robot inside one."""
-    largest = -np.inf
+    """Return the maximum overlap of a robot with a wall or an obstacle, m; inf for a robot inside one."""
+    max_overlap = -np.inf
     for pane in session.timeline.panes:
         free_area = pane.setup.sensed_environment.free
         centers = shapely.points(pane.simulation.positions)
@@ -110,8 +110,8 @@ def compute_penetration(session: Session) -> float:
             return np.inf
         distances = shapely.distance(free_area.boundary, centers)
         overlaps = pane.simulation.team.radius - distances
-        largest = max(largest, float(overlaps.max()))
-    return largest
+        max_overlap = max(max_overlap, float(overlaps.max()))
+    return max_overlap
 
 
 def add_pillar(environment: Environment = HALL, pillar: CircleObstacle = PILLAR) -> Environment:

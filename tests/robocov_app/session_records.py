@@ -41,6 +41,6 @@ def build_record(session: Session) -> Record:
     return record
 
 
-def have_same_arrays(one: Record, other: Record) -> bool:
-    """Whether two records are the same, bit for bit."""
-    return all(np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in ARRAYS)
+def have_same_arrays(first: Record, second: Record) -> bool:
+    """Return whether the arrays of two records are the same, bit for bit."""
+    return all(np.array_equal(getattr(first, name), getattr(second, name), equal_nan=True) for name in ARRAYS)

@@ -11,7 +11,7 @@ SLEEP_S = 60.0
 
 
 class Doubling:
-    """Doubles numbers. Some words make it misbehave."""
+    """Doubles numbers. Some texts make it slow, print or fail."""
 
     failure_message = "it could not be doubled"
 

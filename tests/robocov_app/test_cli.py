@@ -1,3 +1,5 @@
+"""Commands that print information, and errors in arguments and files of all commands."""
+
 import contextlib
 import gc
 import io
@@ -80,9 +82,12 @@ def test_controllers_lists_gains_with_units_and_recommendations(
     assert "atlas   Atlas   (recommended)" in out
 
 
-def test_controllers_lists_the_named_ones_only(capsys: pytest.CaptureFixture[str]) -> None:
+def test_controllers_lists_only_named_ones_if_there_are_any(capsys: pytest.CaptureFixture[str]) -> None:
     rows = read_json(capsys, "controllers", "lloyd", "rapf")["controllers"]
     assert [row["name"] for row in rows] == ["lloyd", "rapf"]
+
+
+def test_controllers_rejects_unknown_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["controllers", "loyd"]) == 2
     assert "unknown controller 'loyd': did you mean 'lloyd'?" in capsys.readouterr().err
 
@@ -94,24 +99,37 @@ def test_the_map_schema_is_a_valid_json_schema(capsys: pytest.CaptureFixture[str
     jsonschema.Draft202012Validator.check_schema(json.loads(capsys.readouterr().out))
 
 
-def test_check_measures_maps_and_reports_each_invalid_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    row = read_json(capsys, "check", "square")["maps"][0]
+def test_check_measures_areas(capsys: pytest.CaptureFixture[str]) -> None:
+    (row,) = read_json(capsys, "check", "square")["maps"]
     assert row["valid"]
-    assert row["area_m2"] == row["free_area_m2"] == 100.0
+    assert row["area_m2"] == 100.0
+    assert row["free_area_m2"] == 100.0
     assert row["components_m2"] == [100.0]
-    invalid = tmp_path / "invalid.json"
-    invalid.write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundary": [[0, 0], [1, 1]]}')
-    assert main(["check", "square", str(invalid), "--json"]) == 2
-    rows = json.loads(capsys.readouterr().out)["maps"]
-    assert [row["valid"] for row in rows] == [True, False]
-    assert rows[1]["error"].startswith(f"{invalid}:1:66: boundary")
-    assert (rows[1]["line"], rows[1]["column"]) == (1, 66)
-    assert main(["check", "square", str(invalid)]) == 2
-    printed = capsys.readouterr()
-    assert "narrowest gap" in printed.out
-    assert f"robocov: error: {invalid}:1:66: boundary" in printed.err
+
+
+@pytest.fixture
+def invalid_map(tmp_path: Path) -> Path:
+    """A map with an error in line 1, column 66."""
+    path = tmp_path / "invalid.json"
+    path.write_text('{"format": "robocov-map", "version": 1, "name": "x", "boundary": [[0, 0], [1, 1]]}')
+    return path
+
+
+def test_check_reports_invalid_maps_as_json(invalid_map: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "square", str(invalid_map), "--json"]) == 2
+    valid_row, invalid_row = json.loads(capsys.readouterr().out)["maps"]
+    assert valid_row["valid"]
+    assert not invalid_row["valid"]
+    assert invalid_row["error"].startswith(f"{invalid_map}:1:66: boundary")
+    assert invalid_row["line"] == 1
+    assert invalid_row["column"] == 66
+
+
+def test_check_prints_valid_maps_and_errors(invalid_map: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "square", str(invalid_map)]) == 2
+    output = capsys.readouterr()
+    assert "narrowest gap" in output.out
+    assert f"robocov: error: {invalid_map}:1:66: boundary" in output.err
 
 
 def test_the_cost_of_a_robot_at_the_center_of_a_square_is_exact(
@@ -132,15 +150,27 @@ def test_the_cost_of_a_robot_at_the_center_of_a_square_is_exact(
         assert (saved["owner"] == 0).all()
 
 
-def test_an_import_replaces_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    plan = tmp_path / "plan.json"
-    plan.write_text(
-        json.dumps({"id": "flat", "verts": [[0, 0], [6, 0], [6, 4], [3, 4], [3, 7], [0, 7], [0, 0]]})
-    )
+@pytest.fixture
+def plan(tmp_path: Path) -> Path:
+    """A plan of an L-shaped flat of 33 m²."""
+    path = tmp_path / "plan.json"
+    corners = [[0, 0], [6, 0], [6, 4], [3, 4], [3, 7], [0, 7], [0, 0]]
+    path.write_text(json.dumps({"id": "flat", "verts": corners}))
+    return path
+
+
+def test_an_import_keeps_the_free_area(
+    plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "flat.json"
     row = read_json(capsys, "import", str(plan), "-o", str(out))
     assert row["area_kept_m2"] == pytest.approx(33.0)
     assert load_map(out).free_area == pytest.approx(33.0)
+
+
+def test_an_import_replaces_no_file(plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "flat.json"
+    out.touch()
     assert "already exists" in read_error(capsys, "import", str(plan), "-o", str(out))
 
 
@@ -166,8 +196,7 @@ def test_an_import_replaces_no_file(tmp_path: Path, capsys: pytest.CaptureFixtur
         ("run rooms --max-speed -1", "--max-speed: expected a number from"),
         ("run rooms --fail 9@1", "--fail: expected a robot from 1 to 6, got robot 9"),
         ("run rooms --message-rate -1", "--message-rate: expected a number"),
-        ("run rooms --dt 0", "dt: expected a number from 0.0001 to 1 s, got 0.0"),
-        ("run rooms --dt nan", "dt: expected a number from 0.0001 to 1 s, got nan"),
+        ("run rooms --dt nan", "--dt: expected a number from 0.0001 to 1 s, got nan"),
         ("run rooms --duration 1e6 --record-hz 60", "rows of the record"),
         ("run rooms --duration -1", "--duration: expected a number from 0 to 1e+06 s, got -1.0"),
         ("run rooms --max-speed 0", "--max-speed: expected a number from 1e-06 to 1000, got 0.0 m/s"),

@@ -1,3 +1,5 @@
+"""Attributes that are parsed from docstrings."""
+
 from __future__ import annotations
 
 import inspect

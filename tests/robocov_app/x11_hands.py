@@ -70,14 +70,14 @@ class Hands:
     def __init__(self, process: subprocess.Popen, display: str, folder: Path) -> None:
         self.process = process
         self.folder = folder
-        self.screenshots = len(list(folder.glob("robocov-*.png")))
+        self.screenshot_count = len(list(folder.glob("robocov-*.png")))
         self.environment = {**os.environ, "DISPLAY": display}
         self.window = ""
 
     def run_xdotool(self, *arguments: object) -> str:
         command = ["xdotool", *map(str, arguments)]
-        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
-        return done.stdout.strip()
+        process = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
+        return process.stdout.strip()
 
     def wait_until(self, condition: Callable[[], object], description: str) -> None:
         started_at = time.monotonic()
@@ -125,27 +125,27 @@ class Hands:
         self.run_xdotool("type", "--delay", "25", text)
 
     def take_screenshot(self) -> np.ndarray:
-        """Press F12, and return the saved picture. Pictures from before the first drawing are skipped."""
+        """Press F12, and return the saved pixels, (height, width, 3). Black screenshots are skipped."""
         while True:
-            self.screenshots += 1
-            path = self.folder / f"robocov-{self.screenshots}.png"
+            self.screenshot_count += 1
+            path = self.folder / f"robocov-{self.screenshot_count}.png"
             self.press("F12")
-            self.wait_until(path.exists, f"picture {path.name}")
-            with Image.open(path) as picture:
-                pixels = np.asarray(picture.convert("RGB")).astype(int)
+            self.wait_until(path.exists, f"screenshot {path.name}")
+            with Image.open(path) as image:
+                pixels = np.asarray(image.convert("RGB")).astype(int)
             if pixels.any():
                 return pixels
 
-    def wait_for_picture(self, condition: Callable[[np.ndarray], object], description: str) -> np.ndarray:
-        """Return the first picture that fulfills a condition. An action is drawn a frame later."""
-        pictures = []
+    def wait_for_screenshot(self, condition: Callable[[np.ndarray], object], description: str) -> np.ndarray:
+        """Return the first screenshot that fulfills a condition. An action is drawn a frame later."""
+        screenshots = []
 
         def is_fulfilled() -> object:
-            pictures.append(self.take_screenshot())
-            return condition(pictures[-1])
+            screenshots.append(self.take_screenshot())
+            return condition(screenshots[-1])
 
         self.wait_until(is_fulfilled, description)
-        return pictures[-1]
+        return screenshots[-1]
 
 
 @contextmanager

@@ -36,7 +36,7 @@ LEVELS = {
 }
 
 
-@given(valid_sketches(least=2), st.sampled_from(SIDES), st.booleans())
+@given(valid_sketches(min_size=2), st.sampled_from(SIDES), st.booleans())
 def test_aligned_objects_are_level_and_move_along_one_axis(sketch, side, to_boundary):
     keys = [item.key for item in sketch.obstacles]
     before = list_bounds(sketch, keys)
@@ -53,7 +53,7 @@ def test_aligned_objects_are_level_and_move_along_one_axis(sketch, side, to_boun
     np.testing.assert_allclose(after[:, 2:] - after[:, :2], before[:, 2:] - before[:, :2], atol=2.1e-4)
 
 
-@given(valid_sketches(least=3), st.sampled_from(["x", "y"]))
+@given(valid_sketches(min_size=3), st.sampled_from(["x", "y"]))
 def test_gaps_become_equal(sketch, axis):
     keys = [item.key for item in sketch.obstacles]
     a = ("x", "y").index(axis)

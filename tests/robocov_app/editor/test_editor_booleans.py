@@ -220,7 +220,7 @@ def test_crossing_outlines_are_repaired():
     assert only.sketch.boundary == sketch.boundary
 
 
-@given(valid_sketches(least=1))
+@given(valid_sketches(min_size=1))
 def test_walls_and_circles_become_polygons_of_the_same_area(sketch):
     keys = [item.key for item in sketch.obstacles if not isinstance(item.shape, PolygonObstacle)]
     assume(keys)

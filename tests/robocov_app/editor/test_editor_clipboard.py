@@ -18,7 +18,7 @@ PILLAR = CircleObstacle((6.0, 4.0), 0.5)
 
 
 @settings(max_examples=80)
-@given(st.one_of(drafts(), valid_sketches(least=1)))
+@given(st.one_of(drafts(), valid_sketches(min_size=1)))
 def test_copied_objects_can_be_pasted(sketch):
     everything = Selection.select_all(sketch)
     assume(everything)
@@ -35,7 +35,7 @@ def test_copied_objects_can_be_pasted(sketch):
     assert json.loads(copy_selection(after, change.selection))["obstacles"] == json.loads(text)["obstacles"]
 
 
-@given(valid_sketches(least=1), st.sampled_from([(0.0, 0.0), (3.25, -1.5)]))
+@given(valid_sketches(min_size=1), st.sampled_from([(0.0, 0.0), (3.25, -1.5)]))
 def test_objects_are_pasted_at_the_cursor(sketch, at):
     whole = Selection(frozenset(item.key for item in sketch.obstacles))
     change = paste(sketch, copy_selection(sketch, whole), at)

@@ -193,7 +193,7 @@ def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
         driver.run_command("density none")
         assert driver.sketch.density is None
         driver.run_command("density some")
-        assert "expected none" in driver.read_refusal()
+        assert "expected none" in driver.read_dialog_error()
         driver.press_key("v")
         driver.run_frames(2)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, anywhere, drafts, floats, json_values, renumber, shapes, valid_sketches
+from drawn_sketches import HALL, any_positions, drafts, floats, json_values, renumber, shapes, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -34,7 +34,7 @@ EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 
 
 @settings(max_examples=150)
-@given(st.one_of(drafts(), drafts(shapes(anywhere, floats)), valid_sketches()))
+@given(st.one_of(drafts(), drafts(shapes(any_positions, floats)), valid_sketches()))
 def test_a_sketch_survives_its_document(sketch):
     document = to_document(sketch)
     again = build_sketch(json.loads(json.dumps(document)), "again")
@@ -146,7 +146,7 @@ def test_a_header_is_a_draft():
 @settings(max_examples=60)
 @given(st.data())
 def test_moving_a_vertex_changes_one_line(data):
-    sketch = data.draw(valid_sketches(least=1))
+    sketch = data.draw(valid_sketches(min_size=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
     vertex, _ = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, places, valid_shapes, valid_sketches
+from drawn_sketches import HALL, positions, valid_shapes, valid_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely import affinity
@@ -151,7 +151,7 @@ def compute_distance(a: shapely.Geometry, b: shapely.Geometry) -> float:
     return float(np.abs(first - second).max())
 
 
-@given(valid_sketches(least=1), st.sampled_from([0.0, 1.0, -2.7, 0.1234]), places)
+@given(valid_sketches(min_size=1), st.sampled_from([0.0, 1.0, -2.7, 0.1234]), positions)
 def test_moving_agrees_with_shapely(sketch, dx, about):
     change = transform.move(sketch, Selection.select_all(sketch), dx, 0.5)
     expected = affinity.translate(collect_shapes(sketch), dx, 0.5)
@@ -160,7 +160,7 @@ def test_moving_agrees_with_shapely(sketch, dx, about):
     assert back == sketch
 
 
-@given(valid_sketches(least=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), places)
+@given(valid_sketches(min_size=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), positions)
 def test_turning_agrees_with_shapely(sketch, degrees, about):
     polygons = [item.key for item in sketch.obstacles if isinstance(item.shape, PolygonObstacle)]
     change = transform.rotate(sketch, Selection(frozenset(polygons), boundary=True), degrees, about)
@@ -240,7 +240,7 @@ def test_placing_gives_the_typed_position(sketch):
     )
 
 
-@given(valid_sketches(least=1), st.sampled_from(["x", "y"]))
+@given(valid_sketches(min_size=1), st.sampled_from(["x", "y"]))
 def test_mirroring_twice_changes_nothing(sketch, axis):
     whole = Selection.select_all(sketch)
     once = transform.mirror(sketch, whole, axis).sketch

@@ -88,7 +88,7 @@ def test_a_missing_folder_is_reported_and_nothing_is_lost(driver: EditorDriver) 
     driver.press_key("ctrl+a")
     driver.type("nowhere/plan.json")
     driver.press_key("return")
-    assert "nowhere" in driver.read_refusal() and driver.editor.document.history.has_unsaved_changes
+    assert "nowhere" in driver.read_dialog_error() and driver.editor.document.history.has_unsaved_changes
 
 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(driver: EditorDriver, tmp_path: Path) -> None:
@@ -141,12 +141,12 @@ def test_maps_bundled_maps_and_other_files_can_be_opened(driver: EditorDriver, t
     driver.press_key("ctrl+o")
     driver.type("missing.txt")
     driver.press_key("return")
-    assert "missing.txt" in driver.read_refusal() and len(driver.shapes) == 18
+    assert "missing.txt" in driver.read_dialog_error() and len(driver.shapes) == 18
     (tmp_path / "bad.json").write_text('{"format": "robocov-map", "version": 1, "name": 3}')
     driver.press_key("ctrl+o")
     driver.type("bad.json")
     driver.press_key("return")
-    assert "bad.json" in driver.read_refusal() and len(driver.shapes) == 18
+    assert "bad.json" in driver.read_dialog_error() and len(driver.shapes) == 18
 
 
 def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_
     driver.press_key("ctrl+b")
     driver.type("no.png")
     driver.press_key("return")
-    assert "not an image" in driver.read_refusal()
+    assert "not an image" in driver.read_dialog_error()
     driver.window.do("background:none")
     assert driver.sketch.background is None
     driver.editor.apply(set_background(driver.sketch, Background("gone.png", (40, 30))))
@@ -214,7 +214,7 @@ def test_export_follows_the_suffix_and_asks_before_replacing(driver: EditorDrive
     driver.press_key("ctrl+a")
     driver.type("plan.xyz")
     driver.press_key("return")
-    assert "unknown format" in driver.read_refusal()
+    assert "unknown format" in driver.read_dialog_error()
     driver.editor.apply(create.add_polygon(driver.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     driver.press_key("ctrl+e")
     assert driver.editor.has_error_message and driver.editor.dialogs.current is None

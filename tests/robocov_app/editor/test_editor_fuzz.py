@@ -120,18 +120,18 @@ class RandomUser:
 
     def move(self) -> None:
         at = self.choose_position()
-        rel = at[0] - self.driver.at[0], at[1] - self.driver.at[1]
+        rel = at[0] - self.driver.pixel[0], at[1] - self.driver.pixel[1]
         pygame.mouse.set_pos(at)
-        self.driver.at = at
+        self.driver.pixel = at
         self.driver.post(pygame.MOUSEMOTION, pos=at, rel=rel, buttons=(self.held == 1, 0, self.held == 3))
 
     def press(self) -> None:
         self.held = self.random.choice(BUTTONS)
-        self.driver.post(pygame.MOUSEBUTTONDOWN, pos=self.driver.at, button=self.held)
+        self.driver.post(pygame.MOUSEBUTTONDOWN, pos=self.driver.pixel, button=self.held)
 
     def release(self) -> None:
         button = self.held if self.random.random() < 0.9 else self.random.choice(BUTTONS)
-        self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.at, button=button)
+        self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.pixel, button=button)
         self.held = 0
 
     def turn_wheel(self) -> None:

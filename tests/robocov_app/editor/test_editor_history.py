@@ -15,7 +15,7 @@ HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 @settings(max_examples=120)
 @given(st.data())
 def test_undo_is_the_exact_inverse_of_any_change(data):
-    history = UndoHistory(data.draw(st.one_of(valid_sketches(least=2), drafts())))
+    history = UndoHistory(data.draw(st.one_of(valid_sketches(min_size=2), drafts())))
     was = [(history.sketch, history.selection)]
     for _ in range(data.draw(st.integers(1, 6))):
         change = data.draw(changes(history.sketch))
@@ -43,7 +43,7 @@ def test_undo_is_the_exact_inverse_of_any_change(data):
 @settings(max_examples=100)
 @given(st.data())
 def test_coordinates_are_rounded_to_a_tenth_of_a_millimeter(data):
-    sketch = data.draw(valid_sketches(least=1))
+    sketch = data.draw(valid_sketches(min_size=1))
     change = data.draw(changes(sketch))
     document = to_document(change.sketch) if change is not None else {}
 

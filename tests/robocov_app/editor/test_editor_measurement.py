@@ -44,7 +44,7 @@ def rasterize_reach(free: shapely.Geometry, radius: float, cell: float) -> tuple
 
 @pytest.mark.slow
 @settings(max_examples=25)
-@given(valid_sketches(least=1, most=6), st.sampled_from([0.1, 0.25, 0.6]))
+@given(valid_sketches(min_size=1, max_size=6), st.sampled_from([0.1, 0.25, 0.6]))
 def test_reach_agrees_with_a_raster(sketch, radius):
     free = sketch.build_unchecked_environment().free
     if free.is_empty:

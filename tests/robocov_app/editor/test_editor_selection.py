@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, places, valid_sketches
+from drawn_sketches import HALL, positions, valid_sketches
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,7 +73,7 @@ def test_nearby_obstacles_are_found_where_none_covers_the_point(sketch):
     assert find_owner_at(Sketch(), (0.0, 0.0), 1.0) is None
 
 
-@given(valid_sketches(least=2), places, st.sampled_from([0.05, 0.5]))
+@given(valid_sketches(min_size=2), positions, st.sampled_from([0.05, 0.5]))
 def test_the_nearest_vertices_and_edges_are_found(sketch, point, reach):
     owners = [BOUNDARY, *(item.key for item in sketch.obstacles), *(name for name, _ in sketch.starts)]
     lines = [
@@ -126,7 +126,7 @@ def test_boxes_select_objects(sketch):
     assert corners.vertices == {Vertex(0, 0, 0), Vertex(0, 1, 0), Vertex(BOUNDARY, 0, 0)}
 
 
-@given(valid_sketches(least=1), places, places)
+@given(valid_sketches(min_size=1), positions, positions)
 def test_boxes_agree_with_shapely(sketch, a, b):
     box = shapely.box(min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))
     inside = {item.key for item in sketch.obstacles if box.covers(item.shape.polygon.envelope)}

@@ -93,7 +93,7 @@ def test_traced_plans_become_straight():
     )
 
 
-@given(valid_sketches(least=1), st.sampled_from([1.0, 5.0, 20.0]))
+@given(valid_sketches(min_size=1), st.sampled_from([1.0, 5.0, 20.0]))
 def test_straightening_is_idempotent(sketch, degrees):
     try:
         change = straighten(sketch, Selection(), degrees)

@@ -67,7 +67,7 @@ def test_a_snap_stays_within_reach_and_has_a_guide(sketch, point, reach, grid, k
         assert math.dist(snap_point(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7
 
 
-@given(valid_sketches(least=1), cursor, st.sampled_from([0.05, 0.4, 2.0]))
+@given(valid_sketches(min_size=1), cursor, st.sampled_from([0.05, 0.4, 2.0]))
 def test_the_nearest_vertex_wins(sketch, point, reach):
     marks = [at for owner in (BOUNDARY, *sketch.index_by_key) for vertex, at in list_vertices(sketch, owner)]
     centers = [item.shape.center for item in sketch.obstacles if isinstance(item.shape, CircleObstacle)]

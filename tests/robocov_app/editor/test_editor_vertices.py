@@ -41,7 +41,7 @@ def select_vertices(*chosen: Vertex) -> Selection:
 
 @given(st.data())
 def test_a_placed_vertex_has_its_position(data):
-    sketch = data.draw(valid_sketches(least=1))
+    sketch = data.draw(valid_sketches(min_size=1))
     owner = data.draw(st.sampled_from([BOUNDARY, *(item.key for item in sketch.obstacles)]))
     vertex, before = data.draw(st.sampled_from(list_vertices(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-5, 15), st.integers(-5, 15)))
@@ -154,7 +154,7 @@ def test_impossible_edits_raise_a_map_error(sketch, deed, words):
 
 @given(st.data())
 def test_inserting_on_an_edge_keeps_the_shape(data):
-    sketch = data.draw(valid_sketches(least=1))
+    sketch = data.draw(valid_sketches(min_size=1))
     edges = [
         Edge(owner, ring, k, (0.0, 0.0))
         for owner in (BOUNDARY, *(item.key for item in sketch.obstacles))

@@ -65,7 +65,7 @@ def test_the_worker_agrees_with_the_function_after_every_change():
 def test_changes_are_enough_to_rebuild_the_sketch(data):
     measuring = SketchMeasurer()
     codec = MeasurementCodec()
-    sketch = data.draw(valid_sketches(least=1))
+    sketch = data.draw(valid_sketches(min_size=1))
     known = {}
     questions = []
     for _ in range(4):

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from color_vision import find_least_difference
+from color_vision import find_min_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
@@ -107,16 +107,16 @@ class TestContrast:
 @pytest.mark.parametrize("theme", THEMES.values(), ids=lambda theme: theme.name)
 class TestDifferentColors:
     def test_the_selected_tool_is_visible_for_all_color_visions(self, theme):
-        assert find_least_difference([theme.accent, theme.panel]) >= 30
-        assert find_least_difference([theme.accent, get_accent_ink(theme)]) >= 30
+        assert find_min_difference([theme.accent, theme.panel]) >= 30
+        assert find_min_difference([theme.accent, get_accent_ink(theme)]) >= 30
 
     def test_cells_differ_for_all_color_visions(self, theme):
         cells = list_cell_colors(theme)
-        assert find_least_difference(cells[:N_SHARED_HUES]) >= 8.0
-        assert find_least_difference(cells) >= 4.5
+        assert find_min_difference(cells[:N_SHARED_HUES]) >= 8.0
+        assert find_min_difference(cells) >= 4.5
 
     def test_controllers_of_the_paper_differ_for_all_color_visions(self, theme):
-        assert find_least_difference(list(theme.controllers.values())) >= 18.0
+        assert find_min_difference(list(theme.controllers.values())) >= 18.0
 
     def test_custom_controllers_differ_from_all_others(self, theme):
         curves = [*theme.controllers.values(), *theme.others]

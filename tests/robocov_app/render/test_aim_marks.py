@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import SIZE, TWO, list_legend_texts, list_pixels, measure_least_error, render_layers
+from drawn_pixels import SIZE, TWO, list_legend_texts, list_pixels, measure_min_error, render_layers
 from drawn_run import SQUARE, build_scene
 
 from robocov.observation import Decision, Snapshot
@@ -23,7 +23,7 @@ def test_centroids_are_plus_signs() -> None:
     frame, painter = render_layers(build_scene(TWO, goals=CENTROIDS), "centroids")
     for center in painter.camera.to_pixels(CENTROIDS):
         for offset in PLUS_SIGN_PX:
-            assert measure_least_error(frame, center + offset, LIGHT.ink) < 60
+            assert measure_min_error(frame, center + offset, LIGHT.ink) < 60
 
 
 @pytest.mark.parametrize("layer", ["centroids", "goals"])
@@ -33,7 +33,7 @@ def test_other_goals_are_times_signs(layer: str) -> None:
     frame, painter = render_layers(build_scene(TWO, goals=goals), layer)
     for center in painter.camera.to_pixels(goals):
         for offset in TIMES_SIGN_PX:
-            assert measure_least_error(frame, center + offset, LIGHT.final) < 90
+            assert measure_min_error(frame, center + offset, LIGHT.final) < 90
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_robot_without_a_goal_has_no_cross(layer: str) -> None:
     goals = np.array([[3.0, 6.0], [np.nan, np.nan]])
     scene = build_scene(TWO, goals=goals)
     frame, painter = render_layers(scene, layer)
-    assert measure_least_error(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 90
+    assert measure_min_error(frame, painter.camera.to_pixels(goals[0]), LIGHT.final) < 90
     pixels, _ = list_pixels(scene, layer)
     points = painter.camera.to_world(pixels.astype(float))
     assert (points[:, 0] < 4.0).all()

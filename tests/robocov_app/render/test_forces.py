@@ -10,7 +10,7 @@ from drawn_pixels import (
     find_layer,
     list_legend_texts,
     list_pixels,
-    measure_least_error,
+    measure_min_error,
     render_layers,
 )
 from drawn_run import build_scene
@@ -116,7 +116,7 @@ class TestViscosity:
         frame, painter = render_layers(build_moving_scene(-0.9, 0.0), "force_viscosity", theme=theme)
         x, y = painter.camera.to_pixels(ONE[0])
         pixel_on_line = (x + 14.0 * painter.scale, y)
-        assert measure_least_error(frame, pixel_on_line, theme.forces["viscosity"]) < 25
+        assert measure_min_error(frame, pixel_on_line, theme.forces["viscosity"]) < 25
 
     @THEMES
     def test_the_legend_contains_viscosity(self, theme):
@@ -156,14 +156,14 @@ ROBOTS_IN_A_ROW = np.array([[1.0, 4.0], [3.0, 4.0], [7.0, 4.0]])
 def test_only_robots_within_range_are_linked():
     frame, painter = render_layers(build_scene(ROBOTS_IN_A_ROW, communication_range=2.5), "links")
     near_pair, far_pair = painter.camera.to_pixels(np.array([[2.0, 4.0], [5.0, 4.0]]))
-    assert measure_least_error(frame, near_pair, LIGHT.final) < 120
-    assert measure_least_error(frame, far_pair, LIGHT.background) == 0
+    assert measure_min_error(frame, near_pair, LIGHT.final) < 120
+    assert measure_min_error(frame, far_pair, LIGHT.background) == 0
 
 
 def test_with_unlimited_range_robots_with_adjacent_cells_are_linked():
     frame, painter = render_layers(build_scene(ROBOTS_IN_A_ROW), "links")
     far_pair = painter.camera.to_pixels(np.array([5.0, 4.0]))
-    assert measure_least_error(frame, far_pair, LIGHT.final) < 120
+    assert measure_min_error(frame, far_pair, LIGHT.final) < 120
 
 
 def test_only_sensed_obstacle_points_are_marked():
@@ -172,6 +172,6 @@ def test_only_sensed_obstacle_points_are_marked():
     scene = build_scene(TWO, obstacle_points=points)
     frame, painter = render_layers(scene, "obstacle_points")
     color = LIGHT.forces["repulsion_obstacle"]
-    assert measure_least_error(frame, painter.camera.to_pixels(points[1]), color) < 30
+    assert measure_min_error(frame, painter.camera.to_pixels(points[1]), color) < 30
     pixels, _ = list_pixels(scene, "obstacle_points")
     assert (painter.camera.to_world(pixels.astype(float))[:, 0] > 5.0).all()

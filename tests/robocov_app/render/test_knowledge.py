@@ -14,7 +14,7 @@ from drawn_pixels import (
     list_legend_texts,
     list_pixels,
     measure_error,
-    measure_least_error,
+    measure_min_error,
     render_layers,
     sample_inside,
 )
@@ -80,7 +80,7 @@ class TestRayScan:
         origin, ends = build_scan(wall_x=5.4)
         frame, painter = render_layers(build_scan_scene((origin, ends)), "scan", theme=theme)
         for pixel, end in zip(painter.camera.to_pixels(ends), ends, strict=True):
-            error = measure_least_error(frame, pixel, theme.final)
+            error = measure_min_error(frame, pixel, theme.final)
             is_hit = end[0] > 5.39
             if is_hit:
                 assert error < 40
@@ -132,7 +132,7 @@ class TestRayScan:
         wall_pixel = painter.camera.to_pixels(np.array([5.4, 4.0]))
         center_x = SIZE[0] // 2
         center_y = SIZE[1] // 2
-        assert measure_least_error(frame, wall_pixel, LIGHT.final) < 10
+        assert measure_min_error(frame, wall_pixel, LIGHT.final) < 10
         assert measure_error(frame, (center_x + 60, center_y), LIGHT.background) == 0
         assert measure_error(frame, (center_x - 60, center_y - 40), LIGHT.background) > 8
 
@@ -175,7 +175,7 @@ def list_visible_points(frame, painter, theme=LIGHT):
     """Return the indices of the sensed points that have a dot."""
     color = theme.forces["repulsion_obstacle"]
     pixels = painter.camera.to_pixels(SENSED_POINTS)
-    return [k for k, pixel in enumerate(pixels) if measure_least_error(frame, pixel, color) < 25]
+    return [k for k, pixel in enumerate(pixels) if measure_min_error(frame, pixel, color) < 25]
 
 
 def get_pale_color(theme):
@@ -209,7 +209,7 @@ class TestSensedObstacles:
         outline_color = mix(LIGHT.background, LIGHT.obstacle_edge, 0.6)
         outline_points = np.array([[4.0, 4.0], [2.5, 7.0], [2.5, 7.6], [10.05, 2.8]])
         for pixel in painter.camera.to_pixels(outline_points):
-            assert measure_least_error(frame, pixel, outline_color) < 40
+            assert measure_min_error(frame, pixel, outline_color) < 40
 
     def test_an_obstacle_in_a_courtyard_is_pale(self):
         ring = PolygonObstacle(
@@ -338,8 +338,8 @@ class TestSensedObstacles:
         )
         frame, painter = render_layers(scene, "sensed", "obstacles", theme=theme)
         on_arrow, beside_arrow = painter.camera.to_pixels(np.array([[13.0, 7.0], [13.0, 7.5]]))
-        assert measure_least_error(frame, on_arrow, theme.ink) < 30
-        assert measure_least_error(frame, beside_arrow, get_pale_color(theme)) < 5
+        assert measure_min_error(frame, on_arrow, theme.ink) < 30
+        assert measure_min_error(frame, beside_arrow, get_pale_color(theme)) < 5
 
     def test_without_sensed_points_nothing_is_drawn(self):
         scene = build_row_scene(record_walk(ROOMS, 4))
@@ -370,13 +370,13 @@ class TestCursorPath:
         for start, end in pairwise(corners):
             for fraction in np.linspace(0.15, 0.95, 9):
                 pixel = painter.camera.to_pixels(start + fraction * (end - start))
-                assert measure_least_error(frame, pixel, theme.final) < 50
+                assert measure_min_error(frame, pixel, theme.final) < 50
 
     @THEMES
     def test_the_path_has_a_dot_at_the_cursor(self, theme):
         frame, painter = render_layers(build_path_scene(), "path", theme=theme)
         cursor = painter.camera.to_pixels(np.array(CURSOR_PATH[0]))
-        assert measure_least_error(frame, cursor, theme.final) < 5
+        assert measure_min_error(frame, cursor, theme.final) < 5
 
     def test_only_the_path_and_its_label_are_drawn(self):
         pixels, painter = list_pixels(build_path_scene(), "path")
@@ -438,7 +438,7 @@ class TestCursorPath:
         assert len(labels) == 1
         for fraction in (0.3, 0.45, 0.6, 0.8):
             pixel = painter.camera.to_pixels(cursor + 0.6 * fraction * direction)
-            assert measure_least_error(frame, pixel, LIGHT.final) < 50
+            assert measure_min_error(frame, pixel, LIGHT.final) < 50
         frame_with_robot, _ = render_layers(scene, "path", "robots")
         frame_without_path, _ = render_layers(scene, "robots")
         is_robot = measure_ink(frame_without_path) > 0

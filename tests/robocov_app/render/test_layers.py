@@ -14,7 +14,7 @@ from drawn_pixels import (
     list_legend_texts,
     list_pixels,
     measure_error,
-    measure_least_error,
+    measure_min_error,
     render_layers,
     sample_inside,
 )
@@ -152,7 +152,7 @@ class TestCells:
     def test_edges_of_cells_are_drawn_between_robots(self):
         frame, painter = render_layers(build_scene(TWO), "cells")
         for pixel in painter.camera.to_pixels(np.array([[4.0, 4.0], [3.0, 5.0], [6.0, 2.0]])):
-            assert measure_least_error(frame, pixel, LIGHT.cell_edge) < 70
+            assert measure_min_error(frame, pixel, LIGHT.cell_edge) < 70
 
     @pytest.mark.parametrize(
         ("n", "is_plain"), [(100, False), pytest.param(1000, True, marks=pytest.mark.slow)]
@@ -184,7 +184,7 @@ class TestCells:
     def test_true_cells_are_drawn_if_the_controller_has_others(self, communication_range, cells):
         frame, painter = render_layers(build_cells_scene(communication_range, cells), "cells")
         on_edge, in_first_cell = painter.camera.to_pixels(np.array([[3.0, 5.0], [5.0, 1.0]]))
-        assert measure_least_error(frame, on_edge, LIGHT.cell_edge) < 70
+        assert measure_min_error(frame, on_edge, LIGHT.cell_edge) < 70
         assert measure_error(frame, in_first_cell, LIGHT.get_cell_color(0)) == 0
 
 
@@ -220,7 +220,7 @@ class TestMap:
         corners = HALL.region.vertices
         midpoints = (corners + np.roll(corners, -1, axis=0)) / 2
         for pixel in painter.camera.to_pixels(midpoints):
-            assert measure_least_error(frame, pixel, LIGHT.boundary) < 40
+            assert measure_min_error(frame, pixel, LIGHT.boundary) < 40
         concave_side = painter.camera.to_pixels(np.array([6.0, 7.0]))
         assert measure_error(frame, concave_side, LIGHT.background) == 0
 
@@ -259,7 +259,7 @@ class TestMap:
             assert measure_error(frame, center, LIGHT.background) == 0
             for direction in ((1, 0), (-1, 0), (0, 1), (0, -1)):
                 pixel = center + 4.5 * painter.scale * np.array(direction)
-                assert measure_least_error(frame, pixel, LIGHT.start) < 60
+                assert measure_min_error(frame, pixel, LIGHT.start) < 60
 
 
 class TestCrowds:
@@ -319,7 +319,7 @@ class TestRobots:
         frame, painter = render_layers(scene, "robots")
         pixels = painter.camera.to_pixels(scene.snapshot.positions)
         for (x, y), hue in zip(pixels, painter._hues, strict=True):
-            assert measure_least_error(frame, (x, y - 5.0), LIGHT.robots[hue]) < 30
+            assert measure_min_error(frame, (x, y - 5.0), LIGHT.robots[hue]) < 30
         assert min(count_number_pixels(frame, painter, scene)) >= 4
 
     def test_discs_without_numbers_have_no_pixels_of_their_color(self, monkeypatch):
@@ -416,7 +416,7 @@ class TestNumbers:
                 x, y = painter.camera.to_pixels(np.array(positions[number]))
                 robot_color = theme.robots[number - 1]
                 cell_color = theme.get_cell_color(number - 1)
-                assert measure_least_error(frame, (x, y - 5.0), robot_color) < 30
+                assert measure_min_error(frame, (x, y - 5.0), robot_color) < 30
                 assert measure_error(frame, (x, y + 30.0), cell_color) == 0
 
     def test_numbers_beyond_the_hues_do_not_choose_colors(self):
@@ -436,7 +436,7 @@ class TestTrajectories:
         for robot in range(4):
             color = LIGHT.trajectory if colors == "paper" else LIGHT.robots[robot]
             for pixel in painter.camera.to_pixels(record.positions[5:35:4, robot]):
-                assert measure_least_error(frame, pixel, color) < 110
+                assert measure_min_error(frame, pixel, color) < 110
 
     def test_a_growing_trail_looks_like_one_drawn_at_once(self):
         record = record_walk(SQUARE, 5, steps=60)
@@ -470,7 +470,7 @@ class TestTrajectories:
         frame, painter = render_layers(scene, "trajectories")
         old_pixel, new_pixel = painter.camera.to_pixels(record.positions[[20, 78], 0])
         assert (extract_patch(frame, old_pixel, 2) == LIGHT.background).all()
-        assert measure_least_error(frame, new_pixel, LIGHT.robots[0]) < 110
+        assert measure_min_error(frame, new_pixel, LIGHT.robots[0]) < 110
 
 
 CARTS = Environment(

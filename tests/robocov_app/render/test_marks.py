@@ -12,7 +12,7 @@ from drawn_pixels import (
     list_legend_texts,
     list_pixels,
     measure_error,
-    measure_least_error,
+    measure_min_error,
     render_layers,
 )
 from drawn_run import SQUARE, build_scene
@@ -68,9 +68,9 @@ class TestFailedRobots:
         center = painter.camera.to_pixels(np.array([4.0, 5.0]))
         assert measure_error(frame, center, theme.ink) < 8
         for pixel in center + 3.0 * painter.scale * DIAGONAL_DIRECTIONS:
-            assert measure_least_error(frame, pixel, theme.ink) < 40
+            assert measure_min_error(frame, pixel, theme.ink) < 40
         for pixel in center + 5.0 * painter.scale * AXIS_DIRECTIONS:
-            assert measure_least_error(frame, pixel, get_failed_color(theme)) < 12
+            assert measure_min_error(frame, pixel, get_failed_color(theme)) < 12
 
     @THEMES
     def test_a_failed_robot_has_no_hue(self, theme):
@@ -140,7 +140,7 @@ class TestFailedRobots:
         frame, painter = render_layers(scene, "failed")
         inside, outside = painter.camera.to_pixels(np.array([[4.9, 4.0], [4.0, 2.8]]))
         assert measure_error(frame, inside, get_failed_color(LIGHT)) == 0
-        assert measure_least_error(frame, outside, LIGHT.background) == 0
+        assert measure_min_error(frame, outside, LIGHT.background) == 0
 
     def test_working_robots_are_drawn_above_failed_ones(self):
         scene = build_failed_scene({3: (4.05, 4.0)}, ONE)
@@ -195,7 +195,7 @@ class TestSelection:
         for angle in np.arange(12) * np.pi / 6:
             direction = np.array([np.cos(angle), np.sin(angle)])
             pixel = center + 13 * painter.scale * direction
-            assert measure_least_error(frame, pixel, theme.ink) < 30
+            assert measure_min_error(frame, pixel, theme.ink) < 30
 
     def test_the_ring_covers_no_robot(self):
         frame, painter = render_layers(replace(build_scene(TWO), selected=1), "selection", "robots")

@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from drawn_pixels import SIZE, find_layer, measure_error, measure_least_error, render_layers
+from drawn_pixels import SIZE, find_layer, measure_error, measure_min_error, render_layers
 from drawn_run import SQUARE, build_row_scene, build_scene, record_walk
 
 from robocov_app.look.hues import choose_trail_color
@@ -190,7 +190,7 @@ class TestGaps:
             frame = render_trail(painter, trail[:n_rows], fade_s=fade_s)
             assert count_pixels_off_paths(painter, trail[:n_rows], frame, theme) == 0
         for pixel in painter.camera.to_pixels(trail[[60, 70, 78], 1]):
-            assert measure_least_error(frame, pixel, choose_trail_color(theme, 1)) < 120
+            assert measure_min_error(frame, pixel, choose_trail_color(theme, 1)) < 120
         x, y = painter.camera.to_pixels(trail[40, 1]).astype(int)
         ink_before_joining = measure_ink(frame, theme)[y - 4 : y + 5, : x - 3]
         assert ink_before_joining.max() == 0
@@ -208,7 +208,7 @@ class TestGaps:
             frame = render_trail(painter, trail[:n_rows], fade_s=fade_s)
             assert count_pixels_off_paths(painter, trail[:n_rows], frame) == 0
         for pixel in painter.camera.to_pixels(trail[[26, 44, 55], 1]):
-            assert measure_least_error(frame, pixel, choose_trail_color(LIGHT, 1)) < 150
+            assert measure_min_error(frame, pixel, choose_trail_color(LIGHT, 1)) < 150
 
     @pytest.mark.parametrize("fade_s", [None, 20.0], ids=["permanent", "fading"])
     def test_a_slow_robot_that_rejoins_elsewhere_has_two_separate_paths(self, fade_s):
@@ -229,7 +229,7 @@ class TestGaps:
             frame = render_trail(painter, trail[:n_rows], fade_s=fade_s)
         assert count_pixels_off_paths(painter, trail, frame) == 0
         pixel = painter.camera.to_pixels(trail[30, 1])
-        assert measure_least_error(frame, pixel, choose_trail_color(LIGHT, 1)) < 200
+        assert measure_min_error(frame, pixel, choose_trail_color(LIGHT, 1)) < 200
 
     @FADE_TIMES
     def test_a_robot_that_is_always_absent_has_no_path(self, fade_s):
@@ -401,7 +401,7 @@ class TestFading:
         painter = build_painter()
         frame = render_trail(painter, trail, fade_s=4.0)
         for pixel in painter.camera.to_pixels(trail[37]):
-            assert measure_least_error(frame, pixel, LIGHT.trajectory) < 150
+            assert measure_min_error(frame, pixel, LIGHT.trajectory) < 150
 
 
 @FADE_TIMES
@@ -411,7 +411,7 @@ def test_trails_are_drawn_at_high_zoom(fade_s):
     painter.camera = replace(painter.camera, center=tuple(trail[-5, 0]), zoom=2e4)
     frame = render_trail(painter, trail, fade_s=fade_s)
     pixel = painter.camera.to_pixels(trail[-5, 0])
-    assert measure_least_error(frame, pixel, choose_trail_color(LIGHT, 0), reach=3) < 110
+    assert measure_min_error(frame, pixel, choose_trail_color(LIGHT, 0), reach=3) < 110
 
 
 @pytest.mark.parametrize("fade_s", [None, 4.0], ids=["permanent", "fading"])
@@ -424,7 +424,7 @@ def test_other_robot_numbers_change_the_colors(fade_s):
         for row, number in enumerate(numbers):
             color = choose_trail_color(LIGHT, number - 1)
             for pixel in painter.camera.to_pixels(trail[[30, 36], row]):
-                assert measure_least_error(frame, pixel, color) < 90
+                assert measure_min_error(frame, pixel, color) < 90
 
 
 @pytest.mark.slow

@@ -52,18 +52,18 @@ def test_the_page_is_well_formed_and_its_ids_are_unique(html) -> None:
 def test_the_page_has_landmarks_headings_and_a_skip_link(html) -> None:
     page = Page(html)
     for tag in ("header", "nav", "main", "footer", "h1", "title"):
-        assert len(page.all(tag)) == 1, tag
+        assert len(page.find_all(tag)) == 1, tag
     levels = [int(tag[1]) for tag, _ in page.elements if re.fullmatch("h[1-6]", tag)]
     assert levels[0] == 1 and set(levels[1:]) == {2}
-    skip = next(each for each in page.all("a"))
+    skip = next(each for each in page.find_all("a"))
     assert skip == {"class": "skip", "href": "#content"}
-    for section in page.all("section"):
+    for section in page.find_all("section"):
         assert "aria-label" in section or "aria-labelledby" in section
 
 
 def test_all_images_and_plots_are_described(html) -> None:
     page = Page(html)
-    images = page.all("svg")
+    images = page.find_all("svg")
     assert len(images) > 30
     for each in images:
         hidden = each.get("aria-hidden") == "true"
@@ -74,16 +74,16 @@ def test_all_images_and_plots_are_described(html) -> None:
         "medians at 0.1: 1.430",
     ):
         assert number in descriptions, number
-    for button in page.all("button"):
+    for button in page.find_all("button"):
         assert "Open large." in button["aria-label"] and "final mean distance" in button["aria-label"]
-    assert not page.all("img")
-    assert not page.all("canvas"), "canvases are created by the script"
+    assert not page.find_all("img")
+    assert not page.find_all("canvas"), "canvases are created by the script"
 
 
 def test_tables_have_captions_and_scopes(html) -> None:
     page = Page(html)
-    assert len(page.all("table")) == len(page.all("caption")) >= 5
-    assert {each.get("scope") for each in page.all("th")} == {"col", "row"}
+    assert len(page.find_all("table")) == len(page.find_all("caption")) >= 5
+    assert {each.get("scope") for each in page.find_all("th")} == {"col", "row"}
 
 
 def test_the_page_needs_no_network(html) -> None:
@@ -94,7 +94,7 @@ def test_the_page_needs_no_network(html) -> None:
             assert name not in attributes
         assert (attributes.get("href") or "#").startswith("#")
         assert not [name for name in attributes if name.startswith("on")]
-    (policy,) = [each["content"] for each in page.all("meta") if "http-equiv" in each]
+    (policy,) = [each["content"] for each in page.find_all("meta") if "http-equiv" in each]
     assert "default-src 'none'" in policy
     (script,) = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
     digest = b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -114,14 +114,14 @@ def test_hostile_names_are_escaped() -> None:
     result = replace(result, gain_units={HOSTILE: HOSTILE}, gain_meanings={HOSTILE: HOSTILE})
     html = build_report([result], title=HOSTILE).html
     page = Page(html)
-    assert not page.all("img")
-    assert [each.get("type") for each in page.all("script")] == ["application/json", None]
+    assert not page.find_all("img")
+    assert [each.get("type") for each in page.find_all("script")] == ["application/json", None]
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
     assert data["maps"][0]["name"] == escape_controls(HOSTILE)
     assert escape_controls(HOSTILE) in data["runs"][0]["title"]
-    assert escape_controls(HOSTILE) in "".join(page.words)
-    assert "{{7*7}}" in "".join(page.words)
-    assert not re.findall(r"\b49\b", "".join(page.words))
+    assert escape_controls(HOSTILE) in "".join(page.texts)
+    assert "{{7*7}}" in "".join(page.texts)
+    assert not re.findall(r"\b49\b", "".join(page.texts))
 
 
 def test_the_same_results_give_the_same_bytes() -> None:
@@ -175,7 +175,7 @@ def test_several_results_are_sections_with_unique_ids() -> None:
     levels = [int(tag[1]) for tag, _ in parsed.elements if re.fullmatch("h[1-6]", tag)]
     assert levels[:3] == [1, 2, 3]
     assert levels.count(2) == 3
-    assert "3 results" in parsed.words
+    assert "3 results" in parsed.texts
 
 
 def test_empty_sections_are_left_out() -> None:
@@ -236,7 +236,7 @@ def test_a_long_name_is_shortened_with_a_tooltip() -> None:
         [build_recorded_result([build_run(map_name=name)], replace(ROOMS, name=name))], title=name
     ).html
     page = Page(html)
-    shortened = [word for text in page.words for word in text.split() if "…" in word]
+    shortened = [word for text in page.texts for word in text.split() if "…" in word]
     assert len(shortened) >= 3
     assert max(map(len, shortened)) <= MAX_WORD_CHARS
     assert f'title="{escaped}"' in html

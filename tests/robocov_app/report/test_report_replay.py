@@ -37,9 +37,9 @@ def test_a_replay_is_self_contained() -> None:
     page = Page(html)
     assert [attributes for name, attributes in page.elements if "id" in attributes] == []
     assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
-    assert len(page.all("style")) == 1
-    assert len(page.all("script")) == 2
-    assert not page.all("html")
+    assert len(page.find_all("style")) == 1
+    assert len(page.find_all("script")) == 2
+    assert not page.find_all("html")
     data = read_replay_data(html)
     assert [run["title"] for run in data["runs"]] == ["run 0", "run 1"]
     assert [run["style"] for run in data["runs"]] == ["rapf", "rpf"]
@@ -57,18 +57,18 @@ def test_runs_with_different_gains_have_different_styles() -> None:
 
 def test_images_with_descriptions_replace_the_replay_without_scripts() -> None:
     page = Page(build_replay_element(build_replay_runs(6)))
-    images = page.all("svg")
+    images = page.find_all("svg")
     assert len(images) == MAX_PANES
     assert all(each["role"] == "img" and "4 robots" in each["aria-label"] for each in images)
-    assert not page.all("style")
+    assert not page.find_all("style")
 
 
 def test_hostile_names_are_escaped() -> None:
     record = replace(build_record(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
     html = build_replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
-    assert len(page.all("script")) == 2
-    assert not page.all("img")
+    assert len(page.find_all("script")) == 2
+    assert not page.find_all("img")
     data = read_replay_data(html)
     escaped = escape_controls(HOSTILE)
     assert data["runs"][0]["title"] == escaped

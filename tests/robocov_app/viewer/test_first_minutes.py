@@ -101,7 +101,7 @@ def test_the_cursor_is_described_in_the_pane_below_it_and_on_the_present_map(tmp
         driver.run_frames(2)
         # The same pixel is another point of the new map.
         assert driver.viewer.inspection.cursor != before
-        assert driver.viewer.inspection.cursor == driver.window.canvas.to_world(driver.at, 1)
+        assert driver.viewer.inspection.cursor == driver.window.canvas.to_world(driver.pixel, 1)
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])

@@ -202,30 +202,30 @@ class RandomUser:
 
     def move(self) -> None:
         x, y = self.choose_pixel()
-        rel = x - self.driver.at[0], y - self.driver.at[1]
+        rel = x - self.driver.pixel[0], y - self.driver.pixel[1]
         pygame.mouse.set_pos((x, y))
         pygame.event.clear(pygame.MOUSEMOTION)
         buttons = tuple(int(k in self.held) for k in (1, 2, 3))
         self.driver.post(pygame.MOUSEMOTION, pos=(x, y), rel=rel, buttons=buttons)
-        self.driver.at = (x, y)
+        self.driver.pixel = (x, y)
 
     def change_button(self) -> None:
         """Release a held button, or press one."""
         if self.held and self.random.random() < 0.7:
             button = self.held.pop(self.random.randrange(len(self.held)))
-            self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.at, button=button)
+            self.driver.post(pygame.MOUSEBUTTONUP, pos=self.driver.pixel, button=button)
             return
         if self.random.random() < 0.6:
             self.move()
         button = self.random.choice(BUTTONS)
         self.held.append(button)
-        self.driver.post(pygame.MOUSEBUTTONDOWN, pos=self.driver.at, button=button)
+        self.driver.post(pygame.MOUSEBUTTONDOWN, pos=self.driver.pixel, button=button)
 
     def drag(self) -> None:
         """Press and release the first button at two pixels."""
         for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
             self.move()
-            self.driver.post(kind, pos=self.driver.at, button=1)
+            self.driver.post(kind, pos=self.driver.pixel, button=1)
             self.driver.window.advance(0.01)
 
 

@@ -1,4 +1,4 @@
-"""Whole windows against pictures that were looked at, close enough that a missing number is found."""
+"""Whole windows compared with reference images."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import pytest
 from golden_windows import SCENES, compute_difference, draw_scene, read_golden
 
 TOLERANCE = 1e-4
-"""Part of the pixels that may differ."""
+"""Maximum fraction of pixels that differ visibly."""
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_window_looks_as_it_did(name: str) -> None:
+def test_windows_look_like_their_reference_images(name: str) -> None:
     assert compute_difference(draw_scene(name), read_golden(name)) < TOLERANCE
 
 
 def test_a_missing_legend_is_found() -> None:
-    spoiled = draw_scene("past-light", lambda window: window.do("layer:legend"))
-    assert compute_difference(spoiled, read_golden("past-light")) > TOLERANCE
+    changed_frame = draw_scene("past-light", lambda window: window.do("layer:legend"))
+    assert compute_difference(changed_frame, read_golden("past-light")) > TOLERANCE
 
 
 def test_missing_numbers_on_robots_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,7 +26,7 @@ def test_missing_numbers_on_robots_are_found(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_one_missing_word_of_the_panel_is_found() -> None:
-    picture = read_golden("past-light").copy()
-    low = picture[20:60, 600:700]
-    low[:] = np.median(low.reshape(-1, 3), axis=0)
-    assert compute_difference(picture, read_golden("past-light")) > TOLERANCE
+    image = read_golden("past-light").copy()
+    word = image[20:60, 600:700]
+    word[:] = np.median(word.reshape(-1, 3), axis=0)
+    assert compute_difference(image, read_golden("past-light")) > TOLERANCE

@@ -9,7 +9,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from driven_window import FRAME, Driver, open_viewer, resize_window
+from driven_window import FRAME_S, Driver, open_viewer, resize_window
 from PIL import Image
 from sample_sessions import RAPF, start_session
 
@@ -36,10 +36,10 @@ def test_the_title_names_the_map_and_then_the_file(driver: Driver) -> None:
 def test_space_plays_and_pauses(driver: Driver) -> None:
     driver.press_key("space")
     driver.run_frames(10)
-    assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
+    assert driver.session.displayed.time == pytest.approx(10 * FRAME_S, abs=0.02)
     driver.press_key("space")
     driver.run_frames(5)
-    assert driver.session.displayed.time == pytest.approx(10 * FRAME, abs=0.02)
+    assert driver.session.displayed.time == pytest.approx(10 * FRAME_S, abs=0.02)
 
 
 def test_buttons_play_step_settle_and_restart(driver: Driver) -> None:
@@ -75,7 +75,7 @@ def test_the_speed_multiplies_the_simulated_time(driver: Driver) -> None:
     driver.press_key("=")
     driver.press_key("space")
     driver.run_frames(10)
-    assert driver.session.displayed.time == pytest.approx(2 * 10 * FRAME, abs=0.03)
+    assert driver.session.displayed.time == pytest.approx(2 * 10 * FRAME_S, abs=0.03)
 
 
 # status line, cursor, files
@@ -140,7 +140,7 @@ def test_a_video_lasts_as_long_as_the_recording(driver: Driver, tmp_path: Path) 
     assert driver.viewer.message.startswith(f"Video saved: {path}")
     assert not driver.viewer.view.is_recording
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert seconds == pytest.approx(75 * FRAME, abs=0.15)
+    assert seconds == pytest.approx(75 * FRAME_S, abs=0.15)
     assert count == pytest.approx(45, abs=4)
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
 

@@ -33,7 +33,7 @@ def test_a_thrown_robot_keeps_moving(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (0.5, 3.0)))
     driver.press_key("space")
     driver.press(*driver.find_robot_pixel(1))
-    x, y = driver.at
+    x, y = driver.pixel
     for k in range(12):
         driver.move(x + 8 * k, y, held=1, settled=False)
         driver.run_frames()
@@ -90,7 +90,7 @@ def test_escape_releases_a_dragged_obstacle(driver: Driver) -> None:
 def test_another_button_does_not_release_a_dragged_obstacle(driver: Driver) -> None:
     driver.press(*driver.find_pixel((4.2, 1.2)))
     driver.move(*driver.find_pixel((4.6, 1.4)), held=1)
-    driver.post(pygame.MOUSEBUTTONDOWN, pos=driver.at, button=3)
+    driver.post(pygame.MOUSEBUTTONDOWN, pos=driver.pixel, button=3)
     driver.release(3)
     driver.move(*driver.find_pixel((5.0, 1.8)), held=1)
     driver.release()

@@ -121,8 +121,8 @@ def test_an_open_menu_covers_the_buttons_below_it(driver: Driver) -> None:
     fewer = driver.get_widget("button", "fewer").rect
     driver.click(*driver.get_widget("menu", "map").rect.center)
     open_list = driver.window.panel.ui.open_list
-    name = open_list.options[open_list.find_item((driver.at[0], fewer.centery))]
-    driver.click(driver.at[0], fewer.centery)
+    name = open_list.options[open_list.find_item((driver.pixel[0], fewer.centery))]
+    driver.click(driver.pixel[0], fewer.centery)
     assert driver.session.timeline.scenario.robots == 3
     assert driver.viewer.files.map_name == name
 
@@ -139,7 +139,7 @@ def test_a_click_beside_the_knob_moves_it_there(driver: Driver) -> None:
     slider = driver.get_widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
     assert driver.session.timeline.panes[0].setup.properties.max_speed > 4.0
-    assert driver.find_knob("team.max_speed")[0].collidepoint(driver.at)
+    assert driver.find_knob("team.max_speed")[0].collidepoint(driver.pixel)
 
 
 def test_a_knob_can_be_dragged_beyond_its_slider(driver: Driver) -> None:

@@ -74,7 +74,7 @@ def test_events_are_marked_on_the_time_line(driver: Driver) -> None:
     assert event.text == "robot 2 failed"
     assert not driver.shows_frame(quiet)
     driver.move(*find_time(driver, 1.0))
-    assert driver.window.chart.hover == driver.at
+    assert driver.window.chart.hover == driver.pixel
 
 
 def test_home_end_and_arrow_keys_move_through_time(driver: Driver) -> None:
@@ -94,7 +94,7 @@ def test_home_end_and_arrow_keys_move_through_time(driver: Driver) -> None:
 
 def find_cursor(driver: Driver, pane: int = 0) -> np.ndarray:
     """Return the point of the map under the cursor, (2,) m."""
-    return np.array(driver.window.canvas.to_world(driver.at, pane))
+    return np.array(driver.window.canvas.to_world(driver.pixel, pane))
 
 
 @pytest.mark.parametrize("amount", [3, -1])
@@ -144,4 +144,4 @@ def test_panes_share_the_camera(tmp_path: Path) -> None:
         first, second = driver.window.canvas._painters
         assert first.camera.zoom == second.camera.zoom
         assert first.camera.center == second.camera.center
-        assert np.allclose(driver.window.canvas.to_world(driver.at, 1), MIDDLE, atol=0.02)
+        assert np.allclose(driver.window.canvas.to_world(driver.pixel, 1), MIDDLE, atol=0.02)

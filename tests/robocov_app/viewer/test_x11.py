@@ -50,7 +50,7 @@ def test_keys_and_mouse_reach_the_window_until_it_is_closed(display: str, tmp_pa
         assert first.mean() > 190
 
         hands.press("t", "w")
-        dark = hands.wait_for_picture(lambda picture: picture.mean() < 90, "dark window")
+        dark = hands.wait_for_screenshot(lambda picture: picture.mean() < 90, "dark window")
 
         hands.press("c")
         hands.drag((300, 200), (330, 200), (340, 200))
@@ -60,12 +60,12 @@ def test_keys_and_mouse_reach_the_window_until_it_is_closed(display: str, tmp_pa
             around = np.abs(picture - dark)[170:230, 270:330].max(axis=2)
             return (around > 20).mean() > 0.6
 
-        drawn = hands.wait_for_picture(shows_pillar, "pillar")
+        drawn = hands.wait_for_screenshot(shows_pillar, "pillar")
 
         hands.press("v", "space")
         time.sleep(0.4)
         hands.press("space")
-        played = hands.wait_for_picture(lambda picture: not np.array_equal(picture, drawn), "motion")
+        played = hands.wait_for_screenshot(lambda picture: not np.array_equal(picture, drawn), "motion")
 
         hands.press("slash")
         hands.run_xdotool("type", "--delay", "20", "robots 1")
@@ -76,13 +76,13 @@ def test_keys_and_mouse_reach_the_window_until_it_is_closed(display: str, tmp_pa
         def has_restarted(picture: np.ndarray) -> bool:
             return not np.array_equal(picture[track], played[track])
 
-        one_robot = hands.wait_for_picture(has_restarted, "time 0")
+        one_robot = hands.wait_for_screenshot(has_restarted, "time 0")
         hands.move(SIZE[0] - 234, 74 + BAR_HEIGHT_PX)  # the field of the number of robots
         hands.run_xdotool("click", 1)
         hands.run_xdotool("type", "--delay", "20", "3")
         hands.press("Return")
         hands.move(20, 20)
-        hands.wait_for_picture(
+        hands.wait_for_screenshot(
             lambda picture: np.abs(picture - one_robot)[:400, :600].max() > 60, "three robots"
         )
         hands.press("ctrl+shift+s")

@@ -56,7 +56,7 @@ def test_a_page_gets_the_last_picture_and_no_picture_twice(display, teacher):
         display.send(surface)
     display.send(surface)  # unchanged
     n_frames = 0
-    while teacher.picture is None or not np.array_equal(teacher.picture, read_pixels(surface)):
+    while teacher.image is None or not np.array_equal(teacher.image, read_pixels(surface)):
         teacher.receive_frame()
         n_frames += 1
     assert n_frames <= 50
@@ -76,8 +76,8 @@ def test_a_page_whose_base_frame_was_dropped_gets_a_complete_picture(display, mo
             fast_page.receive_frame()
             if shade != 20:
                 slow_page.receive_frame()
-        assert np.array_equal(fast_page.picture, read_pixels(surface))
-        while not np.array_equal(slow_page.picture, read_pixels(surface)):
+        assert np.array_equal(fast_page.image, read_pixels(surface))
+        while not np.array_equal(slow_page.image, read_pixels(surface)):
             slow_page.receive_frame()
 
 
@@ -88,4 +88,4 @@ def test_new_viewers_see_a_window_that_does_not_change(display):
     for _ in range(5):
         with connect_page(display.watch_link) as viewer:
             viewer.receive_frame()
-        assert np.array_equal(viewer.picture, read_pixels(surface))
+        assert np.array_equal(viewer.image, read_pixels(surface))

@@ -76,7 +76,7 @@ def connect_projector_and_phone(display, window, projector, phone, **settings):
 
 
 def receive_frames_until(page, condition):
-    while page.picture is None or not condition(page.picture):
+    while page.image is None or not condition(page.image):
         page.receive_frame()
 
 
@@ -106,7 +106,7 @@ def test_a_watching_phone_shows_the_map_even_while_a_dialog_covers_it(display, w
     assert has_size(projector.receive_frame(), WINDOW_SIZE_PX)
     change_window(display, window, 9, is_covered=True)
     receive_frames_until(phone, lambda picture: picture[0, 0] == 9 << 16)
-    assert has_size(phone.picture, PHONE_SIZE_PX)
+    assert has_size(phone.image, PHONE_SIZE_PX)
 
 
 def test_a_controlling_phone_shows_the_dialog_alone(display, window, teacher, viewer):
@@ -119,7 +119,7 @@ def test_a_controlling_phone_shows_the_dialog_alone(display, window, teacher, vi
         receive_frames_until(viewer, lambda picture: picture[0, 0] == 7 << 16)
         change_window(display, window, 9, is_covered=True)
         receive_frames_until(viewer, lambda picture: picture[0, 0] == 9 << 8)
-        assert has_size(viewer.picture, PHONE_SIZE_PX)
+        assert has_size(viewer.image, PHONE_SIZE_PX)
 
 
 def test_the_pointer_of_a_controlling_phone_is_at_the_same_point_of_the_map(display, window, teacher, viewer):
