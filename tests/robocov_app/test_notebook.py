@@ -140,8 +140,8 @@ def test_snapshots_and_shortened_records_are_described_in_one_line(executed):
 
 def test_a_plot_without_given_axes_is_shown_as_a_page(executed):
     (output,) = [output for output in find_cell(executed, "cost").outputs if "data" in output]
-    picture = Image.open(io.BytesIO(base64.b64decode(output["data"]["image/png"])))
-    assert picture.width > output["metadata"]["image/png"]["width"] > 600
+    image = Image.open(io.BytesIO(base64.b64decode(output["data"]["image/png"])))
+    assert image.width > output["metadata"]["image/png"]["width"] > 600
     assert "mean distance" in output["metadata"]["image/png"]["alt"]
 
 

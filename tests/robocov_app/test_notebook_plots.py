@@ -30,7 +30,7 @@ from robocov_app.look.theme import DARK, LIGHT
 
 
 @pytest.fixture(autouse=True)
-def _coarse_pictures(request, monkeypatch):
+def _use_coarse_lattice(request, monkeypatch):
     """Draw distances on a coarse lattice to save time, except in slow tests."""
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr(drawing_backend, "MIN_FIGURE_LATTICE", 32)
@@ -258,7 +258,9 @@ def find_external_links(html: str) -> list[str]:
 
 
 class TestNotebook:
-    @pytest.mark.parametrize("environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+    @pytest.mark.parametrize(
+        "environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda environment: environment.name
+    )
     def test_a_map_is_a_drawing_with_a_description_for_screen_readers(self, environment):
         html = environment._repr_html_()
         page = ParsedPage(html)
