@@ -11,6 +11,7 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
@@ -18,6 +19,7 @@ from robocov.environment import Environment
 from robocov.record import Record
 from robocov.typing import FloatArray, IntArray
 from robocov_app.figures.page import POINTS_PER_INCH, get_figure, to_plot_color
+from robocov_app.figures.start_numbers import place_start_numbers
 from robocov_app.look import legend
 from robocov_app.look.axes import TICK_FACTORS
 from robocov_app.look.colors import Color, choose_text_color, mix
@@ -38,6 +40,12 @@ _MIN_NUMBER_PT = 4.2
 _NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
 """Text sizes of numbers of one, two, three and more digits, in radii of the robot."""
 _START_PT = 6.2
+_START_NUMBER_SIZE = 1.1
+"""Text size of the numbers of starts, in diameters of their rings."""
+_MAX_NUMBERED_STARTS = 30
+"""In a larger team, the numbers of starts would hide the trajectories."""
+_START_NUMBER_HALO_PT = 1.6
+"""Width of the light edge that separates the number of a start from what is below it."""
 _GOAL_PT = 8.0
 _MIN_MARK_PT = 3.2
 """Sizes of starts and goals: of each if there is enough space, and of both in the densest crowd."""
@@ -270,6 +278,34 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     starts = record.positions[first_rows, present]
     size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
     axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
+    if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_NUMBER_PT:
+        _draw_start_numbers(axes, record, present, starts, size, theme)
+
+
+def _draw_start_numbers(
+    axes: Axes, record: Record, robots: IntArray, starts: FloatArray, size: float, theme: Theme
+) -> None:
+    """Write the number of each robot next to the ring at its start, (k, 2) m, with a size in points."""
+    trajectories = record.positions[:, robots].reshape(-1, 2)
+    is_known = np.isfinite(trajectories).all(axis=1)
+    marks = _to_points(axes, trajectories[is_known])
+    start_points = _to_points(axes, starts)
+    centers = place_start_numbers(start_points, marks, size)
+    halo = [withStroke(linewidth=_START_NUMBER_HALO_PT, foreground=to_plot_color(theme.background))]
+    for robot, start, offset in zip(robots.tolist(), starts, centers - start_points, strict=True):
+        axes.annotate(
+            str(robot + 1),
+            xy=start.tolist(),
+            xytext=offset.tolist(),
+            textcoords="offset points",
+            fontsize=_START_NUMBER_SIZE * size,
+            fontweight="bold",
+            color=to_plot_color(theme.start),
+            ha="center",
+            va="center_baseline",
+            path_effects=halo,
+            zorder=_STARTS_ORDER,
+        )
 
 
 def _draw_final_positions(

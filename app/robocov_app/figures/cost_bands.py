@@ -17,7 +17,7 @@ from robocov_app.look.theme import LIGHT
 _FULL_WEIGHT_WIDTH_PX = 700.0
 """Minimum width of a page on which lines have their full width; on narrower pages they are thinner."""
 _SMALL_WEIGHT = 0.7
-_MARGINS = CurveMargins(left=44, top=44, bottom=50, right=30, max_right_fraction=1.0)
+_MARGINS = CurveMargins(left=44, top=44, bottom=50, right=42, max_right_fraction=1.0)
 _MAX_NAME_FRACTION = 0.5
 """Maximum fraction of the page width for a shortened name, its value and the margin on the right."""
 

@@ -98,7 +98,7 @@ _BAR_LABEL_RISE = 4
 """Distance of the label above the middle of the row, at the height of the color scale."""
 _LAST_TICK_SPACE = 14
 """Space to the right of a time axis for half of its last tick label."""
-_CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=26)
+_CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=38)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,21 +32,17 @@ _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4
 _MIN_SHORT_VALUE = 10.0
 """From this value on, units other than meters have four significant digits instead of three decimals."""
-_MAX_WIDENED_LINES = 3
-"""Maximum number of lines on top of a line for which it is widened."""
 _LINE_WIDTH_PT = 2.2
-_EXTRA_LINE_WIDTH_PT = 0.9
-"""Additional width of a line for each one on top of it, so that equal curves can be seen."""
+_SOLID_ORDER = 2.0
+_DASHED_ORDER = 2.1
 _MARK_PT = 6.5
-_EXTRA_MARK_PT = 2.0
 _LABEL_LINE_HEIGHT = 1.45
 """Height of a line of labels, in text sizes."""
-_MIN_MOVED_FRACTION = 0.3
-"""A label that is moved by more than this fraction of its height is connected with its curve by a line."""
 # Horizontal distances from the axes.
-_CONNECTION_START_PT = 4
-_CONNECTION_END_PT = 10
-_LABEL_START_PT = 12
+_CONNECTION_START_PT = 2
+_CONNECTION_END_PT = 9
+_MARK_CENTER_PT = 14
+_LABEL_START_PT = 21
 
 
 class TimeCurve(NamedTuple):
@@ -100,12 +96,15 @@ class _CurveEnd(NamedTuple):
     time : float, s
     value : float
     color : PlotColor
+    mark : str
+        Marker of matplotlib.
     text : str
     """
 
     time: float
     value: float
     color: PlotColor
+    mark: str
     text: str
 
 
@@ -214,7 +213,9 @@ def draw_curves(
     weight: float = 1.0,
     value_range: tuple[float, float] | None = None,
 ) -> None:
-    """Draw curves with labels at their ends; the first curve is at the bottom and has the widest line.
+    """Draw curves, each with its mark, name and final value next to its end.
+
+    Solid curves are below dashed ones, so that equal curves can be seen.
 
     Parameters
     ----------
@@ -247,12 +248,19 @@ def draw_curves(
             color = to_plot_color(style.get_color(theme))
             axes.fill_between(curve.times, low, high, color=color, alpha=0.16, linewidth=0.0)
     ends = []
-    for number, (curve, style) in enumerate(zip(curves, styles, strict=True)):
-        lines_above = len(curves) - 1 - number
+    for curve, style in zip(curves, styles, strict=True):
         color = to_plot_color(style.get_color(theme))
-        time, value = _draw_line(axes, curve, style, color, weight=weight, lines_above=lines_above)
-        ends.append(_CurveEnd(time, value, color, format_end_label(curve, unit)))
-    _draw_end_labels(axes, ends)
+        _draw_line(axes, curve, style, color, weight)
+        last = int(np.flatnonzero(np.isfinite(curve.values))[-1])
+        end = _CurveEnd(
+            time=float(curve.times[last]),
+            value=float(curve.values[last]),
+            color=color,
+            mark=style.mark,
+            text=format_end_label(curve, unit),
+        )
+        ends.append(end)
+    _draw_end_labels(axes, ends, weight)
 
 
 def _set_axes(
@@ -275,39 +283,22 @@ def _set_axes(
     set_value_axis(axes.yaxis, values, value_range=value_range)
 
 
-def _draw_line(
-    axes: Axes, curve: TimeCurve, style: CurveStyle, color: PlotColor, *, weight: float, lines_above: int
-) -> tuple[float, float]:
-    """Draw a curve with a mark at its last finite value; return the time and the value there.
-
-    `lines_above` is the number of curves that are drawn on top of it.
-    """
-    times = curve.times
-    values = curve.values
-    extra = min(lines_above, _MAX_WIDENED_LINES)
-    width = weight * (_LINE_WIDTH_PT + _EXTRA_LINE_WIDTH_PT * extra)
-    dashes = style.dashes
+def _draw_line(axes: Axes, curve: TimeCurve, style: CurveStyle, color: PlotColor, weight: float) -> None:
+    """Draw the line of a curve; dashed lines are above solid ones, which are visible in their gaps."""
     dash_lengths = style.list_dash_lengths()
-    if dash_lengths:
-        # matplotlib measures dashes in line widths; this makes them equally long on lines of all widths.
-        # The first number is the position in the pattern at which the line starts.
-        dashes = (0, tuple(_LINE_WIDTH_PT * weight / width * length for length in dash_lengths))
-    axes.plot(times, values, color=color, linewidth=width, linestyle=dashes, dash_capstyle="butt")
-    last = int(np.nonzero(np.isfinite(values))[0][-1])
     axes.plot(
-        times[last],
-        values[last],
-        style.mark,
+        curve.times,
+        curve.values,
         color=color,
-        markersize=weight * (_MARK_PT + _EXTRA_MARK_PT * extra),
-        clip_on=False,
-        zorder=5,
+        linewidth=weight * _LINE_WIDTH_PT,
+        linestyle=style.dashes,
+        dash_capstyle="butt",
+        zorder=_DASHED_ORDER if dash_lengths else _SOLID_ORDER,
     )
-    return float(times[last]), float(values[last])
 
 
-def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd]) -> None:
-    """Write the label of each curve to the right of the axes, with a line to it if it had to be moved."""
+def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd], weight: float) -> None:
+    """Write the mark and the label of each curve to the right of the axes, with a line to its end."""
     dpi = get_figure(axes).dpi
     box = axes.get_window_extent()
     # One point as a fraction of the width of the axes.
@@ -329,12 +320,20 @@ def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd]) -> None:
             fontsize=TEXT,
             fontweight="bold",
         )
-        if abs(label_row - row) > _MIN_MOVED_FRACTION * line_height:
-            axes.plot(
-                [1.0 + _CONNECTION_START_PT * point, 1.0 + _CONNECTION_END_PT * point],
-                [(row - box.y0) / box.height, fraction],
-                transform=axes.transAxes,
-                color=end.color,
-                linewidth=0.8,
-                clip_on=False,
-            )
+        axes.plot(
+            [1.0 + _CONNECTION_START_PT * point, 1.0 + _CONNECTION_END_PT * point],
+            [(row - box.y0) / box.height, fraction],
+            transform=axes.transAxes,
+            color=end.color,
+            linewidth=0.8,
+            clip_on=False,
+        )
+        axes.plot(
+            1.0 + _MARK_CENTER_PT * point,
+            fraction,
+            end.mark,
+            transform=axes.transAxes,
+            color=end.color,
+            markersize=weight * _MARK_PT,
+            clip_on=False,
+        )

@@ -74,14 +74,14 @@ _MIN_MAP_PAGE_WIDTH_PX = 840
 _MAX_MAP_PAGE_WIDTH_PX = 1400
 _MIN_MAP_PAGE_HEIGHT_PX = 300
 _MAX_MAP_PAGE_HEIGHT_PX = 1300
-_COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=40)
+_COST_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=52)
 """Space around the curves on a page without maps; the title is above them."""
 _MAP_HEAD = 58
 """Space above the map of a page at scale 1, px."""
 _METRICS_SIZE_PX = (1200, 800)
 _METRIC_TITLE_HEIGHT = 40
 """Space above the panels of metrics at scale 1, px, for the title."""
-_METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=24, max_right_fraction=0.5)
+_METRIC_MARGINS = CurveMargins(left=44, top=36, bottom=48, right=36, max_right_fraction=0.5)
 
 
 @plain_style()
@@ -640,7 +640,7 @@ METRIC_PANELS = (
         "%",
         to_free_area_percent(lambda metrics: metrics.visible_area),
     ),
-    MetricPanel("work |F v| (J)", "J", lambda metrics: metrics.work),
+    MetricPanel("work ∫|F·v| dt (J)", "J", lambda metrics: metrics.work),
     MetricPanel("path length per robot (m)", "m", lambda metrics: metrics.path_length),
 )
 

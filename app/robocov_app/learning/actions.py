@@ -59,7 +59,7 @@ def compute_driving_forces(
     -----
     For a desired velocity u, the force is ``F = ν u + m (u - q') / τ``, where q' is the current velocity, and
     τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates the viscosity of (28), the second one
-    accelerates the robot towards u.
+    accelerates the robot toward u.
     """
     if action == "force":
         return actions

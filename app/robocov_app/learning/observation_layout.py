@@ -48,7 +48,7 @@ class ObservationLayout:
     ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
     =============  ==================  =====================================================================
 
-    Each ray takes one query of the physics engine. The centroid, towards which Lloyd's algorithm moves, is
+    Each ray takes one query of the physics engine. The centroid, toward which Lloyd's algorithm moves, is
     the only block that a robot has to compute from its other knowledge.
 
     Parameters

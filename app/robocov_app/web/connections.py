@@ -204,7 +204,7 @@ class Listener:
 
 
 def _raise_file_limit() -> None:
-    """Raise the limit of open files towards `MIN_FILES` if the system allows it; the default may be 256."""
+    """Raise the limit of open files toward `MIN_FILES` if the system allows it; the default may be 256."""
     try:
         import resource
     except ImportError:  # Windows has no such limit

@@ -267,7 +267,7 @@ def cut_cell(
     origin : (x, y), m
         A point on the line.
     normal : (x, y)
-        Vector across the line, towards the side that is removed.
+        Vector across the line, toward the side that is removed.
     setback : float, m
         Setback of the new edge; see `Edge`.
     widening_share : float

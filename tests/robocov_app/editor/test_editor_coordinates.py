@@ -173,7 +173,7 @@ def test_typed_angles_are_parsed():
         parse_angle("north")
 
 
-def test_a_single_length_leads_towards_the_cursor():
+def test_a_single_length_leads_toward_the_cursor():
     assert parse_next_point("2", LAST, (1.0, 9.0)) == (1.0, 4.0)
     assert parse_next_point("2", LAST, (4.0, 6.0)) == pytest.approx((2.2, 3.6))
     assert parse_next_point("50 cm", LAST, (0.0, 2.0)) == (0.5, 2.0)

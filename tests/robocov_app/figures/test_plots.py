@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 from page_layout import assert_layout_is_clear, boxes_overlap
 
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
@@ -66,6 +66,16 @@ def find_marks(axes, marker):
 
 def has_marks(axes, marker):
     return any(line.get_marker() == marker for line in axes.lines)
+
+
+def list_start_numbers(axes):
+    """Return the numbers next to starts."""
+    return [text for text in axes.texts if isinstance(text, Annotation)]
+
+
+def list_robot_numbers(axes):
+    """Return the numbers on robots."""
+    return [text for text in axes.texts if not isinstance(text, Annotation)]
 
 
 def to_colors(collection_colors):
@@ -248,10 +258,21 @@ class TestTrajectories:
 
     def test_each_robot_has_its_number_at_its_final_position(self):
         record = record_walk(ROOMS, 12, seed=4)
-        texts = plot_trajectories(record).axes[0].texts
+        texts = list_robot_numbers(plot_trajectories(record).axes[0])
         final_positions = [tuple(position) for position in record.positions[-1].tolist()]
         assert [text.get_text() for text in texts] == [str(number) for number in range(1, 13)]
         assert [text.get_position() for text in texts] == final_positions
+
+    def test_each_robot_has_its_number_next_to_its_start(self):
+        record = record_walk(ROOMS, 12, seed=4)
+        numbers = list_start_numbers(plot_trajectories(record).axes[0])
+        assert [text.get_text() for text in numbers] == [str(number) for number in range(1, 13)]
+        assert np.array([text.xy for text in numbers]) == pytest.approx(record.positions[0])
+        assert {to_rgb(text.get_color()) for text in numbers} == {to_plot_color(LIGHT.start)}
+
+    def test_starts_of_a_large_team_have_no_numbers(self):
+        axes = plot_trajectories(record_walk(ROOMS, 31)).axes[0]
+        assert not list_start_numbers(axes)
 
     @pytest.mark.parametrize(("n", "n_colors"), [(5, 5), (40, 1)])
     def test_only_robots_of_small_teams_have_their_own_color(self, n, n_colors):
@@ -361,15 +382,21 @@ def list_end_marks(axes):
 
 class TestCost:
     def test_equal_curves_are_all_visible(self):
-        """Each curve is wider than the one drawn on top of it, and has its own dashes and mark."""
-        axes = plot_cost(build_curves(1.0, 1.0, 1.0, 1.0)).axes[0]
+        """The solid curve is visible in the gaps of the others; each has its own dashes and mark."""
+        axes = plot_cost(build_curves(1.0, 1.0, 1.0, 1.0)[::-1]).axes[0]
         lines = list_curve_lines(axes)
-        widths = [line.get_linewidth() for line in lines]
-        heights = [line.get_zorder() for line in lines]
-        assert (np.diff(widths) < -0.5).all()
-        assert heights == sorted(heights)
+        assert len({line.get_linewidth() for line in lines}) == 1
+        lowest = min(lines, key=lambda line: line.get_zorder())
+        assert lowest.get_linestyle() == "-"
         assert len({str(line._dash_pattern) for line in lines}) == 4
         assert len(set(list_end_marks(axes))) == 4
+
+    def test_end_marks_of_equal_curves_do_not_overlap(self):
+        axes = plot_cost(build_curves(1.0, 1.0, 1.0, 1.0)).axes[0]
+        marks = [line for line in axes.lines if len(line.get_xdata()) == 1]
+        pixels = [line.get_transform().transform(line.get_xydata())[0] for line in marks]
+        size = marks[0].get_markersize() * axes.figure.dpi / 72
+        assert (np.diff(sorted(y for _, y in pixels)) > size).all()
 
     def test_the_style_of_a_controller_does_not_depend_on_others(self):
         values = 1.0 + np.exp(-TIME)

@@ -95,8 +95,8 @@ def test_contacts_are_reported_and_penalized(empty: Environment) -> None:
 
 def test_contact_between_two_robots_counts_for_both(empty: Environment) -> None:
     episode = start_episode(empty, np.array([[5.0, 5.0], [5.5, 5.0], [8.0, 8.0]]))
-    towards = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 0.0]])
-    contact_time = sum(episode.advance(towards).contact_time for _ in range(12))
+    toward = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 0.0]])
+    contact_time = sum(episode.advance(toward).contact_time for _ in range(12))
     assert contact_time[0] == contact_time[1] > 0.1
     assert contact_time[2] == 0.0
 

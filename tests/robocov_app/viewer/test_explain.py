@@ -74,7 +74,7 @@ def test_each_force_is_described_with_its_cause():
     assert report.verdict == "moving 0.20 m/s east to its goal"
     assert list_texts(report) == [
         "at (2.00, 4.00) m, 0.20 m/s east",
-        "pulled with 0.31 N towards its goal, 3.0 m away",
+        "pulled with 0.31 N toward its goal, 3.0 m away",
         "pushed with 0.12 N by robot 7, 80 cm west (2 robots in range)",
         "pushed with 0.30 N by the obstacle, 42 cm south",
         "held back with 0.40 N by viscosity",
@@ -127,7 +127,7 @@ def test_obstructed_goals_are_described(environment, position, goal, hidden):
     away = format_length(float(np.hypot(*pull))) + " away" + hidden
     size = format_force(float(np.hypot(*pull)))
     report = build_report([position], goals=[goal], environment=environment, attraction=[pull])
-    assert get_line(report, "attraction").text == f"pulled with {size} towards its goal, {away}"
+    assert get_line(report, "attraction").text == f"pulled with {size} toward its goal, {away}"
     held = build_report([position], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
     assert held.verdict.startswith("at rest, stuck: " if hidden else "at rest ")
     assert any(text.startswith("stuck: ") for text in list_texts(held)) == bool(hidden)

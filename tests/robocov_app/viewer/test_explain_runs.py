@@ -38,7 +38,7 @@ def test_robots_at_rest_on_their_centroids():
     square = load_map("square")
     reports = explain_run(Simulation(square, Lloyd(), square.start().sample(4, seed=0)), 40.0)
     assert {report.verdict for report in reports} == {"arrived: at rest on its centroid"}
-    assert "not pulled towards its centroid, 0 mm away" in list_texts(reports[0])
+    assert "not pulled toward its centroid, 0 mm away" in list_texts(reports[0])
 
 
 def test_robots_without_goals():

@@ -203,7 +203,7 @@ def _draw_sides(
         else:
             partitions = divide_evenly(0.0, length, _MEETING_ROOM_WIDTH_M).tolist()
             _draw_meeting_rooms(part, partitions, depth)
-        # These rooms need a wall towards an open space in the corner.
+        # These rooms need a wall toward an open space in the corner.
         for x, neighbor in ((0.0, "south"), (length, "north")):
             if uses[neighbor] == "open":
                 part.add_wall((x, 0.0), (x, depth))

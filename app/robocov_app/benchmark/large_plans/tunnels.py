@@ -143,7 +143,7 @@ def _draw_drift_mine(rng: np.random.Generator) -> FloorPlan:
         end = _move(lower[station], rng.uniform(-2.5, 2.5), rng.uniform(-9.5, -7.0))
         _dig_stope(rng, network, lower[station], end, max_radius=2.6)
         if station + 2 < stations and rng.random() < 0.6:
-            # A drift towards the next stope, which ends before reaching it.
+            # A drift toward the next stope, which ends before reaching it.
             network.dig([end, _move(end, rng.uniform(5.0, 8.0), rng.uniform(-1.0, 1.0))], 1.6)
     adit = _move(lower[0], -4.5, 0.0)
     network.dig([adit, lower[0]], 3.0)

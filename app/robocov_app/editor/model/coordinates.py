@@ -95,7 +95,7 @@ def parse_point(text: str, *, last: Point | None = None) -> Point:
     return _round_exactly(x), _round_exactly(y)
 
 
-def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Point:
+def parse_next_point(text: str, last: Point | None, toward: Point | None) -> Point:
     """Parse the next point of a line that is being drawn, m.
 
     Parameters
@@ -105,14 +105,14 @@ def parse_next_point(text: str, last: Point | None, towards: Point | None) -> Po
         an angle, such as ``<45``, at the distance of the cursor.
     last : Point or None
         The previous point of the line, m.
-    towards : Point or None
+    toward : Point or None
         Position of the cursor, m.
     """
-    if last is None or towards is None:
+    if last is None or toward is None:
         return parse_point(text, last=last)
     typed = _clean(text)
-    dx = towards[0] - last[0]
-    dy = towards[1] - last[1]
+    dx = toward[0] - last[0]
+    dy = toward[1] - last[1]
     cursor_distance = math.hypot(dx, dy)
     if typed[:1] == "<":
         x, y = _convert_polar(cursor_distance, _parse_angle(typed[1:]), text)

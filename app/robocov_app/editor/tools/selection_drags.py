@@ -154,7 +154,7 @@ class MoveDrag(Drag):
         super().end()
 
     def enter_text(self, text: str) -> None:
-        """Move by a typed length towards the cursor, or by a displacement such as ``0.5 -2`` or ``2<45``."""
+        """Move by a typed length toward the cursor, or by a displacement such as ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         has_two_values = len(text.split()) > 1 or "<" in text or ";" in text
         if has_two_values and text[0] not in "@+":
@@ -204,7 +204,7 @@ class VertexDrag(Drag):
             self.label += f"   {geometry.format_bearing(self._origin, position)}"
 
     def enter_text(self, text: str) -> None:
-        """Move the vertex to a typed position, or by a length towards the cursor."""
+        """Move the vertex to a typed position, or by a length toward the cursor."""
         self._place(parse_next_point(text, self._origin or self._start, self._end))
 
 

@@ -36,7 +36,7 @@ WIDE_PX = 2148
 NARROW_PX = 1050
 """Widths of two journal columns (7.16 inches) and of one (3.5 inches)."""
 _COST_HEIGHT_PX = 1050
-_COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=34)
+_COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=46)
 _HIDDEN_M = 0.25
 """Distance within which the disc of a robot hides its goal, on a map of ten meters."""
 _ARRIVED = 0.05

@@ -86,7 +86,7 @@ _METRICS = (
     ),
     _Metric(
         title="Energy",
-        label="work |F v| so far (J)",
+        label="work ∫|F·v| dt so far (J)",
         unit="J",
         get_values=lambda metrics: metrics.work,
     ),

@@ -37,7 +37,7 @@ class SharedCamera:
         self._viewer = viewer
         self._painters: Sequence[Painter] = ()
         self._camera: Camera | None = None  # None while the whole map is shown
-        self._glide: CameraGlide | None = None  # towards `_camera`, while it lasts
+        self._glide: CameraGlide | None = None  # toward `_camera`, while it lasts
 
     def attach(self, painters: Sequence[Painter]) -> None:
         """Replace the painters, one for each pane; the new ones show the same section of the map."""

@@ -95,11 +95,11 @@ def _describe_attraction(situation: RobotSituation, kind: str, force: complex) -
     direction = format_direction(force)
     alignment = compute_alignment(force, goal.offset)
     if abs(force) < MIN_FORCE_N:
-        text = "not pulled towards"
+        text = "not pulled toward"
     elif alignment < 0.0:
         text = f"slowed by {size} {direction} on the way to"
     elif alignment > _STRAIGHT_ALIGNMENT:
-        text = f"pulled with {size} towards"
+        text = f"pulled with {size} toward"
     else:
         text = f"pulled with {size} {direction} on the way to"
     return f"{text} {goal.name}, {goal.distance_text}"

@@ -95,7 +95,7 @@ class RobotEdit(_Edit):
 
 @dataclass(frozen=True)
 class DragRobot(RobotEdit):
-    """Pull a robot towards a point by a spring.
+    """Pull a robot toward a point by a spring.
 
     Attributes
     ----------

@@ -1,0 +1,47 @@
+"""Placement of the numbers of robots next to the marks of their starts."""
+
+import numpy as np
+
+from robocov.typing import FloatArray
+
+_DIRECTIONS = 16
+"""Number of directions from a start in which its number may be written."""
+_NUMBER_DISTANCE = 1.15
+"""Distance of the center of a number from its start, in sizes of the mark."""
+_MAX_DISTANCE = 4.0
+"""Marks that are farther from a start than this, in sizes of its mark, do not matter."""
+
+
+def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float) -> FloatArray:
+    """Place a number next to each start, as far as possible from marks and other numbers.
+
+    Parameters
+    ----------
+    starts : (n, 2) array
+    marks : (m, 2) array
+        Points that numbers should not hide, such as other starts and points of trajectories.
+    mark_size : float
+        Diameter of the mark of a start, in the unit of the positions.
+
+    Returns
+    -------
+    (n, 2) array
+        Centers of the numbers.
+
+    Examples
+    --------
+    >>> place_start_numbers(np.array([[0.0, 0.0]]), np.array([[10.0, 0.0], [20.0, 0.0]]), 10.0).round(9)
+    array([[-11.5,   0. ]])
+    """
+    angles = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
+    offsets = _NUMBER_DISTANCE * mark_size * np.column_stack([np.cos(angles), np.sin(angles)])
+    centers = np.empty_like(starts)
+    for number, start in enumerate(starts):
+        obstacles = np.concatenate([marks, starts, centers[:number]])
+        is_near = np.hypot(*(obstacles - start).T) < _MAX_DISTANCE * mark_size
+        candidates = start + offsets
+        differences = candidates[:, None] - obstacles[None, is_near]
+        clearances = np.hypot(differences[..., 0], differences[..., 1]).min(axis=1)
+        # Rounding lets the first of several equally good directions win on all machines.
+        centers[number] = candidates[np.argmax(clearances.round(6))]
+    return centers
