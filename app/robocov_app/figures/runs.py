@@ -671,7 +671,16 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     )
     for number, (curves, panel) in enumerate(zip(curves_of_panels, METRIC_PANELS, strict=True)):
         axes = _create_metric_axes(page, number, curves, label_width)
-        draw_curves(axes, curves, theme, label=panel.label, unit=panel.unit, weight=0.8)
+        maximum = max(float(np.nanmax(curve.values)) for curve in curves)
+        draw_curves(
+            axes,
+            curves,
+            theme,
+            label=panel.label,
+            unit=panel.unit,
+            weight=0.8,
+            value_range=(0.0, maximum),
+        )
     return page.figure
 
 

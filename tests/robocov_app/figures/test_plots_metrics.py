@@ -60,3 +60,8 @@ def test_time_axes_have_the_same_length() -> None:
     figure = plot_metrics([build_run("rapf", 1)], "light", "One run")
     widths = {round(axes.get_position().width, 9) for axes in figure.axes}
     assert len(widths) == 1
+
+
+def test_value_axes_start_at_zero():
+    figure = plot_metrics([build_run("rapf", 1)], "light", "One run")
+    assert [axes.get_ylim()[0] for axes in figure.axes] == [0.0] * len(METRIC_PANELS)

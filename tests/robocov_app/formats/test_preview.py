@@ -17,6 +17,8 @@ from robocov.errors import OutputError, ParameterError
 from robocov_app.figures.page import to_plot_color
 from robocov_app.formats import ForeignMap, Shaping, build_environment
 from robocov_app.formats.preview import plot_import, save_preview
+from robocov_app.formats.preview.plotting import FORMAT_LABELS
+from robocov_app.formats.registry import IMPORTERS
 from robocov_app.look.theme import DARK, LIGHT
 
 HALL = box(0, 0, 12, 8)
@@ -67,7 +69,11 @@ def test_the_preview_has_title_and_report() -> None:
     assert {"plan", "as read", "as imported", "repaired: 2 rings closed"} <= set(words)
     assert any(word.startswith("123 vertices, ") for word in words)
     assert any(word.startswith("dropped: 1 separate part") for word in words)
-    assert any(word.endswith("imported from svg") for word in words)
+    assert any(word.endswith("imported from SVG") for word in words)
+
+
+def test_each_format_has_a_label() -> None:
+    assert set(FORMAT_LABELS) == set(IMPORTERS)
 
 
 def test_nothing_is_marked_where_nothing_differs() -> None:

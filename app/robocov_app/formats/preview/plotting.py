@@ -56,6 +56,25 @@ _PASSAGE_RING_PT = 20.0
 _MIN_GROUPED_NUMBER = 9999.5
 """Numbers from this one on are written without decimals, with thin spaces between groups of digits."""
 _THIN_SPACE = "\u202f"
+FORMAT_LABELS = {
+    "argos": "ARGoS",
+    "coverage-control": "CoverageControl",
+    "dxf": "DXF",
+    "geojson": "GeoJSON",
+    "houseexpo": "HouseExpo",
+    "image": "an image",
+    "imdf": "IMDF",
+    "irsim": "IR-SIM",
+    "movingai": "Moving AI",
+    "osm": "OpenStreetMap",
+    "rings": "lists of rings",
+    "ros": "ROS",
+    "stage": "Stage",
+    "svg": "SVG",
+    "tmx": "Tiled",
+    "wkt": "well-known text",
+}
+"""How the figure calls each format, by its name in commands."""
 
 
 def save_preview(foreign: ForeignMap, environment: Environment, report: ImportReport, path: Path) -> None:
@@ -140,7 +159,8 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
         environment.name, left, _TITLE_Y_PX * page.scale, points=HEADING, bold=True, max_width=max_width
     )
     width, height = report.size
-    facts = f"{width:.4g} x {height:.4g} m, imported from {report.format}"
+    label = FORMAT_LABELS.get(report.format, report.format)
+    facts = f"{width:.2f} x {height:.2f} m, imported from {label}"
     page.write(facts, left, _SUBTITLE_Y_PX * page.scale, color=page.theme.faint, max_width=max_width)
 
 
