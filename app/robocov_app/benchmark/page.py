@@ -148,7 +148,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
-        method=list(dict.fromkeys(sentence for result in results for sentence in result["method"])),
+        method=_list_method(results),
         entries=_build_entries_table(results, labels),
     )
     return escape_controls(page)
@@ -438,6 +438,15 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
         if not front or points[k][1] < points[front[-1]][1]:
             front.append(k)
     return front
+
+
+def _list_method(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """List the sentences on the method of some results. Texts that differ only in spaces are listed once."""
+    sentences: dict[str, str] = {}
+    for result in results:
+        for sentence in result["method"]:
+            sentences["".join(sentence.split())] = sentence
+    return list(sentences.values())
 
 
 def _describe_entries_without_messages(

@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ _CORE_MAPS = tuple(name for names in FAMILIES.values() for name in names[:3])
 class Track:
     """A set of runs, defined by its differences from the ideal track.
 
-    On the ideal track six robots communicate without limits, and nothing goes wrong.
+    On the ideal track six robots communicate without limits and without disturbances.
 
     Parameters
     ----------
@@ -132,12 +133,12 @@ _FAILURES = ((0, 15.0), (3, 30.0))
 _LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
 TRACKS: Mapping[str, Track] = {
     "ideal": Track(
-        "nothing goes wrong",
+        "no disturbances",
         maps=tuple(name for names in FAMILIES.values() for name in names),
         seeds=(0, 1),
     ),
     "short-range": Track("communication range of 3 m", changes={"communication_range": 3.0}),
-    "lossy": Track("2 messages per second, 0.5 s late, 30% lost", changes={"conditions": _LOSSY}),
+    "lossy": Track("2 messages per second, delayed by 0.5 s, 30% lost", changes={"conditions": _LOSSY}),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
     "unicycle": Track("robots on two wheels, which turn before driving", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
@@ -217,8 +218,10 @@ def build_map(name: str) -> Environment:
         If the suite has no such map.
     """
     if name not in FAMILY_OF:
+        similar_names = get_close_matches(name.lower(), FAMILY_OF, n=1)
+        hint = f"did you mean {quote(similar_names[0])}? " if similar_names else ""
         raise ParameterError(
-            f"--maps: unknown map of the benchmark {quote(name)}; `robocov benchmark suite` lists them"
+            f"--maps: unknown map of the benchmark {quote(name)}: {hint}`robocov benchmark suite` lists them"
         )
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):

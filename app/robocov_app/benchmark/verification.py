@@ -179,10 +179,10 @@ class Verification:
 
     def describe(self) -> list[str]:
         """Return sentences that describe the checks."""
-        lines = [
-            f"{self.runs} of {format_count(self.rows, 'run')} repeated. {self._describe_missing()}",
-            *self._describe_isolation(),
-        ]
+        repeated = f"{self.runs} of {format_count(self.rows, 'run')} repeated."
+        if self.runs < self.rows:
+            repeated += f" {self._describe_missing()}"
+        lines = [repeated, *self._describe_isolation()]
         if self.comparison is not None:
             lines.append(self._describe_new_maps(self.comparison))
         elif not self.new_maps:
@@ -329,7 +329,8 @@ def _describe_controller(
     description = rated.describe(next(iter(studies.values())))
     if description["source_sha256"] != result["entry"]["source_sha256"]:
         raise InputError(
-            f"{path}: --controller: {rated.controller} is not the source that was rated: its digest differs"
+            f"{path}: --controller: {rated.controller} is not the file that was rated "
+            "(or a module it imports has changed)"
         )
     return description
 

@@ -230,6 +230,9 @@ def _verify(options: Arguments) -> int:
             return INTERRUPTED
     differences = verification.differences
     verdict = "Verified: no difference."
+    if not verification.new_maps:
+        runs = format_count(verification.runs, "run")
+        verdict = f"Verified: no difference in {runs}; new maps were not tried."
     if differences:
         verdict = f"Not verified: {format_count(len(differences), 'difference')}."
     comparison = verification.comparison

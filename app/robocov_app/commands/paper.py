@@ -253,5 +253,8 @@ def _print_claims(claims: Sequence[Claim]) -> None:
         measured = "–"
         if claim.criteria:
             measured = f"{claim.criteria[0].measure}: {claim.criteria[0].result_text}"
-        rows.append((claim.text, claim.verdict, measured, str(claim.runs)))
+        text = claim.text
+        if claim.gains:
+            text += f" ({claim.gains})"
+        rows.append((text, claim.verdict, measured, str(claim.runs)))
     print_table([("claim", wrapped), ("verdict", BOLD), ("measured", wrapped), ("runs", RIGHT)], rows)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FAILED = 1
 """Exit status of a sweep with failed runs."""
 
-_AXIS_LABELS = {"starts": "starts of all maps"}
+_AXIS_LABELS = {"starts": "starts, summed over maps"}
 """Labels of the parameters of a study whose names would be misunderstood in an estimate."""
 
 

@@ -127,4 +127,4 @@ def report_compilation() -> Iterator[None]:
 
 
 def _print_compilation_notice() -> None:
-    echo("compiling the simulation (only once)", to_stderr=True)
+    echo("compiling (once for each kind of controller)", to_stderr=True)

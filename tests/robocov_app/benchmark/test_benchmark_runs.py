@@ -356,7 +356,7 @@ def test_controllers_in_files_are_verified_only_if_named_and_unchanged(
     assert verify(out, sample=1, controller=f"{mine}:Mine") == (1, [])
     mine.write_text(HEAD + PULL + "\n# changed\n")
     message = read_error(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
-    assert "is not the source that was rated" in message
+    assert "is not the file that was rated" in message
 
 
 def select_part(result: dict[str, Any], part: str) -> dict[str, Any]:

@@ -93,7 +93,9 @@ def test_references_have_the_stated_cost() -> None:
 def test_unknown_tracks_and_maps_are_rejected() -> None:
     with pytest.raises(ParameterError, match="--track: unknown track 'ideel': did you mean 'ideal'"):
         suite.select_maps(["ideel"], [], quick=False)
-    with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'; `robocov"):
+    with pytest.raises(
+        ParameterError, match="--maps: unknown map of the benchmark 'room': did you mean 'rooms'"
+    ):
         suite.select_maps([], ["room"], quick=False)
     with pytest.raises(ParameterError, match="--maps: expected a map of ideal, got forklifts"):
         suite.select_maps(["ideal"], ["forklifts"], quick=False)

@@ -26,7 +26,7 @@ def test_a_report_contains_every_measure(hall: Environment) -> None:
         "name": "hall",
         "area": "100 m²",
         "free area": "100 m² (100.0%)",
-        "obstacles": "0, with 4 vertices (boundary included)",
+        "obstacles": "0 separate obstacles, walls are part of the boundary; 4 vertices (boundary included)",
         "components": "1 (100 m²)",
         "unreachable": "none, for robots of radius 0.1 m",
         "narrowest gap": "none",

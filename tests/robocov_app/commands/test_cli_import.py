@@ -30,7 +30,7 @@ def test_a_ros_map_is_imported_with_a_preview(tmp_path: Path, capsys: pytest.Cap
     assert lines == [
         "ros: 12 vertices read, 12 kept; free area 4.25 m² read, 4.25 m² kept",
         "3 x 1.5 m, 0 obstacles",
-        "note: 16 x 10 cells of 0.25 m: 42.5% free, 27.5% blocked, 30% unknown, treated as obstacles",
+        "note: 16 x 10 cells of 0.25 m: 42.5% free, 27.5% blocked, 30.0% unknown, treated as obstacles",
         "note: cells are larger than robots: walls move by at most 0.2 m instead of one cell "
         "(--simplify 0.25)",
         f"saved in {out} and {preview}",
@@ -49,7 +49,7 @@ def test_an_import_is_reported_as_json(tmp_path: Path, capsys: pytest.CaptureFix
     assert row["size_m"] == [3.0, 1.5]  # up to the inner edge of the walls
     assert row["area_kept_m2"] == pytest.approx(4.25)
     assert row["tolerance_m"] == 0.0
-    assert any(note.endswith("30% unknown, cut away") for note in row["notes"])
+    assert any(note.endswith("30.0% unknown, cut away") for note in row["notes"])
 
 
 def test_the_default_output_is_named_after_the_source(

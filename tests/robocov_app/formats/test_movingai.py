@@ -33,8 +33,8 @@ def test_characters_have_their_meaning(tmp_path: Path) -> None:
     assert shapely.equals(foreign.free, expected)
     assert foreign.cell == 1.0
     assert foreign.notes == (
-        "no cell size was given: 1 m taken",
-        "6 x 5 cells of 1 m: 30% free, 70% blocked",
+        "no cell size given: assuming 1 m (--cell)",
+        "6 x 5 cells of 1 m: 30.0% free, 70.0% blocked",
     )
     assert read(tmp_path, GRID, trees="free").free.area == 10
     # the water touches free cells at two corners, where obstacles touch too

@@ -74,7 +74,7 @@ def test_transparent_pixels_are_unknown(tmp_path: Path) -> None:
     assert shapely.equals(read(path, cell=1.0, unknown="free"), shapely.box(0, 0, 3, 4))
     foreign = IMPORTER.read(path, ReadOptions(cell=1.0, unknown="cut"))
     assert foreign.boundary is not None
-    assert foreign.notes == ("4 x 4 cells of 1 m: 50% free, 25% blocked, 25% transparent, cut away",)
+    assert foreign.notes == ("4 x 4 cells of 1 m: 50.0% free, 25.0% blocked, 25.0% transparent, cut away",)
     pixels[..., 3] = 0
     with pytest.raises(MapError, match="--unknown free treats transparent cells as free"):
         read(save_picture(tmp_path, pixels), cell=1.0)

@@ -36,7 +36,7 @@ def test_a_map_is_read_at_its_origin(tmp_path: Path) -> None:
     assert shapely.equals(foreign.free, expected)
     assert (foreign.name, foreign.cell, foreign.vertices_read) == ("plan", 0.25, 12)
     assert foreign.notes == (
-        "16 x 10 cells of 0.25 m: 42.5% free, 27.5% blocked, 30% unknown, treated as obstacles",
+        "16 x 10 cells of 0.25 m: 42.5% free, 27.5% blocked, 30.0% unknown, treated as obstacles",
     )
 
 
@@ -196,7 +196,7 @@ def test_pictures_of_16_bits_are_read(tmp_path: Path) -> None:
     deep = np.array([[65535, 65535, 52685, 0]])
     path = write_ros_map(tmp_path, build_pgm(deep, 65535), resolution=1.0)
     assert shapely.equals(read(path), shapely.box(0, 0, 2, 1))
-    assert "25% unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
+    assert "25.0% unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
 
 
 def test_remarkable_metadata_has_notes(tmp_path: Path) -> None:

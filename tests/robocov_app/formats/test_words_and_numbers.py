@@ -32,7 +32,7 @@ def test_numbers_are_formatted_readably() -> None:
         "0",
         "1200",
     )
-    assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1%", "50%")
+    assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1%", "50.0%")
     assert (_format_number(1761234.5), _format_number(35.2789)) == ("1\u202f761\u202f234", "35.28")
     assert (format_plural(2, "empty geometry"), format_plural(2, "box")) == ("2 empty geometries", "2 boxes")
 

@@ -402,7 +402,7 @@ class TestWords:
         for case, number in (("convex", 2), ("a", 4), ("b", 6)):
             final = paper.figures[""][f"{case}/rapf"].history.mean_distance[-1]
             assert f"{final:.3f} m" in describe(number)
-            assert re.search(r"RAPF's is the lower one \S+% of the time", describe(number + 1))
+            assert re.search(r"RAPF's cost is lower \S+% of the time", describe(number + 1))
         assert "robots are" in describe(8)
         assert "“Pentagon”" in describe(1)
 

@@ -94,7 +94,7 @@ def test_all_maps_have_the_same_weight() -> None:
 
 def test_too_few_maps_have_no_interval_in_the_headline() -> None:
     (comparison,) = compare(build_pairs({"a": 0.8, "b": 1.3}))
-    assert comparison.format_headline().endswith("over 2 maps only.")
+    assert comparison.format_headline().endswith("(2 maps, too few for an interval).")
     assert "2 maps are too few" in render_method([comparison])
 
 

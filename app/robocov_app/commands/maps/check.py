@@ -245,7 +245,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         "name": report.name,
         "area": _format_area(report.area),
         "free area": f"{_format_area(report.free_area)} ({report.free_fraction:.1%})",
-        "obstacles": f"{report.obstacle_count}, with {report.vertex_count} vertices (boundary included)",
+        "obstacles": _format_obstacles(report),
         "components": f"{len(report.components)} ({', '.join(areas)})",
         "unreachable": _format_unreachable_area(report),
         "narrowest gap": _format_narrowest_gap(report),
@@ -265,6 +265,14 @@ def _format_unreachable_area(report: MapReport) -> str:
         return f"none, for robots of radius {report.radius:g} m"
     area = _format_area(report.unreachable_area)
     return f"{area} ({fraction:.1%} of the free area), for robots of radius {report.radius:g} m"
+
+
+def _format_obstacles(report: MapReport) -> str:
+    """Format the number of obstacles. Walls that touch the boundary are not counted: they are part of it."""
+    vertices = f"{report.vertex_count} vertices (boundary included)"
+    if not report.obstacle_count:
+        return f"0 separate obstacles, walls are part of the boundary; {vertices}"
+    return f"{report.obstacle_count}, with {vertices}"
 
 
 def _format_area(area: float) -> str:

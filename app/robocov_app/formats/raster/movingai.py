@@ -84,7 +84,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     cell = get_or_default(options.cell, DEFAULT_CELL_M)
     notes: tuple[str, ...] = ()
     if options.cell is None:
-        notes = (f"no cell size was given: {DEFAULT_CELL_M:g} m taken",)
+        notes = (f"no cell size given: assuming {DEFAULT_CELL_M:g} m (--cell)",)
     return build_grid_map(
         cells,
         GridFrame(cell),

@@ -45,8 +45,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     scale = get_or_default(options.scale, 1.0)
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], location=f"polygon {number}")
-    remark = "" if options.scale else " (the file says none; --scale)"
-    shapes.notes = [f"a unit is {scale:g} m{remark}"]
+    shapes.notes = [f"a unit is {scale:g} m"]
+    if not options.scale:
+        shapes.notes = [f"no unit in the file: assuming {scale:g} m (--scale)"]
     return shapes.build_foreign_map(get_map_name(path), "Imported from rings.", solid=False, overlap=True)
 
 

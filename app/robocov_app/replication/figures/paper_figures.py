@@ -160,8 +160,8 @@ def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
     common = slice(1, min(len(rapf_cost), len(other_cost)))
     lower = float((rapf_cost[common] < other_cost[common]).mean())
     return (
-        f"Averaged over the first {FIRST_MINUTE_S:g} s RAPF has {rapf_mean:.3f} m, {label} "
-        f"{other_mean:.3f} m: {_describe_difference(rapf_mean, other_mean)}. RAPF's is the lower one "
+        f"Over the first {FIRST_MINUTE_S:g} s RAPF averages {rapf_mean:.3f} m, {label} "
+        f"{other_mean:.3f} m: {_describe_difference(rapf_mean, other_mean)}. RAPF's cost is lower "
         f"{format_amount(lower, '%')} of the time. RAPF stays within 5% of its last value from "
         f"{find_arrival_time(rapf.history):.0f} s on, "
         f"{label} from {find_arrival_time(other.history):.0f} s on."

@@ -73,7 +73,8 @@ class GroupComparison:
     first, second : RunGroup
     maps : tuple of MapPairs
     ratio : Interval
-        Ratio of the first group to the second: a mean over maps, or over seeds if there is only one map.
+        Ratio of the first group to the second: a mean over maps, or over seeds if there is only one map. It
+        has no limits if there are several maps, but fewer than `MIN_BOOTSTRAP_MAPS`.
     unpaired_count : int
         Number of cases that only one of the groups has.
     """
@@ -110,8 +111,7 @@ class GroupComparison:
         map_count = len(self.maps)
         if map_count > 1:
             if map_count < MIN_BOOTSTRAP_MAPS:
-                # No interval: it would be misleadingly narrow if the few maps happen to agree.
-                ratio = f"{self.ratio.estimate:.3f} over {map_count} maps only"
+                ratio = f"{self.ratio.estimate:.3f} ({map_count} maps, too few for an interval)"
             else:
                 ratio = f"{format_ratio(self.ratio)} over {map_count} maps"
             return f"{names}: {self.format_verdicts()}; ratio {ratio}."
@@ -169,7 +169,7 @@ def compare_pair(first: RunGroup, second: RunGroup) -> GroupComparison | None:
     ratio = maps[0].ratio
     if len(maps) > 1:
         log_ratios = [float(np.log(pairs.ratio.estimate)) for pairs in maps]
-        ratio = _exponentiate(bootstrap(log_ratios, "mean"))
+        ratio = _estimate_ratio_over_maps(log_ratios)
     # The symmetric difference contains the cases of only one group.
     unpaired_cases = first_runs.keys() ^ second_runs.keys()
     return GroupComparison(first, second, tuple(maps), ratio, len(unpaired_cases))
@@ -190,6 +190,16 @@ def _estimate_ratio(runs: Sequence[ReportedRun], ratios: FloatArray) -> Interval
         effects.setdefault((run.start, run.seed), []).append(effect)
     means = [float(np.mean(values)) for values in effects.values()]
     return _exponentiate(estimate_mean(means))
+
+
+def _estimate_ratio_over_maps(log_ratios: Sequence[float]) -> Interval:
+    """Estimate the geometric mean of the ratios on several maps.
+
+    Few maps have no interval: it would be misleadingly narrow if they happen to agree.
+    """
+    if len(log_ratios) < MIN_BOOTSTRAP_MAPS:
+        return _exponentiate(Interval(float(np.mean(log_ratios)), float("nan"), float("nan")))
+    return _exponentiate(bootstrap(log_ratios, "mean"))
 
 
 def _exponentiate(effect: Interval) -> Interval:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robocov.errors import format_count
 from robocov_app.report.analysis.comparisons import GroupComparison, MapPairs, format_ratio
 from robocov_app.report.tables.table import PageTable
 
@@ -22,17 +23,25 @@ def build_pairs_table(comparisons: Sequence[GroupComparison]) -> PageTable | Non
             comparison.second.label,
             format_ratio(comparison.ratio),
             verdicts,
-            f"{lower_count} of {pair_count}",
+            f"{lower_count} of {format_count(pair_count, 'pair')}",
         )
         rows.append(row)
     caption = "Final mean distance of the first divided by that of the second"
-    head = ("First", "Second", "Ratio", "First is", "First is lower in")
+    head = ("First", "Second", "Ratio", "First is", "First has the lower cost in")
     return PageTable(caption, head, rows, text_columns=frozenset({1, 3}))
 
 
 def build_map_pairs_tables(comparisons: Sequence[GroupComparison]) -> list[PageTable]:
     """Build a table for each comparison on several maps, with a row for each map."""
-    head = ("Map", "Pairs", "First, m", "Second, m", "Ratio", "First is", "First is lower in")
+    head = (
+        "Map",
+        "Pairs",
+        "First, mean in m",
+        "Second, mean in m",
+        "Ratio",
+        "First is",
+        "First has the lower cost in",
+    )
     tables = []
     for comparison in comparisons:
         if len(comparison.maps) > 1:
@@ -50,5 +59,5 @@ def _build_map_row(pairs: MapPairs) -> tuple[str, ...]:
         f"{np.mean(pairs.second_distances):.3f}",
         format_ratio(pairs.ratio),
         pairs.verdict,
-        f"{pairs.lower_count} of {pairs.pair_count}",
+        f"{pairs.lower_count} of {format_count(pairs.pair_count, 'pair')}",
     )

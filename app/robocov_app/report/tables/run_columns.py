@@ -53,8 +53,11 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
     -------
     list of RunColumn
     """
+    settled_at = "Settled at, s"
+    if unsettled == NO_VALUE:
+        settled_at = "Settled at, s (settled runs)"
     columns = [
-        build_quartiles_column("Settled at, s", "settled_at_s", 1, unsettled),
+        build_quartiles_column(settled_at, "settled_at_s", 1, unsettled),
         RunColumn("Contacts", _format_contacts),
         RunColumn("Clearance, m", _format_clearance),
         build_quartiles_column("Path, m", "path_length_m", 2),

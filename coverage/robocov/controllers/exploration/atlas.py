@@ -174,7 +174,9 @@ class Atlas(BaseController):
         0.003, "1", "fraction of the cost that a move within its own cell must save", high=1.0
     )
     rest: float = gain(0.002, "1", "fraction of its own cell's cost that a new goal must save", high=1.0)
-    stake: float = gain(0.004, "1", "fraction of the cost that must be at stake for a viewpoint", high=1.0)
+    stake: float = gain(
+        0.004, "1", "fraction of the cost that unknown space seen from a viewpoint must contribute", high=1.0
+    )
     patience: float = gain(
         0.12,
         "1",

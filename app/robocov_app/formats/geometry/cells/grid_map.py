@@ -176,7 +176,7 @@ def _format_share(number: int, total: int) -> str:
         return "<0.1%"
     if 99.9 < share < 100.0:
         return ">99.9%"
-    return f"{share:.3g}%"
+    return f"{share:.1f}%"
 
 
 def _find_main_island(known: BoolArray, free: BoolArray) -> BoolArray:
