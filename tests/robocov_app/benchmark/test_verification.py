@@ -367,6 +367,12 @@ def test_the_probability_to_miss_changed_rows_agrees_with_sampling() -> None:
     assert replace(verification, runs=10).compute_miss_probability(1) == 0.0
 
 
+def test_the_probability_to_miss_changed_rows_is_omitted_if_all_runs_are_repeated() -> None:
+    some = Verification(seed=0, rows=10, runs=3)
+    assert "goes unnoticed with a probability of 70.0%" in some.describe()[0]
+    assert replace(some, runs=10).describe()[0] == "10 of 10 runs repeated."
+
+
 def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
     rng = np.random.default_rng(0)
     names = [name for names in suite.FAMILIES.values() for name in names]
