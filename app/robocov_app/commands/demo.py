@@ -52,7 +52,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf",)
     """Up to four controllers side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
-    """Gains of the first controller, as in --set k_rep=0.3."""
+    """Gains, as in --set k_rep=0.3 for all controllers or rapf.k_rep=0.3 for one of them."""
     speed: float = 1.0
     """Initial playback speed, simulated seconds per second."""
     paused: bool = False
@@ -244,6 +244,7 @@ def build_session(options: Arguments) -> Session:
     """
     from robocov.mapfile import load_map
     from robocov.team_files import read_team
+    from robocov_app.commands.gain_options import select_gains
     from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
     from robocov_app.viewer.session.setup.robot_properties import RobotProperties
     from robocov_app.viewer.session.setup.scenario import SessionScenario
@@ -254,9 +255,10 @@ def build_session(options: Arguments) -> Session:
         team = read_team(options.team, {"radius": options.radius})
         robots = get_robot_count(team, robots, Arguments.robots, options.team)
         properties = RobotProperties.from_team(team)
-    first_name, *other_names = options.controllers
-    choices = [ControllerChoice(first_name, parse_gains(options.gains))]
-    choices += [ControllerChoice(name) for name in other_names]
+    gains = select_gains(options.controllers, parse_gains(options.gains))
+    choices = [
+        ControllerChoice(name, own_gains) for name, own_gains in zip(options.controllers, gains, strict=True)
+    ]
     conditions = options.condition.build_conditions(options.seed, robots)
     scenario = SessionScenario(
         load_map(options.map or DEFAULT_MAP),

@@ -82,7 +82,9 @@ def command(options: Arguments) -> None:
     files = [str(Path(row["folder"]) / METRICS_FILE) for row in rows]
     if options.plot is not None:
         files.append(str(options.plot))
-    print_answer(options, {"runs": rows}, f"saved in {', '.join(files)}")
+    *others, last = files
+    listed = f"{', '.join(others)} and {last}" if others else last
+    print_answer(options, {"runs": rows}, f"saved {listed}")
 
 
 def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:

@@ -259,10 +259,10 @@ def _describe_best(environment: Environment, best: Optimum, bound: LowerBound | 
 def _describe_search(best: Optimum, robots: int, seconds: float) -> list[str]:
     """Return the agreement of the restarts, and the gain from descent, as lines of text."""
     restarts = len(best.costs)
-    lines = [f"{format_count(robots, 'robot')}, {restarts} restarts in {seconds:.1f} s, of these"]
+    lines = [f"{format_count(robots, 'robot')}, {format_count(restarts, 'restart')} in {seconds:.1f} s"]
     for tolerance in _AGREEMENT_TOLERANCES:
         agreeing = round(best.compute_agreement(tolerance) * restarts)
-        lines.append(f"  within {tolerance:.1%} of the best  {agreeing:>4}")
+        lines.append(f"  within {tolerance:.1%} of the best: {agreeing}")
     median_gap = best.compute_gap(float(np.median(best.costs)))
     gain = best.compute_gap(float(best.costs_before_descent.min()))
     lines.append(f"the median restart ends {median_gap:.2%} above the best")

@@ -317,7 +317,7 @@ class RunOptions(ScenarioOptions, JsonOption):
     max_acceleration: float = DEFAULT_MAX_ACCELERATION_M_S2
     """Maximum acceleration, m/s²."""
     viscosity: float = DEFAULT_VISCOSITY_N_S_M
-    """Viscosity nu of (28), N s/m, for robots of 1 kg."""
+    """Viscosity nu in m q'' = F - nu q', N s/m, with m = 1 kg."""
     sensing_range: float = DEFAULT_SENSING_RANGE_M
     """Sensing range from the robot's center, m."""
     communication_range: float | None = None
@@ -325,11 +325,11 @@ class RunOptions(ScenarioOptions, JsonOption):
     kinematics: Literal["point", "unicycle"] = "point"
     """Points move in any direction; unicycles have two driven wheels and must turn."""
     track_width: float = DEFAULT_TRACK_WIDTH_M
-    """Distance between the wheels of a unicycle, m; 0 for 1.6 radii."""
+    """Distance between the wheels of a unicycle, m; 0 means 1.6 times the radius."""
     turning_rate: float = DEFAULT_TURNING_RATE_RAD_S
     """Maximum turning rate of a unicycle, rad/s."""
     out: Path | None = None
-    """Folder for the results."""
+    """Folder for the results (default: MAP-CONTROLLER; for compare: MAP-comparison)."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
     no_figures: bool = False

@@ -38,7 +38,10 @@ class Arguments(RunOptions):
     """
 
     controller: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_CONTROLLER
-    """Name of a controller, or mine.py:MyController; for a session, those it may load: a.py:A,b.py:B."""
+    """Name of a controller, or mine.py:MyController.
+
+    For a session, the controllers in files that it may load, as in a.py:A,b.py:B.
+    """
     branch: str | None = None
     """Branch of a session, by name or number; by default the one that was displayed when it was saved."""
     all_branches: bool = False

@@ -45,7 +45,7 @@ def test_the_result_is_printed_as_text(capsys: pytest.CaptureFixture[str]) -> No
     output = capsys.readouterr().out
     assert "mean distance   3.82" in output
     assert "1 robot, 5 restarts in" in output
-    assert "within 0.5% of the best     5" in output
+    assert "within 0.5% of the best: 5" in output
     assert "[5.000, 5.000]" in output
 
 

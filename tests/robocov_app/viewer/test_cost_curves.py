@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from driven_window import Driver, open_viewer
-from sample_sessions import HALL
+from sample_sessions import HALL, RAPF
 
 from robocov.cost import CoverageCost
 from robocov_app.viewer.chart import axes
 from robocov_app.viewer.costs.cost_curves import CostCurves
+from robocov_app.viewer.costs.costs import Costs, KnownCost
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 LATTICE = 16
 STEPS_BEFORE_WALL = 60
@@ -46,6 +51,42 @@ def test_a_curve_gets_its_beginning_on_the_map_before_a_wall(
         start = driver.session.timeline.history[0].states[pane.number]
         expected = CoverageCost(HALL, LATTICE, radius=start.setup.team.min_radius)
         assert curve.values[0] == expected(start.positions).mean_distance
+
+
+def answer_one_pane_per_frame(costs: Costs, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answer one request in each frame, as a process does that takes about as long as a frame."""
+    queued: dict[int, Callable[[], None]] = {}
+    send_request = costs.request
+    collect_answers = costs.poll
+
+    def request(pane: int, *arguments: Any, **options: Any) -> None:
+        queued[pane] = partial(send_request, pane, *arguments, **options)
+
+    def poll() -> list[tuple[int, KnownCost]]:
+        if queued:
+            queued.pop(next(iter(queued)))()
+        return collect_answers()
+
+    monkeypatch.setattr(costs, "request", request)
+    monkeypatch.setattr(costs, "poll", poll)
+
+
+def test_curves_of_a_comparison_start_at_time_0_while_it_plays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_viewer(tmp_path, RAPF, ControllerChoice("lloyd"), lattice=LATTICE) as driver:
+        panes = driver.session.timeline.panes
+        for pane in panes:
+            for curve in pane.curves.values():
+                curve.__init__()
+        for _ in range(STEPS_BEFORE_WALL):
+            driver.session.playback.step()
+        answer_one_pane_per_frame(driver.viewer.costs, monkeypatch)
+        driver.session.playback.is_playing = True
+        driver.run_frames(40)
+        for pane in panes:
+            assert pane.distance_curve.times[0] == 0.0
+            assert pane.distance_curve.times[-1] > STEPS_BEFORE_WALL / 60.0
 
 
 def test_an_empty_chart_says_what_it_waits_for(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,7 +78,7 @@ def test_each_force_is_described_with_its_cause():
         "pushed with 0.12 N by robot 7, 80 cm west (2 robots in range)",
         "pushed with 0.30 N by the obstacle, 42 cm south",
         "held back with 0.40 N by viscosity",
-        "resultant 0.30 N north",
+        "resultant of these forces 0.30 N north",
         "32 cm clear of the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
     ]
@@ -164,7 +164,7 @@ def test_a_robot_pressed_against_an_obstacle_is_held_by_it():
     assert report.verdict == "at rest, stuck: its goal is 1.1 m away, behind an obstacle"
     assert "stuck: the pull to its goal (10 N) presses it against the obstacle" in list_texts(report)
     assert "touches the obstacle east of it" in list_texts(report)
-    assert "limited: 2.0 m/s² instead of 10 m/s²" in list_texts(report)
+    assert "acceleration limited to 2.0 m/s² (the forces ask for 10 m/s²)" in list_texts(report)
     blind = build_report([[3.9, 5]], sensing_range=0.05, **east)
     assert blind.verdict == report.verdict
     assert "touches the obstacle east of it" in list_texts(blind)

@@ -236,7 +236,7 @@ def test_drafts_are_offered_and_the_session_waits_for_the_answer(
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.current, Question)
-            assert "1 edit, never saved" in window.dialogs.current.text
+            assert window.dialogs.current.text.startswith("Unsaved session from ")
             window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
@@ -358,3 +358,22 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         driver.type("robot 2")
         driver.press_key("return")
         assert session.timeline.head is failed
+
+
+def test_a_lesson_waits_for_the_answer_about_drafts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
+    workspace = SessionWorkspace(advance_session(start_session(), 5), tmp_path / "drafts")
+    workspace.session.fail_robot(2)
+    workspace.save_draft({})
+    workspace.close()
+    launcher = build_visible_launcher(monkeypatch, tmp_path, offers_lesson=False)
+    with launcher.window() as window:
+        window.do("tour")
+        window.run_frame(0.5)
+        start = window.lesson.frame_key
+        window.run_frame(0.5)
+        assert window.lesson.frame_key == start
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_l, mod=0, unicode="", scancode=0))
+        window.run_frame(0.0)
+        window.run_frame(0.5)
+        assert window.lesson.frame_key != start

@@ -242,3 +242,9 @@ def test_layers_are_shown_and_hidden_by_options(tmp_path: Path) -> None:
         assert "cells" not in window.viewer.view.layers
         assert math.isinf(window.viewer.session.playback.clock.budget), "nobody waits for the frames"
         window.close()
+
+
+def test_gains_apply_to_all_controllers_or_to_one() -> None:
+    options = Arguments(map="square", controllers=("rapf", "rpf", "lloyd"), gains=("k_rep=2", "rpf.k_rep=3"))
+    controllers = build_session(options).timeline.scenario.controllers
+    assert [choice.gains for choice in controllers] == [{"k_rep": 2}, {"k_rep": 3}, {}]

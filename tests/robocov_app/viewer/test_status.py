@@ -52,16 +52,15 @@ def test_the_cursor_is_described_by_robot_and_distance(viewer: Presenter) -> Non
     x, y = viewer.session.timeline.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
     viewer.inspection.cursor = float(x), float(y)
     text = describe_cursor(viewer)
-    assert text.startswith(f"({x:.2f}, {y:.2f}) m: ")
-    assert "robot 4" in text
-    assert text.endswith("× the mean")
+    assert text.startswith(f"({x:.2f}, {y:.2f}) m, ")
+    assert text.endswith(" m from robot 4")
 
 
 def test_the_cursor_in_a_wall_or_outside_is_described(viewer: Presenter) -> None:
     viewer.inspection.cursor = 1.0, 8.5  # in the obstacle in the upper left corner
-    assert describe_cursor(viewer).endswith(": inside an obstacle")
+    assert describe_cursor(viewer).endswith(", inside an obstacle")
     viewer.inspection.cursor = -3.0, -3.0
-    assert describe_cursor(viewer).endswith(": outside the map")
+    assert describe_cursor(viewer).endswith(", outside the map")
     viewer.inspection.cursor = None
     assert describe_cursor(viewer) == ""
 
@@ -75,5 +74,5 @@ def test_cut_off_rooms_are_reported() -> None:
     viewer.costs.request(0, 0.0, session.timeline.panes[0].simulation.positions)
     viewer.costs.poll()
     viewer.inspection.cursor = 3.0, 1.0
-    assert describe_cursor(viewer).endswith(": out of reach of all robots")
+    assert describe_cursor(viewer).endswith(", out of reach of all robots")
     assert any(fact.startswith("cut off ") for fact in list_facts(viewer, 60.0, 60.0, None))

@@ -38,8 +38,8 @@ def test_unsaved_work_is_recovered(tmp_path: Path) -> None:
     crash_after_draft(workspace)
     (draft,) = find_recoverable_drafts(tmp_path)
     description = describe_draft(draft)
-    assert "1 edit, " in description
-    assert description.endswith("never saved")
+    assert description.startswith("Unsaved session from ")
+    assert description.endswith(", with 1 edit")
     recovered, view = recover_draft(draft, (), tmp_path)
     assert view == {"theme": "light"}
     assert recovered.has_unsaved_edits

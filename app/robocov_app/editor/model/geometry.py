@@ -122,6 +122,12 @@ def format_length(meters: float) -> str:
     return f"{meters:.1f} m"
 
 
+def format_shift(dx: float, dy: float) -> str:
+    """Format a shift in m, for example "Δx 2.00  Δy −3.00"."""
+    # Adding 0.0 turns -0.0 into 0.0. A minus sign is as wide as a digit, unlike a hyphen.
+    return f"Δx {round(dx, 2) + 0.0:.2f}  Δy {round(dy, 2) + 0.0:.2f}".replace("-", "−")
+
+
 def format_point(point: Point) -> str:
     """Format a position, for example "(1.00, 2.50) m"."""
     x = round(point[0], 2) + 0.0  # never minus zero

@@ -11,7 +11,13 @@ from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, P
 from robocov.errors import MapError, format_count
 from robocov_app.editor.edits import create
 from robocov_app.editor.model.coordinates import parse_length, parse_next_point, parse_size
-from robocov_app.editor.model.geometry import build_rectangle, distance, format_bearing, format_length
+from robocov_app.editor.model.geometry import (
+    build_rectangle,
+    distance,
+    format_bearing,
+    format_length,
+    format_shift,
+)
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
@@ -265,7 +271,7 @@ class MeasureTool(LineTool):
         start, end = points[-2:]
         dx = end[0] - start[0]
         dy = end[1] - start[1]
-        label = f"{format_bearing(start, end)}   Δx {dx:.2f}  Δy {dy:.2f}"
+        label = f"{format_bearing(start, end)}   {format_shift(dx, dy)}"
         if len(points) > 2:
             total = sum(distance(a, b) for a, b in pairwise(points))
             label += f"   {format_length(total)} in all, {shapely.Polygon(points).area:.2f} m²"

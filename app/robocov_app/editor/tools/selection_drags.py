@@ -138,7 +138,7 @@ class MoveDrag(Drag):
         else:
             self.change = self._build_change(dx, dy)
         length = geometry.format_length(math.hypot(dx, dy))
-        self.label = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {length}"
+        self.label = f"{geometry.format_shift(dx, dy)}   {length}"
 
     def _build_change(self, dx: float, dy: float) -> Change | None:
         if not dx and not dy:

@@ -64,7 +64,8 @@ class CostCurves:
         self.earlier_answer_count = 0
         self._viewer = viewer
         self._past_version = -1  # of the timeline at the last request
-        self._is_turn_of_displayed_step = False  # while costs of the first seconds are missing
+        # Panes whose next cost is that of the displayed step, while costs of the first seconds are missing.
+        self._panes_of_displayed_step: set[int] = set()
         self._earlier_costs: Costs | None = None
         self._earlier_map: Environment | None = None
 
@@ -150,9 +151,10 @@ class CostCurves:
     def _request_on_displayed_map(self, state: _MissingState) -> None:
         """Request the cost of an earlier state on the displayed map.
 
-        While the run plays, these requests alternate with those for the displayed step.
+        While the run plays, these requests alternate with those for the displayed step of the same pane.
         """
-        if self._viewer.session.playback.is_playing and self._is_turn_of_displayed_step:
+        is_turn_of_displayed_step = state.pane in self._panes_of_displayed_step
+        if self._viewer.session.playback.is_playing and is_turn_of_displayed_step:
             return
         self._viewer.costs.request(
             state.pane, state.time, state.positions, speeds=state.setup.speed_limits, is_for_curve=True
@@ -190,8 +192,9 @@ class CostCurves:
     def _add_answers(self) -> None:
         answers = self._viewer.costs.poll()
         self.answer_count += len(answers)
-        if answers:
-            self._is_turn_of_displayed_step = not self._is_turn_of_displayed_step
+        # Each pane has its own turns. With common ones, two panes would always have the same one.
+        for number, _ in answers:
+            self._panes_of_displayed_step ^= {number}
         if self._earlier_costs is not None:
             earlier_answers = self._earlier_costs.poll()
             self.earlier_answer_count += len(earlier_answers)

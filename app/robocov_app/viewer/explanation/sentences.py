@@ -73,11 +73,13 @@ def list_force_lines(situation: RobotSituation) -> list[ReportLine]:
         lines.append(_build_force_line(describe(situation, kind, force), kind, force))
     if situation.viscosity > 0.0:
         drag = abs(situation.drag)
-        text = f"held back with {format_force(drag)}" if drag >= MIN_FORCE_N else "not held back"
-        lines.append(_build_force_line(f"{text} by viscosity", "viscosity", situation.drag))
+        text = "no viscous drag"
+        if drag >= MIN_FORCE_N:
+            text = f"held back with {format_force(drag)} by viscosity"
+        lines.append(_build_force_line(text, "viscosity", situation.drag))
     size = abs(situation.resultant)
     direction = format_direction(situation.resultant) if size >= MIN_FORCE_N else ""
-    text = f"resultant {format_force(size)} {direction}".rstrip()
+    text = f"resultant of these forces {format_force(size)} {direction}".rstrip()
     lines.append(_build_force_line(text, "resultant", situation.resultant))
     return lines
 
@@ -161,7 +163,9 @@ def _list_limits(situation: RobotSituation) -> list[str]:
     acceleration = abs(situation.resultant) / situation.mass
     limit = situation.max_acceleration
     if acceleration > _FAST_ACCELERATION * limit:
-        texts.append(f"limited: {format_number(limit)} m/s² instead of {format_number(acceleration)} m/s²")
+        allowed = format_number(limit)
+        wanted = format_number(acceleration)
+        texts.append(f"acceleration limited to {allowed} m/s² (the forces ask for {wanted} m/s²)")
     max_speed = situation.max_speed
     low, high = _FULL_SPEED
     if situation.speed >= low * max_speed:

@@ -70,7 +70,7 @@ START_CARDS = (
     ),
     StartCard(
         StartChoice("City with 50 robots", options={"map": "city", "robots": 50, "start": "uniform"}),
-        "Fifty robots share the streets of a city.",
+        "Fifty robots spread through the streets of a city.",
         ("city",),
     ),
     StartCard(

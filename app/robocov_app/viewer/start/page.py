@@ -45,7 +45,7 @@ STILL_TIME_S = 3.0
 """Time of the examples with reduced motion, at which the robots have left their starts."""
 
 _TITLE = "robocov"
-_TAGLINE = "Robots share out a building that they do not know. Pick an example and play."
+_TAGLINE = "Robots spread out through an unknown building. Pick an example."
 _GROUPS = ("Start page",)
 _HINT = "F1 or Esc closes"
 _LIGHT_NAME: ThemeName = "light"

@@ -102,7 +102,9 @@ class RulerTool(SegmentTool):
         end = self.segment.end
         dx = end[0] - start[0]
         dy = end[1] - start[1]
-        return ViewerToolOverlay((start, end), label=f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})")
+        # A minus sign is as wide as a digit, unlike a hyphen.
+        components = f"(Δx {dx:.2f}, Δy {dy:.2f})".replace("-", "−")
+        return ViewerToolOverlay((start, end), label=f"{np.hypot(dx, dy):.2f} m  {components}")
 
 
 @dataclass

@@ -138,7 +138,7 @@ def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft])
             show_start_hint()
 
     question = create_recovery_question(
-        f"A window was closed without saving: {describe_draft(newest)}.",
+        f"{describe_draft(newest)}.",
         other_count=len(others),
         recover=recover,
         discard=discard,

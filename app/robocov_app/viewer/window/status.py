@@ -94,7 +94,7 @@ def describe_cursor(viewer: ViewerModel) -> str:
     known_cost = viewer.costs.known.get(pane.number)
     if known_cost is None:
         return position
-    return f"{position}: {_describe_point(viewer, pane, known_cost, cursor)}"
+    return f"{position}, {_describe_point(viewer, pane, known_cost, cursor)}"
 
 
 def _describe_point(viewer: ViewerModel, pane: Pane, known_cost: KnownCost, point: Point) -> str:
@@ -113,8 +113,7 @@ def _describe_point(viewer: ViewerModel, pane: Pane, known_cost: KnownCost, poin
     if not 0 <= row < len(numbers):
         return "out of reach of all robots"
     distance = float(result.distances[site])
-    ratio = distance / result.mean_distance if result.mean_distance > 0 else 0.0
-    return f"{distance:.2f} m to robot {numbers[row]}, {ratio:.1f} × the mean"
+    return f"{distance:.2f} m from robot {numbers[row]}"
 
 
 def suggest_actions(viewer: ViewerModel) -> str:

@@ -335,6 +335,9 @@ class ViewerWindow(CommandWindow):
         viewer.files.workspace.save_draft(viewer.files.view)
         for message, is_error in self.run_saver.poll():
             viewer.show_message(message, is_error=is_error)
+        if self.lesson.shown is not None and self.dialogs.is_open:
+            # A lesson waits for the answer, for example whether to recover unsaved work.
+            return
         self.lesson.advance(seconds)
         # After a wait for events, the elapsed time is simulated in slices of one frame each, because the
         # clock limits the time of a single frame.

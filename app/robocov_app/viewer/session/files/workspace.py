@@ -150,12 +150,12 @@ def _check_draft(draft: autosave.Draft) -> autosave.Draft | None:
 
 def describe_draft(draft: autosave.Draft) -> str:
     """Describe a draft for the question whether to recover it."""
-    status = "never saved" if draft.path is None else f"not saved to {draft.path.name}"
+    name = "session" if draft.path is None else f"changes of {draft.path.name}"
     session = draft.content["session"]
     nodes = session["touches"] if "touches" in session else session["edits"]  # the former in old drafts
     count = len(nodes) - 1
     unit = "edit" if count == 1 else "edits"
-    return f"session from {draft.when:%H:%M}, {count} {unit}, {status}"
+    return f"Unsaved {name} from {draft.when:%H:%M}, with {count} {unit}"
 
 
 def recover_draft(
