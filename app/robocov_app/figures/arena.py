@@ -42,6 +42,8 @@ _NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
 _START_PT = 6.2
 _START_NUMBER_SIZE = 1.1
 """Text size of the numbers of starts, in diameters of their rings."""
+_MIN_START_NUMBER_PT = 5.5
+"""Numbers of starts that would be smaller are left out: between crowded rings, they would be illegible."""
 _MAX_NUMBERED_STARTS = 30
 """In a larger team, the numbers of starts would hide the trajectories."""
 _START_NUMBER_HALO_PT = 1.6
@@ -278,7 +280,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     starts = record.positions[first_rows, present]
     size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
     axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
-    if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_NUMBER_PT:
+    if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_START_NUMBER_PT:
         _draw_start_numbers(axes, record, present, starts, size, theme)
 
 
