@@ -13,7 +13,7 @@ _MAX_DISTANCE = 4.0
 
 
 def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float) -> FloatArray:
-    """Place a number next to each start, as far as possible from marks and other numbers.
+    """Place a number next to each start, away from marks and other numbers.
 
     Parameters
     ----------
@@ -28,10 +28,15 @@ def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float)
     (n, 2) array
         Centers of the numbers.
 
+    Notes
+    -----
+    A number stands in the first direction, counterclockwise from +x, in which nothing is closer to it than its
+    own start. If there is none, it stands in the direction that is farthest from marks and numbers.
+
     Examples
     --------
-    >>> place_start_numbers(np.array([[0.0, 0.0]]), np.array([[10.0, 0.0], [20.0, 0.0]]), 10.0).round(9)
-    array([[-11.5,   0. ]])
+    >>> place_start_numbers(np.array([[0.0, 0.0]]), np.array([[10.0, 0.0], [20.0, 0.0]]), 10.0).round(1)
+    array([[ 4.4, 10.6]])
     """
     angles = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
     offsets = _NUMBER_DISTANCE * mark_size * np.column_stack([np.cos(angles), np.sin(angles)])
