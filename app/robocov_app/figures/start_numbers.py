@@ -30,8 +30,8 @@ def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float)
 
     Notes
     -----
-    A number stands in the first direction, counterclockwise from +x, in which nothing is closer to it than its
-    own start. If there is none, it stands in the direction that is farthest from marks and numbers.
+    A number stands in the first direction, counterclockwise from +x, in which nothing is closer to it than
+    its own start. If there is none, it stands in the direction that is farthest from marks and numbers.
 
     Examples
     --------
