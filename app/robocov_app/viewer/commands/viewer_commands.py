@@ -113,7 +113,7 @@ def _list_run_commands(viewer: Presenter) -> list[Command]:
     group.add("settle", "Play until settled, then stop", playback.toggle_settling, "s")
     group.add("slower", "Slower", slower, "-", repeats=True)
     group.add("faster", "Faster", faster, "=", "+", repeats=True)
-    group.add("seed:next", "New starting positions (next seed)", playback.restart_with_next_seed, "n")
+    group.add("seed:next", "New starting positions: the next seed", playback.restart_with_next_seed, "n")
     group.add("start:next", "Next start of the map", playback.restart_at_next_start, "shift+n")
     group.add("more", "Restart with one more robot", add_robot, "shift+=", "shift++", repeats=True)
     group.add("fewer", "Restart with one fewer robot", remove_robot, "shift+-", repeats=True)
@@ -180,7 +180,9 @@ def _list_edit_commands(viewer: Presenter) -> list[Command]:
     group.add("robot:next", "Inspect the next robot", select_next, "i", repeats=True)
     group.add("robot:previous", "Inspect the previous robot", select_previous, "shift+i", repeats=True)
     group.add("robot:fail", "Fail or revive selected robot", robots.fail_or_revive, "shift+d")
-    group.add("robot:follow", "Follow selected robot with the view", robots.toggle_following, "shift+v")
+    group.add(
+        "robot:follow", "Follow selected robot: the view moves with it", robots.toggle_following, "shift+v"
+    )
     group.add("robot:remove", "Remove selected robot", robots.remove, "shift+delete")
     group.add("robot:add", "Add a robot here", robots.add_at_cursor, "shift+a")
     group.add("delete", "Delete the selection", viewer.selection.delete, "delete")
@@ -237,7 +239,8 @@ def _list_layer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Comm
     group.add("preset:next", "Next preset of layers", viewer.view.use_next_preset, "shift+l")
     for number, preset in enumerate(LAYER_PRESETS, 1):
         key = f"alt+shift+{number}"
-        title = f"{preset.title} · {preset.description}"
+        name = preset.title.removesuffix("?")
+        title = f"{name}: {preset.description[0].lower()}{preset.description[1:]}"
         group.add(f"preset:{preset.name}", title, partial(viewer.view.use_preset, preset), key)
     return group.commands
 

@@ -90,11 +90,11 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
     group.add("pan:right", "Pan right", pan_right, "ctrl+right", repeats=True)
     group.add("pan:up", "Pan up", pan_up, "ctrl+up", repeats=True)
     group.add("pan:down", "Pan down", pan_down, "ctrl+down", repeats=True)
-    group.add("plot", "Plot mean distance or mean time", chart.switch_quantity, "y")
+    group.add("plot", "Plot distance or travel time", chart.switch_quantity, "y")
     group.add("layers", "Menu of layers and presets", actions.toggle_layer_menu, "l")
     group.add("presets", "Presets of layers", actions.open_preset_menu, "ctrl+l")
     group.add("tab", "Next page of the panel", actions.show_next_tab, "ctrl+tab")
-    group.add("focus:next", "Next control; Enter or Space uses it", actions.focus_next, "tab", repeats=True)
+    group.add("focus:next", "Next control: Enter or Space uses it", actions.focus_next, "tab", repeats=True)
     group.add("focus:previous", "Previous control", actions.focus_previous, "shift+tab", repeats=True)
     group.add("fullscreen", "Full screen", actions.toggle_fullscreen, "f11")
     return group.commands
@@ -122,7 +122,7 @@ def _list_share_commands(share: ShareActions, actions: ViewerWindowActions) -> l
 
 def _list_compare_commands(actions: ViewerWindowActions) -> list[Command]:
     group = CommandGroup("Compare")
-    group.add("pane:add", "Compare with another controller, from 0 s", actions.compare, "k")
+    group.add("pane:add", "Compare controllers: all start at 0 s", actions.compare, "k")
     return group.commands
 
 
