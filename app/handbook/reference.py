@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 ARRAY_TYPES = ("FloatArray", "IntArray", "BoolArray", "Float32Array", "Int32Array", "AnyArray")
 """Types of arrays in signatures; names of ``robocov.typing``."""
 ARRAY_LIKE = stringify_annotation(ArrayLike, "smart")
-"""What Sphinx shows for NumPy's type of everything that can be converted to an array."""
+"""Text by which Sphinx represents NumPy's type of everything that can be converted to an array."""
 
 OTHER_NAMES = {
     "Figures": ("robocov_app.figures.files.save_figure", "robocov_app.figures.files.render_png"),

@@ -281,20 +281,21 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
     axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
     if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_START_NUMBER_PT:
-        _draw_start_numbers(axes, record, present, starts, size, theme)
+        starts_by_robot = dict(zip(present.tolist(), starts, strict=True))
+        _draw_start_numbers(axes, record, starts_by_robot, size, theme)
 
 
 def _draw_start_numbers(
-    axes: Axes, record: Record, robots: IntArray, starts: FloatArray, size: float, theme: Theme
+    axes: Axes, record: Record, starts: Mapping[int, FloatArray], size: float, theme: Theme
 ) -> None:
-    """Write the number of each robot next to the ring at its start, (k, 2) m, with a size in points."""
-    trajectories = record.positions[:, robots].reshape(-1, 2)
+    """Write the number of each robot next to the ring at its start, (2,) m. Rings have a size in points."""
+    trajectories = record.positions[:, list(starts)].reshape(-1, 2)
     is_known = np.isfinite(trajectories).all(axis=1)
     marks = _to_points(axes, trajectories[is_known])
-    start_points = _to_points(axes, starts)
+    start_points = _to_points(axes, np.array(list(starts.values())))
     centers = place_start_numbers(start_points, marks, size)
     halo = [withStroke(linewidth=_START_NUMBER_HALO_PT, foreground=to_plot_color(theme.background))]
-    for robot, start, offset in zip(robots.tolist(), starts, centers - start_points, strict=True):
+    for (robot, start), offset in zip(starts.items(), centers - start_points, strict=True):
         axes.annotate(
             str(robot + 1),
             xy=start.tolist(),

@@ -74,7 +74,7 @@ FORMAT_LABELS = {
     "tmx": "Tiled",
     "wkt": "well-known text",
 }
-"""How the figure calls each format, by its name in commands."""
+"""Names of formats in figures, by their names in commands."""
 
 
 def save_preview(foreign: ForeignMap, environment: Environment, report: ImportReport, path: Path) -> None:

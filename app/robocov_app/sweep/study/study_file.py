@@ -58,7 +58,7 @@ class _Key(NamedTuple):
     """Description of a key of a table."""
 
     meaning: str
-    """What the value sets, with its unit and its default; Markdown."""
+    """Meaning of the value, with its unit and its default; Markdown."""
     schema: _ValueSchema | _TableSchema
     """Schema of the value."""
 
@@ -275,7 +275,7 @@ class KeyDescription(NamedTuple):
     name : str
         Name of the key; keys of tables are dotted, such as ``team.radius``.
     meaning : str
-        What the value sets, with its unit and its default; Markdown.
+        Meaning of the value, with its unit and its default; Markdown.
     expected : str
         Accepted values, and whether the key is required.
     """

@@ -36,7 +36,7 @@ TipSketch: TypeAlias = Callable[[float], Surface]
 
 
 TipSide: TypeAlias = Literal["below", "left", "right"]
-"""Where a tip appears: below its widget, or to the left or right of the page with the widget."""
+"""Side on which a tip appears: below its widget, or to the left or right of the page with the widget."""
 
 
 class _Line(NamedTuple):

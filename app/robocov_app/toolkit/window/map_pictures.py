@@ -12,27 +12,15 @@ from robocov_app.toolkit.window.cover_picture import CoverPicture
 if TYPE_CHECKING:
     from robocov_app.toolkit.window.command_window import CommandWindow
 
-MAX_MAP_PICTURES = 8  # of different sizes that are kept
+MAX_MAP_PICTURES = 8
+"""Maximum number of pictures of different sizes that are kept."""
 
 
 class MapPicture(Protocol):
     """Draws the map of a window without its buttons, in another size."""
 
     def draw(self, size: tuple[int, int], scale: float, *, is_controlling: bool) -> Surface:
-        """Draw the map.
-
-        Parameters
-        ----------
-        size : (width, height), px
-        scale : float
-            Size of texts and symbols.
-        is_controlling : bool
-            Whether the picture is for the page that controls the window, on which buttons can be used.
-
-        Returns
-        -------
-        pygame.Surface
-        """
+        """Draw the map, as `robocov_app.toolkit.window.page_view.MapDrawing.draw` does."""
 
     def find_window_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return the pixel of the window that shows the same as a pixel of the newest picture."""

@@ -1,7 +1,8 @@
 """Choice of the chips that fit into the layer bar."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from robocov_app.viewer.canvas.layer_chips import Chip
 
@@ -9,15 +10,22 @@ _DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
 """Layers with symbols that need no explanation; their chips are left out first if space is short."""
 
 
+class FittedChips(NamedTuple):
+    """The chips that are shown in the layer bar."""
+
+    layers: list[Chip]
+    presets: list[Chip]
+    """Chips of the presets, or only the button that opens their menu."""
+
+
 def fit_chips(
     chips: Sequence[Chip],
     presets: Sequence[Chip],
     more: Chip,
     standard_commands: set[str],
-    measure: Callable[[Chip], int],
-    space: int,
-) -> tuple[list[Chip], list[Chip]]:
-    """Leave out chips, or their texts, until the others fit into a space.
+    fits: Callable[[Sequence[Chip]], bool],
+) -> FittedChips:
+    """Leave out chips, or their texts, until the others fit.
 
     Symbols that need no explanation are left out first, then a button replaces the presets. Then the chips of
     standard layers lose their texts and are left out, from the last one, so that symbols that are new to the
@@ -32,38 +40,43 @@ def fit_chips(
         Button that opens the menu of the presets.
     standard_commands : set of str
         Commands of the chips of layers that are visible by default.
-    measure : callable
-        Returns the width that a chip takes, px.
-    space : int
-        Available width, px.
+    fits : callable
+        Returns whether chips fit into the layer bar together.
 
     Returns
     -------
-    chips, presets : list of Chip
+    FittedChips
     """
-
-    def fits(some_chips: Sequence[Chip], some_presets: Sequence[Chip]) -> bool:
-        return sum(measure(chip) for chip in [*some_chips, *some_presets]) <= space
-
     button = [more] if presets else []
     for shown_presets in (list(presets), button):
-        remaining = list(chips)
-        for name in _DROPPED_FIRST:
-            if fits(remaining, shown_presets):
-                return remaining, shown_presets
-            remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
-        if fits(remaining, shown_presets):
-            return remaining, shown_presets
-    standard = [chip for chip in remaining if chip.command in standard_commands]
-    other = [chip for chip in remaining if chip.command not in standard_commands]
-    chips_by_command = {chip.command: chip for chip in remaining}
+        for remaining in _drop_known_symbols(chips):
+            if fits([*remaining, *shown_presets]):
+                return FittedChips(remaining, shown_presets)
+    *_, unknown_symbols = _drop_known_symbols(chips)
+    for remaining in _shorten(unknown_symbols, standard_commands):
+        if fits([*remaining, *button]):
+            return FittedChips(remaining, button)
+    return FittedChips([], button)
+
+
+def _drop_known_symbols(chips: Sequence[Chip]) -> Iterator[list[Chip]]:
+    """Yield all chips, and again after each one whose symbol needs no explanation has been left out."""
+    remaining = list(chips)
+    yield remaining
+    for name in _DROPPED_FIRST:
+        remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
+        yield remaining
+
+
+def _shorten(chips: Sequence[Chip], standard_commands: set[str]) -> Iterator[list[Chip]]:
+    """Yield the chips after each step: one more loses its text, or is left out, standard layers first."""
+    remaining = {chip.command: chip for chip in chips}
+    standard = [chip for chip in chips if chip.command in standard_commands]
+    other = [chip for chip in chips if chip.command not in standard_commands]
     for group in (standard, other):
         for chip in reversed(group):
-            chips_by_command[chip.command] = replace(chip, has_text=False)
-            if fits(list(chips_by_command.values()), button):
-                return list(chips_by_command.values()), button
+            remaining[chip.command] = replace(chip, has_text=False)
+            yield list(remaining.values())
         for chip in reversed(group):
-            del chips_by_command[chip.command]
-            if fits(list(chips_by_command.values()), button):
-                return list(chips_by_command.values()), button
-    return [], button
+            del remaining[chip.command]
+            yield list(remaining.values())

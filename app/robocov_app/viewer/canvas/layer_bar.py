@@ -211,17 +211,19 @@ class LayerBar(BasicFocusGroup):
         def measure(chip: Chip) -> int:
             return measure_chip(canvas, chip) + gap
 
-        space = width - 2 * margin - measure(menu) + gap
+        def fits(some_chips: Sequence[Chip]) -> bool:
+            return sum(measure(chip) for chip in [menu, *some_chips]) <= width - 2 * margin + gap
+
         standard_commands = {f"layer:{layer.name}" for layer in layers if layer.is_default}
         more = Chip("more", PRESETS_COMMAND, label="…")
-        chips, presets = fit_chips(chips, presets, more, standard_commands, measure, space)
+        fitted = fit_chips(chips, presets, more, standard_commands, fits)
         placed = []
         x = left + margin
-        for chip in [menu, *chips]:
+        for chip in [menu, *fitted.layers]:
             placed.append((chip, Rect(x, y, measure(chip) - gap, height)))
             x += measure(chip)
-        x = left + width - margin - sum(measure(chip) for chip in presets) + gap
-        for chip in presets:
+        x = left + width - margin - sum(measure(chip) for chip in fitted.presets) + gap
+        for chip in fitted.presets:
             placed.append((chip, Rect(x, y, measure(chip) - gap, height)))
             x += measure(chip)
         return placed
