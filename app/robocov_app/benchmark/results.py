@@ -8,8 +8,9 @@ import zlib
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
+from robocov.controllers.base import Information
 from robocov.controllers.registry import update_gain_names
 from robocov.errors import InputError, quote
 from robocov.files.strictjson import parse_json, read_bytes
@@ -214,12 +215,21 @@ def read_result(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: suite: expected the suite of {suite.SUITE_FILE.name}, got {result.get('suite')}"
         )
-    _check_types_except_rows(result, path)
+    _check_all_except_rows(result, path)
     _update_gain_names(result["entry"])
     result["method"] = [_update_figure_names(str(sentence)) for sentence in result["method"]]
+    runs = set()
     for k, row in enumerate(result["rows"]):
+        location = f"{path}: rows[{k}]"
         _update_row_names(row)
-        _check_row(row, f"{path}: rows[{k}]")
+        _check_row(row, location)
+        run = (row["track"], row["map"], row["seed"])
+        if run in runs:
+            raise InputError(
+                f"{location}: expected a run without an earlier row, "
+                f"got {row['track']} on {row['map']}, seed {row['seed']}"
+            )
+        runs.add(run)
     return result
 
 
@@ -257,15 +267,26 @@ _RUN_TYPES = {"track": str, "map": str, "seed": int}
 _FAILED_ROW_TYPES = {**_RUN_TYPES, "error": str}
 _ROW_TYPES = {
     **_RUN_TYPES,
-    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound", "sent_bytes", "deciding_s"), int | float | None),
+    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound"), int | float | None),
+    **dict.fromkeys(
+        ("mean_distance_m", "uncovered_area_m2", "path_length_m", "contacts", "sent_bytes", "deciding_s"),
+        int | float,
+    ),
 }
+_FIGURES_THAT_MAY_BE_NEGATIVE = ("min_clearance_m", "gap", "gap_to_bound")
+_BOUND_TOLERANCE = 1e-9
+"""Fraction by which rounding errors may make a cost lower than the lower bound."""
 
 
-def _check_types_except_rows(result: dict[str, Any], path: Path) -> None:
-    """Raise InputError unless everything but the rows of a result has the expected types."""
+def _check_all_except_rows(result: dict[str, Any], path: Path) -> None:
+    """Raise InputError unless everything but the rows of a result has the expected types and values."""
     _require_types(result, _HEAD_TYPES, path)
     _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
     _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
+    information = result["entry"]["information"]
+    if information not in get_args(Information):
+        expected = ", ".join(get_args(Information))
+        raise InputError(f"{path}: entry: information: expected one of {expected}, got {quote(information)}")
 
 
 def _update_gain_names(entry: dict[str, Any]) -> None:
@@ -289,11 +310,21 @@ def _update_row_names(row: Any) -> None:
 
 
 def _check_row(row: Any, location: str) -> None:
-    """Raise InputError unless a row has the expected types, and belongs to a run of the suite."""
+    """Raise InputError unless a row belongs to a run of the suite, and its figures are possible."""
     has_failed = isinstance(row, dict) and "error" in row
     _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, location)
     if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
         raise InputError(f"{location}: {row['track']} on {row['map']} is not a run of the suite")
+    if has_failed:
+        return
+    for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_FIGURES_THAT_MAY_BE_NEGATIVE}):
+        if row[name] is not None and row[name] < 0.0:
+            raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
+    if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
+        raise InputError(
+            f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "
+            "No placement has a lower cost than the lower bound"
+        )
 
 
 _TYPE_NAMES: Mapping[Any, str] = {
@@ -303,6 +334,7 @@ _TYPE_NAMES: Mapping[Any, str] = {
     bool: "true or false",
     int: "a whole number",
     str | None: "a string or null",
+    int | float: "a number",
     int | float | None: "a number or null",
 }
 
@@ -312,7 +344,9 @@ def _require_types(values: Any, types: Mapping[str, Any], location: object) -> N
     for name, expected in types.items():
         if not isinstance(values, dict) or name not in values:
             raise InputError(f"{location}: {name}: missing, expected a complete result")
-        if not isinstance(values[name], expected):
+        # A bool is an int in Python.
+        is_wrong_bool = isinstance(values[name], bool) and expected is not bool
+        if is_wrong_bool or not isinstance(values[name], expected):
             type_name = _TYPE_NAMES[expected]
             raise InputError(f"{location}: {name}: expected {type_name}, got {quote(values[name])}")
 

@@ -527,8 +527,6 @@ def _compare_without_running(
     versions = describe_version_differences(result["versions"])
     if versions:
         yield f"made with {versions}"
-    if len(rows) < len(result["rows"]):
-        yield f"{format_count(len(result['rows']) - len(rows), 'row')} of runs that have another row"
     for key in tasks:
         if key not in rows:
             yield f"{_format_key(key)}: missing row"
