@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from robocov.arrays import compute_lengths
 from robocov.typing import FloatArray
 
 _DIRECTIONS = 16
@@ -43,10 +44,10 @@ def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float)
     centers = np.empty_like(starts)
     for number, start in enumerate(starts):
         obstacles = np.concatenate([marks, starts, centers[:number]])
-        is_near = np.hypot(*(obstacles - start).T) < _MAX_DISTANCE * mark_size
+        is_near = compute_lengths(obstacles - start) < _MAX_DISTANCE * mark_size
         candidates = start + offsets
         differences = candidates[:, None] - obstacles[None, is_near]
-        clearances = np.hypot(differences[..., 0], differences[..., 1]).min(axis=1)
+        clearances = compute_lengths(differences).min(axis=1)
         # Rounding lets the first of several equally good directions win on all machines.
         centers[number] = candidates[np.argmax(clearances.round(6))]
     return centers

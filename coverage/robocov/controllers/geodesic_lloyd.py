@@ -218,14 +218,14 @@ class GeodesicPlanner:
         """
         n = len(positions)
         received_positions = [seen.get_neighbor_positions(i) for i in range(n)]
-        neighbor_positions = find_nearest_inside(self.configuration_space, np.vstack(received_positions))
-        all_positions = np.vstack([positions, neighbor_positions])
-        unique_positions, rows = np.unique(all_positions, axis=0, return_inverse=True)
+        unique_received, received_rows = np.unique(np.vstack(received_positions), axis=0, return_inverse=True)
+        free_received = find_nearest_inside(self.configuration_space, unique_received)
+        unique_positions, rows = np.unique(np.vstack([positions, free_received]), axis=0, return_inverse=True)
         results = self.cost.evaluate_teams(unique_positions[:, None])
         distances = np.array([result.distances for result in results])
         own_rows = rows[:n]
         neighbor_ends = np.cumsum([len(received) for received in received_positions])
-        neighbor_rows = np.split(rows[n:], neighbor_ends[:-1])
+        neighbor_rows = np.split(rows[n:][received_rows], neighbor_ends[:-1])
         goals = np.empty_like(positions)
         for i in range(n):
             own_distances = distances[own_rows[i]]

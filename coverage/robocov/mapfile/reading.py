@@ -68,7 +68,7 @@ def load_map(source: str | Path) -> Environment:
     content = read_bytes(path)
     if path.suffix.lower() != ".json" and not content.lstrip(_BLANK_BYTES).startswith(b"{"):
         raise MapError(
-            f"{to_one_line(str(path))}: expected a map of robocov, got a file of another kind. "
+            f"{to_one_line(str(path))}: expected a robocov map, got a file in another format. "
             "Convert it with `robocov import`."
         )
     return parse_map(content, str(path), path.parent)

@@ -333,7 +333,7 @@ def test_files_that_cannot_be_read_are_reported(tmp_path: Path, monkeypatch: pyt
 def test_for_a_file_of_another_kind_the_message_names_the_import(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "office.yaml"
     path.write_bytes(content)
-    with pytest.raises(MapError, match=r"office\.yaml: expected a map of robocov, .* `robocov import`\."):
+    with pytest.raises(MapError, match=r"office\.yaml: expected a robocov map, .* `robocov import`\."):
         load_map(path)
 
 

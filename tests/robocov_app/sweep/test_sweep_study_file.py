@@ -296,7 +296,7 @@ def test_a_pattern_selects_map_files_in_alphabetical_order(folder: Path) -> None
 @pytest.mark.parametrize(
     ("pattern", "expected"),
     [
-        ("maps/*.json", r"maps\[0\]: no file matches 'maps/\*.json'"),
+        ("maps/*.json", r"maps\[0\]: expected a pattern that matches at least one file, got 'maps/\*.json'"),
         ("/maps/*.json", r"maps\[0\]: expected a pattern relative to the study file, got '/maps/\*.json'"),
     ],
 )

@@ -420,16 +420,21 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
 
 
 def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> list[tuple[str, Path]]:
-    """Return the name and the path of each map that an entry of a study stands for.
+    """Find the maps that an entry of a study names: a bundled map, a file, or all files that match a pattern.
 
     Parameters
     ----------
     entry : str
-        Name of a bundled map, or path or pattern of map files relative to the folder.
+        Name of a bundled map, path of a map file, or pattern with "*" relative to the folder.
     folder : Path
         Folder of the study file.
     bundled : Mapping of str to Path
         Files of the bundled maps by name.
+
+    Returns
+    -------
+    list of (str, Path)
+        Name and file of each map.
 
     Raises
     ------
@@ -441,11 +446,12 @@ def _find_map_files(entry: str, folder: Path, bundled: Mapping[str, Path]) -> li
     if not entry.endswith(".json"):
         raise InputError(describe_unknown_name("map", entry, bundled))
     path = folder / entry
-    if "*" not in entry or path.is_file():
+    is_pattern = "*" in entry and not path.is_file()
+    if not is_pattern:
         return [(path.stem, path)]
     if Path(entry).is_absolute():
         raise InputError(f"expected a pattern relative to the study file, got {quote(entry)}")
-    paths = sorted(folder.glob(entry))
-    if not paths:
-        raise InputError(f"no file matches {quote(entry)}")
-    return [(path.stem, path) for path in paths]
+    matches = sorted(folder.glob(entry))
+    if not matches:
+        raise InputError(f"expected a pattern that matches at least one file, got {quote(entry)}")
+    return [(match.stem, match) for match in matches]

@@ -162,42 +162,38 @@ class HelpPage:
         self.is_open = False
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Scroll or close the open page; return whether it has used the event.
+        """Scroll or close the open page; return whether the event was handled.
 
-        A press of a mouse button closes the page, and does nothing else.
+        A click closes the page, and is not passed on.
         """
-        if not self.is_open:
+        columns = self._columns
+        if not self.is_open or columns is None:
             return False
         if event.type == pygame.KEYDOWN:
-            return self._handle_key(get_key_name(event))
+            return self._handle_key(get_key_name(event), columns)
         if event.type == pygame.MOUSEWHEEL:
-            scale = self._columns.scale if self._columns else _MIN_SCALE
-            self._scroll(-SCROLL_PX_PER_NOTCH * scale * get_wheel_notches(event))
+            self._scroll(-SCROLL_PX_PER_NOTCH * columns.scale * get_wheel_notches(event), columns)
             return True
         if event.type == pygame.MOUSEBUTTONDOWN:
-            # Turns of the wheel are reported as presses of further buttons, too.
+            # pygame also reports the wheel as further buttons.
             if event.button <= pygame.BUTTON_RIGHT:
                 self.close()
             return True
         return False
 
-    def _handle_key(self, name: str) -> bool:
-        """Scroll the page by a key; return whether it was used."""
-        columns = self._columns
-        if columns is None:
-            return False
+    def _handle_key(self, name: str, columns: _Columns) -> bool:
+        """Scroll the page by a key; return whether it was handled."""
         if name in _LINE_KEYS:
-            self._scroll(_LINE_KEYS[name] * columns.row_height)
+            self._scroll(_LINE_KEYS[name] * columns.row_height, columns)
             return True
         if name in _PAGE_KEYS:
-            self._scroll(_PAGE_KEYS[name] * columns.view.height)
+            self._scroll(_PAGE_KEYS[name] * columns.view.height, columns)
             return True
         return False
 
-    def _scroll(self, distance: float) -> None:
+    def _scroll(self, distance: float, columns: _Columns) -> None:
         """Scroll the columns by a distance, px; they stop at their ends."""
-        if self._columns is not None:
-            self._offset = min(max(self._offset + distance, 0.0), self._columns.max_offset)
+        self._offset = min(max(self._offset + distance, 0.0), columns.max_offset)
 
     def draw(self, screen: Surface, theme: Theme, scale: float, commands: Sequence[Command]) -> None:
         """Draw the page over the window, if it is open.
@@ -216,7 +212,8 @@ class HelpPage:
         lines = _list_lines(commands, self._groups)
         columns = _arrange_columns(screen, max(scale, _MIN_SCALE), self._hint, lines)
         self._columns = columns
-        self._scroll(0.0)
+        # In a larger window, the page may end before the offset.
+        self._scroll(0.0, columns)
         draw_card(screen, columns.box, theme, columns.scale)
         _draw_title(screen, theme, columns, self._hint)
         view = columns.view

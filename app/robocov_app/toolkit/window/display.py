@@ -170,7 +170,7 @@ def open_window(size: tuple[int, int]) -> Surface:
 
 
 def leave_full_screen() -> None:
-    """Let the window no longer fill the screen."""
+    """Leave full-screen mode."""
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
         # As in `open_window`.
         warnings.simplefilter("ignore", DeprecationWarning)

@@ -1,6 +1,7 @@
 """The layer bar: chips over the canvas that explain the visible layers, and show or hide them at a click."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import pygame
 from pygame import Rect, Surface
@@ -208,6 +209,7 @@ class LayerBar(BasicFocusGroup):
             chips = self._list_layer_chips(layers, scenes)
             presets = self._list_preset_chips()
 
+        @cache
         def measure(chip: Chip) -> int:
             return measure_chip(canvas, chip) + gap
 
