@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import inspect
 import io
+import itertools
 import json
 import re
 import sys
@@ -360,9 +361,12 @@ def build_names_page() -> str:
     """Build the page that documents every public name of the library."""
     text = build_heading("Python: every public name", "=")
     text += "\nAll are names of ``robocov``: ``import robocov as rc``. "
-    text += ":doc:`/names-in-use` shows them by topic.\n"
+    text += ":doc:`/names-in-use` shows them by topic; :ref:`the index <genindex>` also lists methods and "
+    text += "attributes.\n"
+    names = sorted(rc.__all__, key=str.lower)
+    text += build_letter_index(names)
     text += "\n.. py:currentmodule:: robocov\n"
-    for name in sorted(rc.__all__, key=str.lower):
+    for name in names:
         text += "\n" + build_heading(name, "-") + "\n"
         value = getattr(rc, name)
         if callable(value):
@@ -370,6 +374,15 @@ def build_names_page() -> str:
         else:
             text += f".. autodata:: {find_documenting_module(name)}.{name}\n   :no-value:\n"
     return text
+
+
+def build_letter_index(names: Iterable[str]) -> str:
+    """Build a line of links to the sections of a page for each first letter of sorted names."""
+    text = ""
+    for letter, group in itertools.groupby(names, key=lambda name: name[0].upper()):
+        links = " · ".join(f"`{name}`_" for name in group)
+        text += f"\n| **{letter}** {links}"
+    return f"{text}\n"
 
 
 def build_other_names_page() -> str:

@@ -212,7 +212,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
     head = ("Controller", "Rank", "Score, %", "Runs", "Contacts", "At rest", *headings)
-    return PageTable("Scores, and median gaps to the best placement known in % by tracks", head, rows)
+    return PageTable("Scores, and median gaps to the references in % by tracks", head, rows)
 
 
 def _build_overview_cells(

@@ -64,10 +64,11 @@ NOTES = (
     "and so does a run that covers a different area from the reference. The score of an entry depends on no "
     "other entry. Only entries with all runs of a track are ranked on it.",
     "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95% interval of the median "
-    "(bootstrap over maps, for at least 12 maps), the mean and the worst. J_ref is the best placement "
-    "known, not a proven optimum, so gaps may be too small. The number in brackets cannot be too small: it "
-    "is the median gap to proven lower bounds, given if all of them are known. They are certified for J as "
-    "it is computed, a sum over 128 x 128 sites, not for the integral that it approximates.",
+    "(bootstrap over maps, for at least 12 maps), the mean and the worst. J_ref is that of the reference: "
+    "the best known placement, not a proven optimum, so gaps may be too small. The number in brackets cannot "
+    "be too small: it is the median gap to bound, J / J_bound − 1, where J_bound is a proven lower bound. It "
+    "is given if all bounds are known. They are certified for J as it is computed, a sum over 128 x 128 "
+    "sites, not for the integral that it approximates.",
     "To 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J over "
     "the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so are "
     "the other columns, with these exceptions. Contacts: the runs in which a robot touched a wall or "
@@ -344,7 +345,7 @@ def _format_runs(rating: Rating, gap_count: int) -> str:
 
 
 def _format_bound(rating: Rating, gap_count: int) -> str:
-    """Return the median gap to the lower bounds in brackets; empty unless all bounds are known.
+    """Return the median gap to bound in brackets; empty unless all bounds are known.
 
     `gap_count` is the number of runs with a gap.
     """

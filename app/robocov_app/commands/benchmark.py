@@ -23,8 +23,9 @@ _OPTIONS_BY_ACTION = {
 }
 """The options of each action, in addition to --json."""
 _LEGEND = """\
-Gap: excess of the final cost over the best placement known (median, its 95% interval for at least 12 maps,
-worst); in brackets the median excess over proven lower bounds. To 5%: time from which the cost stays within
+Gap: J / J_ref - 1, where J is the final cost and J_ref that of the best known placement (median, its 95%
+interval for at least 12 maps, worst); in brackets the median gap to bound, J / J_bound - 1, where J_bound is
+a proven lower bound. To 5%: time from which the cost stays within
 5% of its final value. Path: mean path length of a robot. Contacts: runs in which a robot touched something.
 At rest: runs that settled. B/s, µs/s: bytes sent and computing time per robot.
 robocov benchmark page explains all columns."""
@@ -33,7 +34,7 @@ robocov benchmark page explains all columns."""
 
 @dataclass
 class Arguments(JsonOption):
-    """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best placements known.
+    """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best known placements.
 
     The first argument is an action:
 

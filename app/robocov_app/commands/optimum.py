@@ -222,7 +222,11 @@ def _build_answer(
     """Build the JSON content of the answer."""
     lower_bound = None
     if bound is not None:
-        lower_bound = {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap}
+        lower_bound = {
+            "mean_distance_m": bound.mean_distance,
+            "cost_m3": bound.value,
+            "max_saving": bound.max_saving,
+        }
     return {
         "mean_distance_m": best.mean_distance,
         "cost_m3": best.value,
@@ -251,7 +255,8 @@ def _describe_best(environment: Environment, best: Optimum, bound: LowerBound | 
     ]
     if bound is not None:
         lines.append(
-            f"lower bound     {bound.mean_distance:.4f} m, no placement is more than {bound.gap:.2%} better"
+            f"lower bound     {bound.mean_distance:.4f} m, "
+            f"no placement is more than {bound.max_saving:.2%} better"
         )
     return lines
 
@@ -265,14 +270,14 @@ def _describe_search(best: Optimum, robots: int, seconds: float) -> list[str]:
         lines.append(f"  within {tolerance:.1%} of the best: {agreeing}")
     median_gap = best.compute_gap(float(np.median(best.costs)))
     gain = best.compute_gap(float(best.costs_before_descent.min()))
-    lines.append(f"the median restart ends {median_gap:.2%} above the best")
-    lines.append(f"descent of the exact cost gained {gain:.2%}")
+    lines.append(f"gap of the median restart: {median_gap:.2%}")
+    lines.append(f"gap before the descent of the exact cost: {gain:.2%}")
     return lines
 
 
 def _describe_gap(gap: dict[str, Any]) -> str:
     """Return the gap of a run as a line of text."""
-    comparison = "covers different rooms from the best placement"
+    comparison = "no gap: covers different rooms from the best placement"
     if gap["gap"] is not None:
-        comparison = f"{gap['gap']:.1%} above the best"
+        comparison = f"gap {gap['gap']:.1%}"
     return f"{gap['run']}: mean distance {gap['mean_distance_m']:.4f} m, {comparison}"

@@ -256,7 +256,7 @@ def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
     gaps = outcomes.get_values(key, "gap")
     worst = int(np.nanargmax(gaps))
     text = (
-        f"Highest medians: {highest}. Worst run: {format_amount(gaps[worst], '%')} above the reference "
+        f"Highest medians: {highest}. Worst run: gap {format_amount(gaps[worst], '%')} "
         f"({outcomes.instances[worst]})."
     )
     failures = _list_failures(summary)
@@ -285,16 +285,16 @@ def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
     if not grid.instances:
         return "Gains: its defaults; in every scenario of the tuning some run failed."
     best = grid.find_best()
-    worst = int(np.argmax(grid.excess.mean(axis=1)))
+    worst = int(np.argmax(grid.relative_costs.mean(axis=1)))
     varied = [name for name in grid.gains[best] if len({gains[name] for gains in grid.gains}) > 1]
     values = ", ".join(f"{name} {format_value(grid.gains[best][name])}" for name in varied)
     defaults = dict(get_gain_values(make_controller(controller)))
     default_rows = [k for k, gains in enumerate(grid.gains) if dict(gains) == defaults]
     default_row = default_rows[0] if default_rows else None
-    means = [format_amount(mean) for mean in grid.excess.mean(axis=1)]
+    means = [format_amount(mean) for mean in grid.relative_costs.mean(axis=1)]
 
     def describe_ratio(row: int) -> str:
-        ratio = float(np.median(grid.excess[best] / grid.excess[row]))
+        ratio = float(np.median(grid.relative_costs[best] / grid.relative_costs[row]))
         return f"median ratio {format_amount(ratio)}"
 
     as_default = ", the default" if default_row == best else ""

@@ -51,11 +51,11 @@ def _summarize_sweep(runs: Sequence[ReportedRun], comparisons: Sequence[GroupCom
 
 
 def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
-    """Describe the only run: final mean distance, gap to the best placement, and whether it settled."""
+    """Describe the only run: final mean distance, gap to the reference, and whether it settled."""
     text = f"At the end the nearest robot is {run.final_distance:.3f} m away on average"
     gap = result.compute_gap(run)
     if np.isfinite(gap):
-        text += f", {100 * gap:.1f}% above the best placement known"
+        text += f", a gap of {100 * gap:.1f}% to the best known placement"
     settled_at = run.figures.get("settled_at_s")
     if settled_at is None:
         return f"{text}; not settled by the end."

@@ -113,7 +113,7 @@ class LowerBound:
     >>> import robocov as rc
     >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
     >>> bound = rc.compute_lower_bound(square, [[0.9, 1.0]], lattice=16, precision=0.01)
-    >>> 0.0 < bound.gap < 0.02
+    >>> 0.0 < bound.max_saving < 0.02
     True
     """
 
@@ -123,8 +123,8 @@ class LowerBound:
     prices: FloatArray
 
     @property
-    def gap(self) -> float:
-        """Largest possible excess cost of the placement over the best one, as a fraction of its own cost."""
+    def max_saving(self) -> float:
+        """Maximum fraction of the placement's cost that any other placement can save, 1 - J_bound / J."""
         if self.placement_mean_distance == 0.0:
             return 0.0
         return 1.0 - self.mean_distance / self.placement_mean_distance
@@ -189,7 +189,7 @@ def compute_lower_bound(
     >>> import robocov as rc
     >>> square = rc.Environment("square", ((0, 0), (2, 0), (2, 2), (0, 2)))
     >>> bound = rc.compute_lower_bound(square, [[1, 1]], lattice=16)
-    >>> bound.gap < 0.001
+    >>> bound.max_saving < 0.001
     True
     """
     require_number("radius", radius, GRID_M, math.inf, "m")

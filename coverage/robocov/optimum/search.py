@@ -84,7 +84,7 @@ class Optimum:
     See Also
     --------
     find_optimum : Find the best positions for a team.
-    LowerBound : A bound on the gap between a placement and the optimum.
+    LowerBound : A bound on how much lower the cost of any placement can be.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class Optimum:
         Parameters
         ----------
         within : float
-            Maximum excess of the mean distance, as a fraction of that of the best restart.
+            Maximum gap to the best restart.
 
         Returns
         -------
@@ -118,7 +118,7 @@ class Optimum:
         return float((self.costs <= self.mean_distance * (1.0 + within)).mean())
 
     def compute_gap(self, mean_distance: float) -> float:
-        """Compute the relative excess of a mean distance over that of the optimum, J / J_ref - 1.
+        """Compute the gap of a mean distance J to that of this placement J_ref, J / J_ref - 1.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ def find_optimum(
 
     See Also
     --------
-    compute_lower_bound : Bound the gap between a placement and the optimum.
+    compute_lower_bound : Bound how much lower the cost of any placement can be.
     CoverageCost : Evaluate a placement.
 
     Notes

@@ -27,7 +27,7 @@ _COLUMNS = {
     "": "{label}",
     "mean distance": "{mean_distance_m:.3f} m",
     _MEAN_TIME_TITLE: "{mean_time_s:.3f} s",
-    "above lowest": "{above_best:.1%}",
+    "above best": "{above_best:.1%}",
     "cost": "{cost_m3:.2f} m³",
     "settled": "{settled}",
     "contacts": "{contacts}",
@@ -79,8 +79,8 @@ class Comparison(Drawable):
         -------
         list of dict
             One row for each controller. The units are part of the keys. ``above_best`` is the relative
-            difference between the final mean distance and the lowest one. ``mean_time_s`` is missing if all
-            robots have the same speed.
+            difference between the final mean distance and the lowest one in the table. ``mean_time_s`` is
+            missing if all robots have the same speed.
         """
         lowest = min(summary["mean_distance_m"] for summary in self.summaries.values())
         rows = []

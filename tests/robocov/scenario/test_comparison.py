@@ -43,7 +43,7 @@ def test_a_comparison_prints_as_an_aligned_table() -> None:
     comparison = rc.compare(ROOM, ["rapf", "lloyd"], robots=2, duration=0.5, lattice=8)
     lines = repr(comparison).splitlines()
     assert lines[0].split() == (
-        "mean distance above lowest cost settled contacts clearance path length".split()
+        "mean distance above best cost settled contacts clearance path length".split()
     )
     assert [line.split()[0] for line in lines[1:]] == ["RAPF", "Lloyd"]
     assert len({len(line) for line in lines}) == 1

@@ -159,7 +159,7 @@ def test_the_main_goals_are_judged_again_on_unseen_maps(changes, verdict):
     assert claim is not None
     assert (claim.key, claim.question, claim.runs, claim.maps) == ("goal-unseen", GOALS, 24, 12)
     assert [criterion.measure for criterion in claim.criteria] == [
-        "median of J/J_ref - 1",
+        "median gap",
         "runs with a contact",
         "runs that settle",
         f"median of J({OWN.label}) / J({RAPF.label}) at the end",

@@ -361,7 +361,7 @@ def build_gain_outcomes(
     best = np.full(len(instances), 4)
     if is_map_dependent:
         best = np.array([get_map_number(instance) % 9 for instance in instances])
-    # The excess grows from the best set to the neighboring sets, and so on.
+    # The cost grows from the best set to the neighboring sets, and so on.
     distances = np.abs(np.arange(9)[:, None] - best) / 8.0
     noise = 1e-4 * np.random.default_rng(2).random((9, len(instances)))
     return GainOutcomes(instances, gains, 1.0 + spread * distances + noise)
@@ -421,7 +421,7 @@ class TestGains:
 
     def test_instances_with_a_failed_run_are_left_out(self):
         rapf = build_gain_outcomes(0.02)
-        rapf.excess[2, 5] = np.nan
+        rapf.relative_costs[2, 5] = np.nan
         claim = judge_gains_result(*select_common_instances(rapf, build_gain_outcomes(0.9)))
         assert claim.runs == 2 * 9 * (ENOUGH_MAPS * 3 - 1)
         assert rapf.find_best() == 4

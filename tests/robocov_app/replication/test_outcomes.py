@@ -109,8 +109,8 @@ def test_sets_of_gains_are_distinguished(study, folder):
     plain = read_outcomes(folder, study, REFERENCES)
     assert set(grids) == {"rapf", "rpf", "lloyd"}
     for controller, key in (("rapf", "rapf-shared"), ("rpf", "rpf-shared")):
-        assert grids[controller].excess.shape == (1, 4)
-        assert grids[controller].excess[0] == pytest.approx(plain.get_values(key, "gap") + 1.0)
+        assert grids[controller].relative_costs.shape == (1, 4)
+        assert grids[controller].relative_costs[0] == pytest.approx(plain.get_values(key, "gap") + 1.0)
         assert grids[controller].gains[0]["k_rep"] == 1.0
     assert TINY.tuning_seed not in {scenario.seed for scenario in grids["rapf"].instances}
 
@@ -146,11 +146,11 @@ def test_selected_outcomes_can_be_merged(study, folder):
 DEFAULTS = get_gain_values(make_controller("range-limited"))
 
 
-def build_gain_outcomes(*excess: tuple[float, ...]) -> GainOutcomes:
+def build_gain_outcomes(*relative_costs: tuple[float, ...]) -> GainOutcomes:
     """Build outcomes of two or more sets of gains of `range-limited`, the defaults first."""
-    sets = [DEFAULTS, *({**DEFAULTS, "interaction_range": 20.0 + k} for k in range(1, len(excess)))]
-    scenarios = tuple(ProblemInstance(f"map-{k}", "corner", 0) for k in range(len(excess[0])))
-    return GainOutcomes(scenarios, tuple(sets), np.array(excess))
+    sets = [DEFAULTS, *({**DEFAULTS, "interaction_range": 20.0 + k} for k in range(1, len(relative_costs)))]
+    scenarios = tuple(ProblemInstance(f"map-{k}", "corner", 0) for k in range(len(relative_costs[0])))
+    return GainOutcomes(scenarios, tuple(sets), np.array(relative_costs))
 
 
 def test_the_best_gains_have_the_smallest_mean():

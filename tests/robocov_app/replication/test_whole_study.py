@@ -164,18 +164,18 @@ class TestRuns:
             table = f"studies/{name}/results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
 
-    def test_the_best_gains_have_the_lowest_mean_excess(self, folder, paper, beyond):
+    def test_the_best_gains_have_the_lowest_mean_relative_cost(self, folder, paper, beyond):
         contenders_by_key = {each.key: each for each in paper.contenders}
         for controller, grid in paper.gains.items():
             assert (
                 contenders_by_key[f"{controller}-best"].gains
-                == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+                == grid.gains[int(np.argmin(grid.relative_costs.mean(axis=1)))]
             )
         assert set(beyond.gains) == set(GAIN_GRIDS)
         table = list(read_results(folder / "studies" / "rivals").rows())
         for name, grid in beyond.gains.items():
             assert {(each.map, each.seed) for each in grid.instances} == {("generated-101", TINY.tuning_seed)}
-            best = grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+            best = grid.gains[int(np.argmin(grid.relative_costs.mean(axis=1)))]
             for row in table:
                 if row["controller"] == name:
                     assert {gain: row[gain] for gain in best} == best

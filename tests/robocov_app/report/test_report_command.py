@@ -156,9 +156,9 @@ def test_the_best_placement_is_cached(run, tmp_path, monkeypatch, capsys) -> Non
     monkeypatch.setattr("robocov_app.report.results.references.RESTARTS", 2)
     page = run / "report.html"
     assert main(["report", str(run)]) == 0
-    assert "above the best" not in page.read_text()
+    assert "best known placement" not in page.read_text()
     assert main(["report", str(run), "--optimum"]) == 0
-    (above,) = re.findall(r"average, ([\d.]+)% above the best placement known", page.read_text())
+    (above,) = re.findall(r"average, a gap of ([\d.]+)% to the best known placement", page.read_text())
     assert float(above) > 0.0
     before = page.read_bytes()
     # From now on, a search would fail.
@@ -167,7 +167,7 @@ def test_the_best_placement_is_cached(run, tmp_path, monkeypatch, capsys) -> Non
     assert page.read_bytes() == before
     monkeypatch.setenv("ROBOCOV_CACHE", "")
     assert main(["report", str(run)]) == 0
-    assert "above the best" not in page.read_text()
+    assert "best known placement" not in page.read_text()
     assert "searching" not in capsys.readouterr().err.replace("searching: 1 of 1", "")
 
 

@@ -57,7 +57,7 @@ def test_the_findings_on_a_single_run_have_its_gap_to_the_reference() -> None:
     references = {run.setting: Reference(2.0, 0.0)}
     result = replace(build_result([run], kind="run"), references=references)
     (finding,) = list_findings(result, [])
-    assert ", 10.0% above the best placement known" in finding
+    assert ", a gap of 10.0% to the best known placement" in finding
 
 
 def test_a_complete_result_has_no_missing_runs() -> None:

@@ -191,7 +191,7 @@ def test_gaps_to_the_reference_are_a_column_if_they_are_known() -> None:
     runs.append(build_run("rapf", final=5.0, map_name="museum"))
     result = replace(build_result(runs), references={runs[0].setting: Reference(2.0, 0.0)})
     all_maps, rooms, museum = build_summary_tables(result)
-    heading = "Above J_ref, %"
+    heading = "Gap, %"
     assert get_column(rooms, heading) == ["5.0 (2.5–7.5)"]
     assert get_column(all_maps, heading) == ["5.0 (2.5–7.5)"]
     assert get_column(museum, heading) == [NO_VALUE]

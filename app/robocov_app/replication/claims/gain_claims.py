@@ -108,7 +108,7 @@ def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> FloatArray:
     """Return the ratio of RAPF's cost to RPF's with the same potential, (g, m), for each set of RAPF."""
     rows = {(gains["k_rep"], gains["rho_0"]): row for row, gains in enumerate(rpf.gains)}
     matching_rows = [rows[gains["k_rep"], gains["rho_0"]] for gains in rapf.gains]
-    return np.asarray(rapf.excess / rpf.excess[matching_rows])
+    return np.asarray(rapf.relative_costs / rpf.relative_costs[matching_rows])
 
 
 def build_variation_criteria(
@@ -150,7 +150,7 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     rpf_regrets, _ = compute_regrets(rpf)
     if not len(rapf_regrets):
         return claim
-    measure = "mean excess of the cost with the best gains of other maps over that with the map's own"
+    measure = "mean increase of the cost with the best gains of other maps over that with the map's own"
     criteria = (
         Criterion(f"RPF: {measure}", bootstrap(rpf_regrets, "mean", maps), low=REGRET, unit="%"),
         Criterion("RAPF: the same", bootstrap(rapf_regrets, "mean", maps), high=REGRET, unit="%"),
@@ -158,7 +158,7 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     rapf_best = format_potential(rapf.gains[rapf.find_best()])
     rpf_best = format_potential(rpf.gains[rpf.find_best()])
     explanation = (
-        f"Both sets are judged from a start on which neither was chosen. Highest excess: RPF "
+        f"Both sets are judged from a start on which neither was chosen. Highest increase: RPF "
         f"{format_amount(rpf_regrets.max(), '%')}, RAPF {format_amount(rapf_regrets.max(), '%')}. "
         f"Best over all maps: RAPF {rapf_best}, RPF {rpf_best}."
     )
@@ -167,12 +167,12 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
 
 def compute_variation(grid: GainOutcomes) -> FloatArray:
     """Return the coefficient of variation of the cost over the sets of gains, for each instance, (m,)."""
-    return np.array([compute_coefficient_of_variation(column) for column in grid.excess.T])
+    return np.array([compute_coefficient_of_variation(column) for column in grid.relative_costs.T])
 
 
 def compute_worst_by_best(grid: GainOutcomes) -> FloatArray:
     """Return the ratio of the cost with the worst gains to that with the best, for each instance, (m,)."""
-    return np.asarray(grid.excess.max(axis=0) / grid.excess.min(axis=0))
+    return np.asarray(grid.relative_costs.max(axis=0) / grid.relative_costs.min(axis=0))
 
 
 def compute_regrets(grid: GainOutcomes) -> tuple[FloatArray, list[str]]:
@@ -203,8 +203,8 @@ def compute_regrets(grid: GainOutcomes) -> tuple[FloatArray, list[str]]:
             elif other.start != instance.start:
                 same_map.append(j)
         if same_map and other_maps:
-            informed = grid.excess[grid.find_best(same_map), k]
-            uninformed = grid.excess[grid.find_best(other_maps), k]
+            informed = grid.relative_costs[grid.find_best(same_map), k]
+            uninformed = grid.relative_costs[grid.find_best(other_maps), k]
             regrets.append(float(uninformed / informed) - 1.0)
             maps.append(instance.map)
     return np.array(regrets), maps
@@ -215,6 +215,6 @@ def select_common_instances(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[Gain
 
     Both must have the same instances in the same order.
     """
-    is_finite = np.isfinite(np.vstack([rapf.excess, rpf.excess]))
+    is_finite = np.isfinite(np.vstack([rapf.relative_costs, rpf.relative_costs]))
     is_complete = np.asarray(is_finite.all(axis=0))
     return rapf.select(is_complete), rpf.select(is_complete)

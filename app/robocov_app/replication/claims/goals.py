@@ -56,7 +56,7 @@ def _build_main_criteria(outcomes: Outcomes, key: str) -> _MainCriteria:
     contacts = estimate_fraction(outcomes.get_values(key, "contacts") > 0, outcomes.maps)
     rest = estimate_fraction(np.isfinite(outcomes.get_values(key, "settled")), outcomes.maps)
     return _MainCriteria(
-        gap=Criterion("median of J/J_ref - 1", gap, high=MAX_GAP, unit="%"),
+        gap=Criterion("median gap", gap, high=MAX_GAP, unit="%"),
         contacts=Criterion("runs with a contact", contacts, high=RARELY, unit="%"),
         rest=Criterion("runs that settle", rest, low=MIN_AT_REST, unit="%"),
     )
@@ -110,8 +110,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
     goals = [
         _build_goal(
             "gap",
-            f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the centralized reference in the "
-            "median.",
+            f"{label}'s cost is within {format_amount(MAX_GAP, '%')} of the reference in the median.",
             _build_main_criteria(finished, key).gap,
             describe_middle_half(gaps),
             finished,

@@ -148,7 +148,7 @@ def judge_lloyd_unusable(outcomes: Outcomes) -> Claim:
     with_gap = finished.select_finite("gap", "lloyd")
     if with_gap.instances:
         gap = bootstrap(with_gap.get_values("lloyd", "gap"), clusters=with_gap.maps)
-        criteria.append(Criterion("Lloyd: median of J/J_ref - 1", gap, low=FAR_FROM_OPTIMUM, unit="%"))
+        criteria.append(Criterion("Lloyd: median gap", gap, low=FAR_FROM_OPTIMUM, unit="%"))
     others = []
     for gains in GAIN_CHOICES:
         key = f"rapf-{gains}"
@@ -191,7 +191,7 @@ def judge_gap(
     if not finished.instances:
         return claim
     gaps = finished.get_values(key, "gap")
-    measure = f"{LABELS[key]}: median of J/J_ref - 1"
+    measure = f"{LABELS[key]}: median gap"
     interval = bootstrap(gaps, clusters=finished.maps)
     if controller == "rpf":
         criterion = Criterion(measure, interval, low=FAR_FROM_OPTIMUM, unit="%")
@@ -211,7 +211,7 @@ def _explain_gaps(outcomes: Outcomes, gaps: FloatArray) -> str:
     worst = int(np.argmax(gaps))
     return (
         f"{describe_middle_half(gaps).removesuffix('.')}; the worst is {format_amount(gaps.max(), '%')} "
-        f"above it ({outcomes.instances[worst]}). Medians per kind of map: {', '.join(medians)}. "
-        f"J_ref is the best of many descents with the whole map known; it is not a bound, "
-        f"but hard to beat{better_than_reference}."
+        f"({outcomes.instances[worst]}). Medians per kind of map: {', '.join(medians)}. "
+        f"The reference is the best of many descents with the whole map known; it is not a "
+        f"bound, but hard to beat{better_than_reference}."
     )

@@ -57,7 +57,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
     claim = Claim(
         f"beyond-{own.key}-closes",
         RIVALS,
-        f"{own.label} closes most of the gap that {other.label} leaves to the centralized reference.",
+        f"{own.label} closes most of the gap that {other.label} leaves to the reference.",
     )
     finished = outcomes.select_finite("gap", own.key, other.key)
     if not finished.instances:
@@ -75,8 +75,7 @@ def judge_closed_gap(outcomes: Outcomes, own: Contender, other: Contender) -> Cl
         return replace(claim, explanation=f"{other.label} leaves no gap that could be closed.")
     closed = bootstrap_statistic(compute_closed_fraction, finished.maps)
     explanation = (
-        f"Medians of J/J_ref - 1 in the same runs: {format_median(own_gaps, '%')} and "
-        f"{format_median(other_gaps, '%')}."
+        f"Median gaps in the same runs: {format_median(own_gaps, '%')} and {format_median(other_gaps, '%')}."
     )
     criterion = Criterion(
         "fraction of the median gap that is closed", closed, low=MIN_CLOSED_FRACTION, unit="%"

@@ -119,7 +119,7 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
     with_samples = [group for group in groups if group[1]]
     if not with_samples:
         return None
-    label = "J/J_ref at the end (1: the centralized reference)"
+    label = "J/J_ref at the end (1: the reference)"
     return partial(
         plot_final_costs,
         with_samples,
@@ -134,7 +134,7 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
 @plain_style()
 def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw gaps, in percent, on a square-root axis, which shows small gaps as well as large ones."""
-    label = "J/J_ref − 1 at the end (%)"
+    label = "gap at the end (%)"
     figure = plot_final_costs([("", samples)], label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
@@ -194,8 +194,8 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
 def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> FloatArray:
     """Return the mean gap for each rho_0 (row) and k_rep (column), %; nan for pairs that were not tried."""
     gaps = np.full((len(rho_0), len(k_rep)), np.nan)
-    for gains, excess in zip(grid.gains, grid.excess, strict=True):
+    for gains, relative_costs in zip(grid.gains, grid.relative_costs, strict=True):
         row = rho_0.index(float(gains["rho_0"] or 0.0))
         column = k_rep.index(float(gains["k_rep"] or 0.0))
-        gaps[row, column] = 100.0 * (excess.mean() - 1.0)
+        gaps[row, column] = 100.0 * (relative_costs.mean() - 1.0)
     return gaps

@@ -317,7 +317,7 @@ def _show_failures(
         k = outcomes.instances.index(instance)
         gaps = {name: format_amount(outcomes.get_values(name, "gap")[k], "%") for name in (key, *others)}
         compared = ", ".join(f"{label} {gaps[name]}" for name, label in others.items())
-        description = f"{gaps[key]} above the reference ({compared})"
+        description = f"gap {gaps[key]} ({compared})"
         if key not in OURS:
             blocked = outcomes.get_values(key, "blocked")[k] * len(record.team)
             description += f"; a wall is between {blocked:.0f} of {len(record.team)} robots and their goals"

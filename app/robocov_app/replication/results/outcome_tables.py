@@ -132,7 +132,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
         Folder of the sweep.
     study : Study
     references : dict
-        Reference placements by map; on maps without one, the excess is nan.
+        Reference placements by map; on maps without one, the relative cost is nan.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
     """
     instances = list_instances(study)
     gain_sets = {name: study.get_gains(name).choices for name in study.controllers}
-    excess = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
+    relative_costs = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
     cells = {}
     for name, sets in gain_sets.items():
         for gains_index, gains in enumerate(sets):
@@ -150,10 +150,12 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
         cell = cells.get(_identify_controller(row["controller"], row))
         if cell is not None and row["map"] in references:
             name, gains_index = cell
-            excess[name][gains_index, instance_index] = (
+            relative_costs[name][gains_index, instance_index] = (
                 row["mean_distance_m"] / references[row["map"]].mean_distance
             )
-    return {name: GainOutcomes(instances, gain_sets[name], excess[name]) for name in study.controllers}
+    return {
+        name: GainOutcomes(instances, gain_sets[name], relative_costs[name]) for name in study.controllers
+    }
 
 
 def list_instances(study: Study) -> tuple[ProblemInstance, ...]:

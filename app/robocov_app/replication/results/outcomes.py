@@ -192,14 +192,14 @@ class GainOutcomes:
     instances : tuple of ProblemInstance
     gains : tuple of Mapping
         The sets of gains.
-    excess : (g, m) array
+    relative_costs : (g, m) array
         J / J_ref: the final mean distance relative to that of the map's reference placement; nan where a run
         failed.
     """
 
     instances: tuple[ProblemInstance, ...]
     gains: tuple[Mapping[str, Value], ...]
-    excess: FloatArray
+    relative_costs: FloatArray
 
     @property
     def maps(self) -> tuple[str, ...]:
@@ -209,23 +209,25 @@ class GainOutcomes:
     def select(self, mask: Sequence[bool] | BoolArray) -> GainOutcomes:
         """Return the outcomes on the instances where a mask, (m,), is true."""
         columns = np.array(mask, dtype=bool)
-        return GainOutcomes(tuple(compress(self.instances, mask)), self.gains, self.excess[:, columns])
+        return GainOutcomes(
+            tuple(compress(self.instances, mask)), self.gains, self.relative_costs[:, columns]
+        )
 
     def select_complete(self) -> GainOutcomes:
         """Return the outcomes on the instances where no run failed."""
-        return self.select(np.asarray(np.isfinite(self.excess).all(axis=0)))
+        return self.select(np.asarray(np.isfinite(self.relative_costs).all(axis=0)))
 
     def find_best(self, columns: Sequence[int] | None = None) -> int:
-        """Return the index of the set of gains with the lowest mean excess.
+        """Return the index of the set of gains with the lowest mean J / J_ref.
 
         Parameters
         ----------
         columns : sequence of int, optional
             Instances to consider; by default all. Instances with a failed run are left out.
         """
-        excess = self.excess if columns is None else self.excess[:, list(columns)]
-        is_complete = np.isfinite(excess).all(axis=0)
-        return int(np.argmin(excess[:, is_complete].mean(axis=1)))
+        relative_costs = self.relative_costs if columns is None else self.relative_costs[:, list(columns)]
+        is_complete = np.isfinite(relative_costs).all(axis=0)
+        return int(np.argmin(relative_costs[:, is_complete].mean(axis=1)))
 
     def list_levels(self, gain: str) -> list[float]:
         """Return the different values of a gain in ascending order; a gain without a value counts as 0."""
@@ -234,7 +236,7 @@ class GainOutcomes:
     def select_gain(self, name: str, value: float) -> GainOutcomes:
         """Return the outcomes of the sets in which the named gain has the given value."""
         mask = [gains.get(name) == value for gains in self.gains]
-        return GainOutcomes(self.instances, tuple(compress(self.gains, mask)), self.excess[mask])
+        return GainOutcomes(self.instances, tuple(compress(self.gains, mask)), self.relative_costs[mask])
 
 
 def find_best_gains(outcomes: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Value]]:

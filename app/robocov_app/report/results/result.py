@@ -105,7 +105,7 @@ class ReportedRun:
 
 
 class Reference(NamedTuple):
-    """The best placement known for a team that knows the whole map.
+    """The best known placement of a team that knows the whole map.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class ReportedResult:
         return replace(self, runs=tuple(readable_runs), damaged_runs=tuple(damaged_runs))
 
     def compute_gap(self, run: ReportedRun) -> float:
-        """Return J / J_ref - 1 at the end of a run.
+        """Return the gap at the end of a run, J / J_ref - 1.
 
         It is nan without a reference, or if the reference does not leave the same area uncovered.
         """

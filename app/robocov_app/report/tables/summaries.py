@@ -37,8 +37,8 @@ _SEVERAL_RUNS_NOTE = (
     "stopped away from their goals; a dash if they have no goals."
 )
 _REFERENCE_NOTE = (
-    f"Above J_ref: J/J_ref − 1 of the final mean distance; J_ref is the lowest of {RESTARTS} "
-    f"searches for the best placement of the team with the whole map known, on the same lattice."
+    f"Gap: J/J_ref − 1, where J is the final mean distance and J_ref that of the reference, the best of "
+    f"{RESTARTS} searches for placements of the team with the whole map known, on the same lattice."
 )
 
 
@@ -100,13 +100,13 @@ def _build_summary_table(caption: str, columns: Sequence[RunColumn], groups: Seq
 
 
 def _build_gap_column(result: ReportedResult) -> RunColumn:
-    """Build the column of relative gaps, in percent, to the best placement known."""
+    """Build the column of gaps to the reference, in percent."""
 
     def format_gaps(runs: Sequence[ReportedRun]) -> str:
         gaps = [100.0 * result.compute_gap(run) for run in runs]
         return format_quartiles([gap for gap in gaps if np.isfinite(gap)], 1)
 
-    return RunColumn("Above J_ref, %", format_gaps)
+    return RunColumn("Gap, %", format_gaps)
 
 
 def _build_scaled_column(result: ReportedResult) -> RunColumn:

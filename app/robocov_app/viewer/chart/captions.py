@@ -1,4 +1,4 @@
-"""Captions to the right of the chart: the displayed value of each curve, and its gap to the best one."""
+"""Captions to the right of the chart: the displayed value of each curve, and how far it is above the best."""
 
 from collections.abc import Mapping
 
@@ -90,7 +90,7 @@ def _draw_caption(
     text = f"{value:.3f}"
     if len(values) > 1:
         if len(set(values.values())) > 1:
-            text += format_gap(value, min(values.values()))
+            text += format_above_best(value, min(values.values()))
         width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
         text = _add_name(canvas, pane.controller.label, text, width)
     canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)
@@ -107,12 +107,12 @@ def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:
     return f"{short_name}  {text}"
 
 
-def format_gap(value: float, best: float) -> str:
-    """Format the excess of a value over the best one.
+def format_above_best(value: float, best: float) -> str:
+    """Format how far a value is above the best one, in percent.
 
     Examples
     --------
-    >>> format_gap(2.2, 2.0), format_gap(5.0, 2.0), format_gap(2.0, 2.0)
+    >>> format_above_best(2.2, 2.0), format_above_best(5.0, 2.0), format_above_best(2.0, 2.0)
     ('  +10.0%', '  +150%', '  best')
     """
     if value <= best:
