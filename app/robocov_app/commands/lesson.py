@@ -38,7 +38,7 @@ def command(options: Arguments) -> int:
     saved = load_lesson(options.file)
     assert saved.lesson is not None
     compile_kernels()
-    chapters = check_lesson(saved)
+    chapters = check_lesson(options.file, saved)
     rows = []
     lines = [saved.lesson.title]
     for number, chapter in enumerate(chapters, start=1):

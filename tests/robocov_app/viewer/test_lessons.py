@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,15 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import save_map
 from robocov_app.cli import main
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
+from robocov_app.viewer.launch import HEADLESS_FPS
 from robocov_app.viewer.lessons import player
-from robocov_app.viewer.lessons.player import BASE_LAYERS, check_lesson, load_lesson
+from robocov_app.viewer.lessons.player import (
+    BASE_LAYERS,
+    FIRST_LESSON,
+    LessonPlayer,
+    check_lesson,
+    load_lesson,
+)
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session
 from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
@@ -66,7 +74,7 @@ def test_chapters_are_short_and_their_layers_exist(chapter) -> None:
 
 @pytest.mark.slow
 def test_every_chapter_of_the_lesson_ends() -> None:
-    assert all(chapter.ends for chapter in check_lesson(load_lesson()))
+    assert all(chapter.ends for chapter in check_lesson(FIRST_LESSON, load_lesson()))
 
 
 def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsys) -> None:
@@ -96,7 +104,7 @@ def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsy
         assert lesson.answer == 1
         driver.run_frames(30)
         assert lesson.state == "task"
-        assert lesson.lines == ["Now you: drag robot 1."]
+        assert lesson.lines == ["Your turn: drag robot 1."]
         viewer.session.place_robot(1, (1.0, 1.0))
         driver.run_frames(2)
         assert lesson.state == "ended"
@@ -312,8 +320,13 @@ def test_chapters_on_bundled_maps_have_their_names(tmp_path: Path) -> None:
         assert driver.viewer.files.title == "Rooms • robocov"
 
 
-def test_an_own_lesson_becomes_a_video(tmp_path: Path, monkeypatch, capsys) -> None:
+def shorten_reading_times(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(player, "READING_S", 0.1)
+    monkeypatch.setattr(player, "READING_S_PER_WORD", 0.0)
+
+
+def test_an_own_lesson_becomes_a_video(tmp_path: Path, monkeypatch, capsys) -> None:
+    shorten_reading_times(monkeypatch)
     path = write_short_lesson(tmp_path)
     video = tmp_path / "two.mp4"
     assert main(["demo", "--lesson", str(path), "--video", str(video), "--size", "900x600"]) == 0
@@ -413,16 +426,62 @@ def test_answers_use_the_controller_names_of_the_window() -> None:
     assert answers >= {"RAPF", "RPF", "Lloyd"}
 
 
+def play_unattended_lesson(driver: Driver, path: Path) -> Iterator[LessonPlayer]:
+    """Yield the lesson after each frame, until it has ended or its maximum duration is over."""
+    driver.window.lesson.is_unattended = True
+    driver.window.lesson.start(path)
+    lesson = driver.window.lesson.player
+    assert lesson is not None
+    for _ in range(round(lesson.duration * HEADLESS_FPS)):
+        driver.run_frames(1)
+        if driver.window.lesson.player is None:
+            return
+        yield lesson
+
+
 def test_an_unattended_lesson_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(player, "READING_S", 0.1)
+    shorten_reading_times(monkeypatch)
     with open_viewer(tmp_path) as driver:
-        driver.window.lesson.is_unattended = True
-        driver.window.lesson.start(write_short_lesson(tmp_path))
-        for _ in range(120):
-            driver.run_frames(1)
-            if driver.window.lesson.player is None:
-                break
+        list(play_unattended_lesson(driver, write_short_lesson(tmp_path)))
         assert driver.window.lesson.player is None
+
+
+def test_an_unattended_lesson_shows_its_closing_page_without_a_score(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shorten_reading_times(monkeypatch)
+    with open_viewer(tmp_path) as driver:
+        states = []
+        for lesson in play_unattended_lesson(driver, write_short_lesson(tmp_path)):
+            states.append(lesson.state)
+            assert lesson.score == (0, 0)
+        assert states[-1] == "closing"
+        assert states.count("closing") > 1
+
+
+def test_an_unattended_lesson_shows_its_task_as_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shorten_reading_times(monkeypatch)
+    with open_viewer(tmp_path) as driver:
+        lines = []
+        for lesson in play_unattended_lesson(driver, write_short_lesson(tmp_path)):
+            lines += lesson.lines
+        assert "Your turn: drag robot 1." in lines
+        assert "Well done." not in lines
+
+
+def test_a_chapter_that_ends_before_its_edit_is_rejected(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_short_lesson(tmp_path)
+    content = json.loads(path.read_text())
+    content["lesson"]["chapters"][0]["until"] = {"step": 15}
+    path.write_text(json.dumps(content))
+    assert main(["lesson", "check", str(path)]) != 0
+    message = (
+        "two.robocov: lesson.chapters[0].until: "
+        "expected an end after step 20 of edit 1 (robot 2 failed), got step 15"
+    )
+    assert message in capsys.readouterr().err
 
 
 def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -202,7 +202,7 @@ def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser,
             lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
         )
         browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
-        assert browser.find("#line").text.startswith("You watch Teacher 1")
+        assert browser.find("#line").text.startswith("You are watching Teacher 1")
         assert not any(button.is_displayed() for button in browser.find_all("#touch button"))
         browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
         browser.run_script("tell({kind: 'control', to: 0})")

@@ -21,7 +21,13 @@ from robocov_app.toolkit.overlay import (
     wrap_text,
 )
 from robocov_app.toolkit.window.layout import Layout
-from robocov_app.viewer.lessons.player import AnswerMark, LessonPlayer, LessonState, MarkedAnswer
+from robocov_app.viewer.lessons.player import (
+    AnswerMark,
+    LessonPlayer,
+    LessonState,
+    MarkedAnswer,
+    list_next_steps,
+)
 
 
 class ClickArea(NamedTuple):
@@ -120,12 +126,12 @@ _BUTTON_EDGE_STRENGTH = 0.28
 _PAGE_HINT = "Space: stay · F2: play freely · Esc: end"
 _CLOSING_TITLE = "What you found out"
 _NEXT_TITLE = "Try next"
-_DEFAULT_NEXT_STEPS = (
-    "End the lesson, then draw a wall (W) and see how the robots react.",
-    "Let a robot fail (D), and watch its neighbors.",
-    "Compare two controllers on a map of your own (K).",
-)
 _MARK_SIGNS = {AnswerMark.NONE: "", AnswerMark.CHOSEN: "●", AnswerMark.RIGHT: "✓", AnswerMark.WRONG: "✗"}
+
+
+def get_answer_sign(number: int, answer: MarkedAnswer) -> str:
+    """Return the sign of an answer's mark, or its number if it has none."""
+    return _MARK_SIGNS[answer.mark] or str(number)
 
 
 def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: LessonPlayer) -> None:
@@ -310,7 +316,7 @@ class LessonPage:
             self._draw_item("✓", finding)
         self.y += _TEXT_GAP_PX * self.scale
         self._write_title(_NEXT_TITLE)
-        for step in lesson.lesson.next_steps or _DEFAULT_NEXT_STEPS:
+        for step in list_next_steps(lesson.lesson):
             self._draw_item("→", step)
 
     def _draw_item(self, sign: str, text: str) -> None:
@@ -349,9 +355,7 @@ class LessonPage:
         scale = self.scale
         is_open = self.lesson.state is LessonState.ASKING
         edge = self._choose_answer_edge(answer, is_open=is_open)
-        ink = self.theme.ink
-        if not is_open and answer.mark is AnswerMark.NONE:
-            ink = self.theme.faint
+        ink = self._choose_answer_ink(answer, is_open=is_open)
         text_width = self.width - (_ANSWER_INDENT_PX + _ANSWER_RIGHT_INDENT_PX) * scale
         lines = wrap_text(answer.text, round(self.text_px * scale), text_width)
         height_px = _LINE_HEIGHT * self.text_px * len(lines) + _ANSWER_HEIGHT_PX
@@ -370,7 +374,7 @@ class LessonPage:
             radius=round(_ANSWER_RADIUS_PX * scale),
             width=max(round(scale * edge_px), 1),
         )
-        sign = _MARK_SIGNS[answer.mark] or str(number)
+        sign = get_answer_sign(number, answer)
         self._write(sign, self.text_px, edge, indent=_MARK_X_PX, bold=True)
         self._write_paragraph(
             answer.text, ink, indent=_ANSWER_INDENT_PX, right_indent=_ANSWER_RIGHT_INDENT_PX
@@ -378,6 +382,12 @@ class LessonPage:
         self.y = box.bottom + _ANSWER_GAP_PX * scale
         if is_open:
             self.areas.append(ClickArea(box, partial(self.lesson.reply, number), f"answer:{number}"))
+
+    def _choose_answer_ink(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
+        """Return the color of the text of an answer; one without a mark is faint after the question."""
+        if is_open or answer.mark is not AnswerMark.NONE:
+            return self.theme.ink
+        return self.theme.faint
 
     def _choose_answer_edge(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
         """Return the color of an answer's frame; it depends on the mark, if the answer has one."""

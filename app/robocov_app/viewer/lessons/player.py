@@ -1,6 +1,6 @@
 """Playing of lessons: session files with chapters that play, ask questions, and set tasks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -10,17 +10,30 @@ from robocov_app.render.layer_catalog import check_layer_names
 from robocov_app.viewer.lessons.session_before import SessionBefore
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.maps import find_bundled_name
-from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, QuestionModel, TaskModel
+from robocov_app.viewer.session.files.models import (
+    ChapterModel,
+    ConditionModel,
+    LessonModel,
+    QuestionModel,
+    TaskModel,
+)
 from robocov_app.viewer.session.files.session_file import SavedSession, load_session
 from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.session import Session
 
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # bundled with robocov
-READING_S = 4.0  # real time after the end of a chapter, and for an answer in an unattended window
+READING_S = 4.0
+"""Real time after the end of a chapter; in an unattended window, also for a question and the closing page."""
 READING_S_PER_WORD = 0.25
+"""Real time added for each word of what there is to read."""
 _CHAPTER_CHANGE_S = 0.5  # real time between two chapters, as a margin of the duration
 MAX_TASK_S = 600.0  # simulated time after which `check_lesson` gives up on a chapter
 STEPS_PER_SECOND = 60
+_DEFAULT_NEXT_STEPS = (
+    "End the lesson, then draw a wall (W) and see how the robots react.",
+    "Let a robot fail (D), and watch its neighbors.",
+    "Compare two controllers on a map of your own (K).",
+)
 _DRAFT_HINT = "What you have changed is kept: Ctrl+Shift+O opens it."
 BASE_LAYERS = frozenset(
     {
@@ -93,6 +106,11 @@ def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
     for index, chapter in enumerate(saved.lesson.chapters):
         check_layer_names(f"{path}: lesson.chapters[{index}].show", chapter.show)
     return saved
+
+
+def list_next_steps(lesson: LessonModel) -> list[str]:
+    """Return what to try after a lesson: the suggestions of its author, or else general ones."""
+    return lesson.next_steps or list(_DEFAULT_NEXT_STEPS)
 
 
 def is_fulfilled(condition: ConditionModel, session: Session) -> bool:
@@ -200,7 +218,7 @@ class LessonPlayer:
         if self.chapter.question is not None:
             lines += self._list_question_lines(self.chapter.question)
         if self.chapter.task is not None:
-            lines += self._list_task_lines(self.chapter.task)
+            lines += _list_task_lines(self.chapter.task, self.state, is_unattended=self.is_unattended)
         return [line for line in lines if line]
 
     @property
@@ -234,7 +252,7 @@ class LessonPlayer:
         if question is not None and is_answered and self.state in (LessonState.ENDED, LessonState.TASK):
             comments.append(question.why)
         if self.chapter.task is not None:
-            comments += self._list_task_lines(self.chapter.task)
+            comments += _list_task_lines(self.chapter.task, self.state, is_unattended=self.is_unattended)
         return [comment for comment in comments if comment]
 
     @property
@@ -257,34 +275,25 @@ class LessonPlayer:
 
     def _list_question_lines(self, question: QuestionModel) -> list[str]:
         if self.state is LessonState.ASKING:
-            answers = [f"{number}  {answer}" for number, answer in enumerate(question.answers, 1)]
-            return [question.text, *answers]
+            return _format_question(question)
         if self.state is LessonState.ENDED and self.answer is not None:
-            correct = question.answers[question.right - 1]
             if self.answer == question.right:
-                return [f"✓ Correct: {correct}", question.why]
-            return [f"✗ Not quite. Correct: {correct}", question.why]
-        return []
-
-    def _list_task_lines(self, task: TaskModel) -> list[str]:
-        if self.state is LessonState.TASK:
-            return [f"Now you: {task.text}"]
-        if self.state is LessonState.ENDED:
-            return [task.done]
+                return _explain_answer(question)
+            return [f"✗ Not quite. Correct: {question.answers[question.right - 1]}", question.why]
         return []
 
     @property
     def duration(self) -> float:
         """Maximum duration of the lesson in an unattended window, s of real time."""
-        duration = 0.0
+        duration = _compute_reading_time([*self.findings, *list_next_steps(self.lesson)]) + _CHAPTER_CHANGE_S
         for chapter in self.lesson.chapters:
             simulated_s = MAX_TASK_S
             if chapter.until.step is not None:
                 simulated_s = chapter.until.step / STEPS_PER_SECOND
             duration += simulated_s / chapter.speed
-            duration += READING_S + _CHAPTER_CHANGE_S
+            duration += _CHAPTER_CHANGE_S + _compute_reading_time(_list_comments(chapter))
             if chapter.question is not None:
-                duration += READING_S
+                duration += _compute_reading_time(_format_question(chapter.question))
         return duration
 
     @property
@@ -307,12 +316,12 @@ class LessonPlayer:
             LessonState.PLAYING: self._advance_playing,
             LessonState.TASK: self._advance_task,
             LessonState.ENDED: self._advance_end,
-            LessonState.CLOSING: _do_nothing,
+            LessonState.CLOSING: self._advance_closing,
         }
         advance_state[self.state]()
 
     def _advance_question(self) -> None:
-        if self.is_unattended and self._waited_s >= READING_S:
+        if self.is_unattended and self._waited_s >= _compute_reading_time(self.lines):
             assert self.chapter.question is not None
             self.reply(self.chapter.question.right)
 
@@ -332,11 +341,13 @@ class LessonPlayer:
             self._enter_state(LessonState.ENDED)
 
     def _advance_end(self) -> None:
-        reading_s = READING_S
-        if not self.is_unattended:
-            reading_s += READING_S_PER_WORD * len(" ".join(self.lines).split())
-        if self._waited_s >= reading_s and not self.is_held:
+        if self._waited_s >= _compute_reading_time(self.lines) and not self.is_held:
             self.skip(1)
+
+    def _advance_closing(self) -> None:
+        reading_s = _compute_reading_time([*self.findings, *list_next_steps(self.lesson)])
+        if self.is_unattended and self._waited_s >= reading_s:
+            self.end()
 
     def reply(self, answer: int) -> None:
         """Answer the question, and play the chapter; `answer` counts from 1."""
@@ -345,24 +356,25 @@ class LessonPlayer:
             return
         if 1 <= answer <= len(question.answers):
             self.answer = answer
-            self.first_answers.setdefault(self.number, answer)
+            if not self.is_unattended:
+                self.first_answers.setdefault(self.number, answer)
             self._enter_state(LessonState.PLAYING)
             self.session.playback.is_playing = True
 
     def skip(self, chapters: int) -> None:
         """Go to the chapter that is `chapters` later, or earlier if negative.
 
-        The closing page follows the last chapter. If the lesson is unattended, it ends instead.
+        The closing page follows the last chapter.
         """
         last = len(self.lesson.chapters) - 1
         if self.state is LessonState.CLOSING:
-            # The closing page stands after the last chapter.
+            # The closing page comes after the last chapter.
             number = last + 1 + chapters
         else:
             number = self.number + chapters
         if number <= last:
             self.go_to(max(number, 0))
-        elif self.state is LessonState.CLOSING or self.is_unattended:
+        elif self.state is LessonState.CLOSING:
             self.end()
         else:
             self.number = last
@@ -448,8 +460,41 @@ class LessonPlayer:
             self._enter_state(LessonState.ASKING)
 
 
-def _do_nothing() -> None:
-    pass
+def _compute_reading_time(texts: Iterable[str]) -> float:
+    """Return the real time for which texts are shown before the lesson continues, s."""
+    return READING_S + READING_S_PER_WORD * len(" ".join(texts).split())
+
+
+def _list_comments(chapter: ChapterModel) -> list[str]:
+    """Return the texts that an unattended window shows at the end of a chapter."""
+    comments: list[str] = []
+    if chapter.question is not None:
+        comments += _explain_answer(chapter.question)
+    if chapter.task is not None:
+        comments.append(_describe_task(chapter.task))
+    return comments
+
+
+def _format_question(question: QuestionModel) -> list[str]:
+    answers = [f"{number}  {answer}" for number, answer in enumerate(question.answers, 1)]
+    return [question.text, *answers]
+
+
+def _explain_answer(question: QuestionModel) -> list[str]:
+    return [f"✓ Correct: {question.answers[question.right - 1]}", question.why]
+
+
+def _list_task_lines(task: TaskModel, state: LessonState, *, is_unattended: bool) -> list[str]:
+    if state is LessonState.TASK:
+        return [_describe_task(task)]
+    if state is LessonState.ENDED:
+        # Without a user, the task is not done.
+        return [_describe_task(task) if is_unattended else task.done]
+    return []
+
+
+def _describe_task(task: TaskModel) -> str:
+    return f"Your turn: {task.text}"
 
 
 def _go_to_start(session: Session, chapter: ChapterModel) -> None:
@@ -483,16 +528,52 @@ class ChapterResult:
     ends: bool
 
 
-def check_lesson(saved: SavedSession) -> list[ChapterResult]:
-    """Play a lesson without a window, and return the outcome of each chapter."""
+def check_lesson(path: Path, saved: SavedSession) -> list[ChapterResult]:
+    """Play a lesson without a window, and return the outcome of each chapter.
+
+    Parameters
+    ----------
+    path : Path
+        The file of the lesson, for messages.
+    saved : SavedSession
+        The session with the lesson, see `load_lesson`.
+
+    Returns
+    -------
+    list of ChapterResult
+
+    Raises
+    ------
+    MapError
+        If a chapter ends before its last edit is made.
+    """
     assert saved.lesson is not None
     session = _open_at_start(saved)
     results: list[ChapterResult] = []
-    for chapter in saved.lesson.chapters:
+    for index, chapter in enumerate(saved.lesson.chapters):
         _go_to_start(session, chapter)
         ends = is_fulfilled(chapter.until, session)
         while not ends and session.timeline.end_time < MAX_TASK_S:
             session.playback.step()
             ends = is_fulfilled(chapter.until, session)
+        if ends:
+            _check_edit_was_made(chapter, session, str(path), ("lesson", "chapters", index, "until"))
         results.append(ChapterResult(chapter.title, session.timeline.end_time, ends))
     return results
+
+
+def _check_edit_was_made(
+    chapter: ChapterModel, session: Session, source_name: str, path: tuple[str | int, ...]
+) -> None:
+    """Raise a MapError if a chapter that has just ended did not reach its last edit.
+
+    `path` is the JSON path of the condition at which the chapter ends.
+    """
+    timeline = session.timeline
+    last_edit = timeline.document.nodes[chapter.edit]
+    if timeline.head is not last_edit:
+        expected = (
+            f"an end after step {last_edit.branch_step} of edit {chapter.edit} ({last_edit.description})"
+        )
+        message = f"expected {expected}, got step {timeline.step}"
+        raise MapError.from_issues(source_name, [Issue.at_path(path, message)])

@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import pygame
 
-from robocov_app.look.colors import Color, mix
+from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.window.layout import Layout
-from robocov_app.viewer.lessons.page import ClickArea, LessonPage
-from robocov_app.viewer.lessons.player import LessonPlayer, LessonState, MarkedAnswer
+from robocov_app.viewer.lessons.page import ClickArea, LessonPage, get_answer_sign
+from robocov_app.viewer.lessons.player import AnswerMark, LessonPlayer, LessonState, MarkedAnswer
 
 # Lengths in pixels at scale 1.
 _TOP_PX = 6
@@ -20,10 +20,8 @@ _TEXT_BOTTOM_PX = 8
 _SCROLL_BAR_WIDTH_PX = 3
 _SCROLL_BAR_RIGHT_PX = 6
 """Distance of the scroll bar from the right edge of the sheet."""
-_TEXT_SIZES_PX = (14.0, 13.0)
-"""Sizes of the text; the first one at which all of it is visible is used, or else the last one."""
-_WATCHED_TEXT_SIZES_PX = (14.0, 13.0, 12.0, 11.0)
-"""The same for somebody who only watches, and cannot scroll the text."""
+_SPECTATOR_ANSWER_INDENT_PX = 20
+_SPECTATOR_ANSWER_GAP_PX = 4
 _SCROLL_BAR_STRENGTH = 0.35
 """Fraction of the color of text in the scroll bar."""
 
@@ -59,17 +57,23 @@ def draw_lesson_sheet(
     max_offset : float
         The maximum of this distance, px; 0 if all of the text is visible.
     """
-    top_px = _TOP_PX if layout.handle.height else _TOP_WITHOUT_HANDLE_PX
-    top = layout.panel.top + top_px * layout.scale
-    sheet_class = LessonSheet if has_buttons else WatchedLessonSheet
-    text_sizes_px = _TEXT_SIZES_PX if has_buttons else _WATCHED_TEXT_SIZES_PX
-    sheet = sheet_class(screen, layout, theme, lesson, text_sizes_px[-1], top)
-    for text_px in text_sizes_px:
+    sheet_class = LessonSheet if has_buttons else SpectatorLessonSheet
+    *larger_sizes_px, smallest_size_px = sheet_class.text_sizes_px
+
+    def draw_sheet(text_px: float) -> LessonSheet:
         screen.fill(theme.panel, layout.panel)
+        top_px = _TOP_PX if layout.handle.height else _TOP_WITHOUT_HANDLE_PX
+        top = layout.panel.top + top_px * layout.scale
         sheet = sheet_class(screen, layout, theme, lesson, text_px, top, scroll_offset=scroll_offset)
         sheet.draw()
+        return sheet
+
+    for text_px in larger_sizes_px:
+        sheet = draw_sheet(text_px)
         if not sheet.max_offset:
             break
+    else:
+        sheet = draw_sheet(smallest_size_px)
     return sheet.areas, sheet.offset, sheet.max_offset
 
 
@@ -87,6 +91,8 @@ class LessonSheet(LessonPage):
         The maximum of this distance, px.
     """
 
+    text_sizes_px: ClassVar[tuple[float, ...]] = (14.0, 13.0)
+    """Sizes of the text; the first one at which all of it is visible is used, or else the last one."""
     min_answer_height: ClassVar[float] = 48.0
     button_height: ClassVar[float] = 48.0
     buttons_above_bottom: ClassVar[float] = 56.0
@@ -150,10 +156,11 @@ class LessonSheet(LessonPage):
 
 
 @dataclass
-class WatchedLessonSheet(LessonSheet):
-    """The page of a lesson in the sheet of somebody who only watches: it has no buttons."""
+class SpectatorLessonSheet(LessonSheet):
+    """The page of a lesson in the sheet of a spectator, without buttons and with answers as a list."""
 
-    min_answer_height: ClassVar[float] = 0.0
+    text_sizes_px: ClassVar[tuple[float, ...]] = (14.0, 13.0, 12.0, 11.0)
+    """As in `LessonSheet`; smaller, because a spectator cannot scroll the text."""
     progress_above_bottom: ClassVar[float] = 20.0
 
     def draw(self) -> None:
@@ -163,6 +170,12 @@ class WatchedLessonSheet(LessonSheet):
         self._draw_progress()
         self.areas = []
 
-    def _choose_answer_edge(self, answer: MarkedAnswer, *, is_open: bool) -> Color:
-        """Return the color of an answer's frame, which never looks like that of a button."""
-        return super()._choose_answer_edge(answer, is_open=False)
+    def _draw_answer(self, number: int, answer: MarkedAnswer) -> None:
+        """Write an answer behind its number or mark."""
+        ink = self._choose_answer_ink(answer, is_open=self.lesson.state is LessonState.ASKING)
+        sign_color = self._choose_answer_edge(answer, is_open=False)
+        if answer.mark is AnswerMark.NONE:
+            sign_color = self.theme.faint
+        self._write(get_answer_sign(number, answer), self.text_px, sign_color, bold=True)
+        self._write_paragraph(answer.text, ink, indent=_SPECTATOR_ANSWER_INDENT_PX, right_indent=0)
+        self.y += _SPECTATOR_ANSWER_GAP_PX * self.scale
