@@ -1,6 +1,6 @@
 """Maps, and whole runs in them, drawn with matplotlib."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,12 @@ _MIN_NUMBER_PT = 4.2
 _NUMBER_SIZES = (1.25, 1.1, 0.85, 0.65)
 """Text sizes of numbers of one, two, three and more digits, in radii of the robot."""
 _START_PT = 6.2
+"""Diameter of the ring at a start; it is larger if robots are large."""
+_START_DIAMETERS = 0.6
+"""Diameter of the ring at a start, in diameters of a large robot."""
+_MAX_NUMBER_PT = 15.0
+_MAX_START_NUMBER_PT = 10.0
+"""Maximum text sizes of the numbers of large robots and of their starts."""
 _START_NUMBER_SIZE = 1.1
 """Text size of the numbers of starts, in diameters of their rings."""
 _MIN_START_NUMBER_PT = 5.5
@@ -49,6 +55,10 @@ _MAX_NUMBERED_STARTS = 30
 _START_NUMBER_HALO_PT = 1.6
 """Width of the light edge that separates the number of a start from what is below it."""
 _GOAL_PT = 8.0
+_GOAL_DIAMETERS = 0.6
+"""Size of the mark of a goal, in diameters of a large robot."""
+_MAX_TRAJECTORY_FACTOR = 1.6
+"""Maximum factor for the width of the trajectories of large robots."""
 _MIN_MARK_PT = 3.2
 """Sizes of starts and goals: of each if there is enough space, and of both in the densest crowd."""
 _ARROW_PT = 16.0
@@ -59,6 +69,8 @@ _MOVING_WIDTH_PT = 1.4
 _LINE_WIDTH_PT = 1.6
 """Width of the boundary of the known region, and of trajectories of a small team."""
 _CELL_EDGE_WIDTH_PT = 0.8
+_OUTLINED_CELL_EDGE_WIDTH_PT = 1.1
+"""Width of the edges of cells that are not filled, because a density is drawn below them."""
 _MAX_RING_WIDTH_PT = 1.1
 _MAX_RING_WIDTH_FRACTION = 0.25
 """Maximum width of the ring of a robot, as a fraction of its radius."""
@@ -69,6 +81,7 @@ _HEADING_SIZE_RADII = 0.9
 # Drawing order, from the bottom to the top.
 _CELLS_ORDER = 1
 _DENSITY_ORDER = 1.5
+_OUTLINED_CELLS_ORDER = 1.6
 _OBSTACLES_ORDER = 2
 _MOVING_ORDER = 2.1
 _PATHS_ORDER = 2.2
@@ -79,6 +92,8 @@ _STARTS_ORDER = 5
 _GOALS_ORDER = 6
 _ROBOTS_ORDER = 7
 _NUMBERS_ORDER = 8
+_LABELS_OF_OPTIONAL_MARKS = (legend.CELL_CENTROID, legend.FINAL_VORONOI_CELL, legend.GOAL)
+"""Legend entries of what is not drawn in every run."""
 _DENSITY_DOTS = 400
 """Number of dots of a density image along the longer side of the map."""
 
@@ -122,7 +137,7 @@ def draw_map(
     time : float, s
         Time at which moving obstacles are drawn.
     """
-    if has_density and environment.density is not None and not environment.density.is_uniform:
+    if has_density and describe_density(environment):
         _draw_density(axes, environment, theme)
     for polygon in environment.at(time).blocked.geoms:
         rings = [
@@ -199,6 +214,8 @@ def _draw_moving_obstacle(
 def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> None:
     """Draw a whole run: map, trajectories, and the final positions, goals and cells of the robots.
 
+    On a map with a density, the cells are outlines, because the density is shown by colors.
+
     Parameters
     ----------
     axes : matplotlib.axes.Axes
@@ -211,8 +228,11 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> N
     cells = record.cells()
     working = np.flatnonzero(record.working[-1])
     hues = choose_robot_hues(len(record.team), working[cells.adjacency])
-    cell_hues = hues[working]
-    _draw_cells(axes, cells.outlines, cell_hues, theme, colors)
+    fills = None
+    if not describe_density(record.environment):
+        get_fill = theme.get_paper_cell_color if colors == "paper" else theme.get_cell_color
+        fills = [get_fill(hue) for hue in hues[working].tolist()]
+    _draw_cells(axes, cells.outlines, fills, theme)
     _draw_trajectories(axes, record, choose_trail_colors(theme, hues.tolist(), colors))
     _draw_starts(axes, record, theme)
     radii = _draw_final_positions(axes, record, hues, theme, colors)
@@ -223,11 +243,7 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colors: ColorScheme) -> N
 
 
 def _draw_cells(
-    axes: Axes,
-    outlines: tuple[list[FloatArray], IntArray],
-    hues: IntArray,
-    theme: Theme,
-    colors: ColorScheme,
+    axes: Axes, outlines: tuple[list[FloatArray], IntArray], fills: Sequence[Color] | None, theme: Theme
 ) -> None:
     """Draw the cells of working robots.
 
@@ -236,24 +252,25 @@ def _draw_cells(
     axes : matplotlib.axes.Axes
     outlines : (list of (k, 2) arrays, (c,) int array)
         Outlines of cells, m, and the working robot that owns each.
-    hues : (w,) int array
-        Hue of each working robot.
+    fills : sequence of Color or None
+        Color of each working robot's cell; None for outlines only.
     theme : Theme
-    colors : {"paper", "robots"}
     """
-    get_color = theme.get_paper_cell_color if colors == "paper" else theme.get_cell_color
     polygons = []
     faces = []
     for outline, owner in zip(*outlines, strict=True):
         if len(outline) > 2:
             polygons.append(outline)
-            faces.append(to_plot_color(get_color(int(hues[int(owner)]))))
+            if fills is not None:
+                faces.append(to_plot_color(fills[int(owner)]))
     collection = PolyCollection(
         polygons,
-        facecolors=faces,
+        facecolors="none" if fills is None else faces,
         edgecolors=to_plot_color(theme.cell_edge),
-        linewidths=_CELL_EDGE_WIDTH_PT,
-        zorder=_CELLS_ORDER,
+        linewidths=_OUTLINED_CELL_EDGE_WIDTH_PT if fills is None else _CELL_EDGE_WIDTH_PT,
+        zorder=_OUTLINED_CELLS_ORDER if fills is None else _CELLS_ORDER,
+        # A single cell has no edge in the region.
+        label=legend.FINAL_VORONOI_CELL if len(polygons) > 1 else "",
     )
     axes.add_collection(collection, autolim=False)
 
@@ -262,10 +279,12 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
     """Draw the trajectory of each robot while it is present."""
     robots = len(record.team)
     trajectories = [record.positions[record.present[:, robot], robot] for robot in range(robots)]
+    enlargement = np.sqrt(_compute_median_diameter(axes, record) / (2.0 * _DISC_PT))
+    size_factor = float(np.clip(enlargement, 1.0, _MAX_TRAJECTORY_FACTOR))
     collection = LineCollection(
         trajectories,
         colors=[to_plot_color(color) for color in colors],
-        linewidths=_LINE_WIDTH_PT * choose_width_factor(robots),
+        linewidths=_LINE_WIDTH_PT * choose_width_factor(robots) * size_factor,
         capstyle="round",
         joinstyle="round",
         zorder=_TRAJECTORIES_ORDER,
@@ -278,7 +297,8 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     present = np.flatnonzero(record.present[-1])
     first_rows = np.argmax(record.present, axis=0)[present]
     starts = record.positions[first_rows, present]
-    size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, _START_PT)
+    max_size = max(_START_PT, _START_DIAMETERS * _compute_median_diameter(axes, record))
+    size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, max_size)
     axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
     if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_START_NUMBER_PT:
         starts_by_robot = dict(zip(present.tolist(), starts, strict=True))
@@ -293,7 +313,8 @@ def _draw_start_numbers(
     is_known = np.isfinite(trajectories).all(axis=1)
     marks = _to_points(axes, trajectories[is_known])
     start_points = _to_points(axes, np.array(list(starts.values())))
-    centers = place_start_numbers(start_points, marks, size)
+    text_size = min(_START_NUMBER_SIZE * size, _MAX_START_NUMBER_PT)
+    centers = place_start_numbers(start_points, marks, mark_size=size, text_size=text_size)
     halo = [withStroke(linewidth=_START_NUMBER_HALO_PT, foreground=to_plot_color(theme.background))]
     for (robot, start), offset in zip(starts.items(), centers - start_points, strict=True):
         axes.annotate(
@@ -301,7 +322,7 @@ def _draw_start_numbers(
             xy=start.tolist(),
             xytext=offset.tolist(),
             textcoords="offset points",
-            fontsize=_START_NUMBER_SIZE * size,
+            fontsize=text_size,
             fontweight="bold",
             color=to_plot_color(theme.start),
             ha="center",
@@ -371,10 +392,12 @@ def _draw_goals(
         goals = centroids
     goal_points = _to_points(axes, goals)
     distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
-    size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, _GOAL_PT)
+    max_size = max(_GOAL_PT, _GOAL_DIAMETERS * _compute_median_diameter(axes, record))
+    size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, max_size)
     # The disc of a robot at its goal would hide the cross, except for its ends.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
-    axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, **_build_goal_style(is_centroid, theme, size))
+    if is_away.any():
+        axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, **_build_goal_style(is_centroid, theme, size))
 
 
 def draw_robots(
@@ -421,7 +444,7 @@ def draw_robots(
         numbers = range(1, len(positions) + 1)
     for number, (x, y), disc, fill in zip(numbers, positions.tolist(), radii, fills, strict=True):
         digits = min(len(str(number)), len(_NUMBER_SIZES))
-        size = disc * _NUMBER_SIZES[digits - 1]
+        size = min(disc * _NUMBER_SIZES[digits - 1], _MAX_NUMBER_PT)
         if size >= _MIN_NUMBER_PT:
             axes.text(
                 x,
@@ -441,6 +464,11 @@ def _compute_points_per_meter(axes: Axes) -> float:
     """Return the number of points of the page in a meter of the map."""
     ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     return abs(float(ends[1, 0] - ends[0, 0]))
+
+
+def _compute_median_diameter(axes: Axes, record: Record) -> float:
+    """Return the median diameter of the robots of a run, in points of the page."""
+    return 2.0 * float(np.median(record.team.radius)) * _compute_points_per_meter(axes)
 
 
 def _to_points(axes: Axes, positions: FloatArray) -> FloatArray:
@@ -537,7 +565,7 @@ def build_robot_handle(label: str, fill: Color, theme: Theme) -> Artist:
 
 
 def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list[Artist]:
-    """Build the legend entries for what `draw_run` draws."""
+    """Build the legend entries for what `draw_run` may draw; see `select_drawn`."""
     robots = len(record.team)
     trail_color = choose_trail_colors(theme, list(range(robots)), colors)[0]
     final_color = theme.robots[0]
@@ -557,3 +585,19 @@ def build_run_handles(record: Record, theme: Theme, colors: ColorScheme) -> list
     handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))
     # The boundary needs no entry here.
     return [*handles, *build_map_handles(record.environment, theme)[1:]]
+
+
+def select_drawn(handles: Iterable[Artist], axes: Iterable[Axes]) -> list[Artist]:
+    """Return legend entries without those of goals and cells that none of the axes contain.
+
+    Goals are not drawn where robots have reached them, and a single cell has no visible edge.
+    """
+    drawn_labels: set[str] = set()
+    for item in axes:
+        _, labels = item.get_legend_handles_labels()
+        drawn_labels.update(labels)
+    return [
+        handle
+        for handle in handles
+        if get_label(handle) not in _LABELS_OF_OPTIONAL_MARKS or get_label(handle) in drawn_labels
+    ]

@@ -1,6 +1,5 @@
 """A page about the coverage cost: its curves, and maps of the distance to the nearest robot."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,27 +16,34 @@ from robocov.record import Record
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
 from robocov_app.figures import arena
+from robocov_app.figures.coverage_layout import (
+    BAR_INDENT,
+    BAR_WIDTH,
+    CAPTION_TITLE,
+    CURVE_MARGINS,
+    CoverageArrangement,
+    CoverageContents,
+    create_coverage_page,
+)
 from robocov_app.figures.curves import (
     DISTANCE,
     TIME,
     WEIGHTED_DISTANCE,
-    CurveMargins,
     TimeCurve,
     add_curve_axes,
-    compute_right_margin,
     draw_curves,
 )
 from robocov_app.figures.extent import Extent, enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
     SMALL,
-    TEXT,
     FigurePage,
     PageBox,
     PagePanel,
     check_not_empty,
     to_plot_color,
 )
+from robocov_app.figures.run_titles import build_run_title
 from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -55,50 +61,23 @@ DOTS_PER_PIXEL = 2
 """Dots of a map image per pixel of the page."""
 MIN_SIZE_PX = (720, 400)
 """Minimum size of a page with curves and maps; a smaller page shows only the curves."""
-DEFAULT_WIDTH_PX = 1500
-MAX_HEIGHT_PX = 2600
-MAX_MAP_HEIGHT_PX = 760
-MAX_ASPECT_BESIDE = 1.9
-"""Maximum width / height of a map to the right of the curves; a wider map is below them."""
-_DEFAULT_SCALE = 1.3
 _MIN_ASPECT_SIDE_BY_SIDE = 2.4
 """Minimum width / height of a box in which mean distances and mean times are next to each other."""
 _HATCH_PX = 9
 """Distance between the lines that hatch areas that no robot can reach."""
 _BORDER_WIDTH = 1.4
 _BAR_LABEL = "distance to the nearest robot"
-_MAX_MAPS_IN_ROW = 3
-"""Maximum number of maps side by side; more maps form a grid."""
-_GRID_ASPECT = 1.6
-"""Approximate width / height of a grid of maps."""
-_MIN_HEIGHT_PX = 320.0
-_MIN_HEIGHT_BESIDE = 480
-"""Minimum height of a page with a map next to the curves, px at scale 1."""
-_MAX_CURVES_FRACTION = 0.4
-"""Maximum height of curves above maps, as a fraction of the height of both."""
 # Heights at scale 1, px.
-_HEAD = 46
-_CURVES_HEIGHT = 290
-_CAPTION_HEIGHT = 50
-_PANEL_GAP = 16
 _TITLE_ROW = 26
-_BAR_ROW = 26
-_BAR_ROW_BELOW_CURVES = 24
 _CAPTION_TITLE_ROW = 35
 _CAPTION_FACTS_ROW = 14
 """Distances of the rows of a caption above its map."""
-_BAR_WIDTH = 190
 _BAR_HEIGHT = 10
 _BAR_RISE = 9
 """Distance of the top of the color scale above the middle of its row; the ticks are below."""
-_BAR_INDENT = 14
-"""Space between the color scale and the right edge of the maps."""
 _BAR_LABEL_GAP = 12
 _BAR_LABEL_RISE = 4
 """Distance of the label above the middle of the row, at the height of the color scale."""
-_LAST_TICK_SPACE = 14
-"""Space to the right of a time axis for half of its last tick label."""
-_CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=38)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,36 +141,11 @@ class DistanceSnapshot:
             environment=record.environment,
             team=record.team[counted],
             field=field,
-            title=record.label,
+            title=build_run_title(record),
             facts=f"{cost} after {time:.1f} s".lstrip(),
             numbers=tuple((counted + 1).tolist()),
             time=time,
         )
-
-
-@dataclass(frozen=True)
-class _Arrangement:
-    """Positions of the parts of a page, px.
-
-    Attributes
-    ----------
-    curves, maps : PageBox
-    bar_row : float
-        Vertical middle of the color scale.
-    bar_min_left : float
-        Leftmost position of the color scale and its label.
-    footer_left : float
-        Leftmost position of the scale bar and the legend below the maps.
-    is_below : bool
-        Whether the maps are below the curves.
-    """
-
-    curves: PageBox
-    maps: PageBox
-    bar_row: float
-    bar_min_left: float
-    footer_left: float
-    is_below: bool
 
 
 @plain_style()
@@ -235,9 +189,14 @@ def plot_coverage(
     extent = enclose_maps(snapshot.environment for snapshot in snapshots)
     limit = _choose_limit(snapshots)
     handles = _build_handles(snapshots, theme)
-    page, arrangement = _create_page(
-        theme, size, extent, handles, map_count=len(snapshots), end_curves=times or curves
+    contents = CoverageContents(
+        title=title,
+        captions=[(snapshot.title, snapshot.facts) for snapshot in snapshots],
+        aspect=extent.aspect,
+        end_curves=times or curves,
+        handles=handles,
     )
+    page, arrangement = create_coverage_page(contents, theme, size)
     bar_left = _draw_bar(page, limit, arrangement)
     title_end: float = page.size[0]
     if not arrangement.is_below:
@@ -248,129 +207,11 @@ def plot_coverage(
         if any(describe_density(snapshot.environment) for snapshot in snapshots):
             distance_label = WEIGHTED_DISTANCE
         _draw_curves(page, curves, times, arrangement.curves, distance_label)
-    boxes = _draw_maps(page, snapshots, extent, limit, arrangement.maps)
+    _draw_maps(page, snapshots, extent, limit, arrangement.panels)
+    boxes = [panel.box for panel in arrangement.panels]
     zoom = boxes[0].width / extent.width
     page.draw_footer(handles, boxes, zoom, arrangement.footer_left)
     return page.figure
-
-
-def _create_page(
-    theme: Theme,
-    size: tuple[int, int] | None,
-    extent: Extent,
-    handles: Sequence[Artist],
-    *,
-    map_count: int,
-    end_curves: Sequence[TimeCurve],
-) -> tuple[FigurePage, _Arrangement]:
-    """Create a page, and arrange curves and maps on it.
-
-    Parameters
-    ----------
-    theme : Theme
-    size : (width, height) or None, px
-        Without a size, the page is as high as its maps need.
-    extent : Extent
-        Area that all maps show.
-    handles : sequence of Artist
-        Entries of the legend in the footer.
-    map_count : int
-    end_curves : sequence of TimeCurve
-        Curves at the bottom of the page if there are curves next to a map.
-    """
-    has_curves = bool(end_curves)
-    is_beside = has_curves and map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE
-    is_below = has_curves and not is_beside
-    if size is None:
-        # A page of any height serves to measure the footer; its final height is chosen below.
-        page = FigurePage((DEFAULT_WIDTH_PX, 1000), theme, _DEFAULT_SCALE)
-    else:
-        page = FigurePage(size, theme)
-    maps_fraction = 0.5 if is_beside else 1.0
-    footer_left = page.margin
-    if is_beside:
-        footer_left = _find_curves_end(page, end_curves)
-    footer_height = page.measure_footer(handles, footer_left)
-    maps_width = maps_fraction * page.size[0] - 2 * page.margin
-    if size is None:
-        height = _choose_height(page, extent, map_count, maps_width, footer_height, is_below=is_below)
-        page = FigurePage((page.size[0], height), theme, _DEFAULT_SCALE)
-    if is_below:
-        return page, _arrange_below(page, maps_width, footer_height, has_fixed_size=size is not None)
-    return page, _arrange_beside(page, maps_fraction, footer_height, footer_left, has_curves=has_curves)
-
-
-def _find_curves_end(page: FigurePage, curves: Sequence[TimeCurve]) -> float:
-    """Return the left edge of the space to the right of the time axis of curves next to a map, px."""
-    right = compute_right_margin(page, curves, _CURVE_MARGINS, 0.5 * page.size[0] - page.margin)
-    return 0.5 * page.size[0] - right + _LAST_TICK_SPACE * page.scale
-
-
-def _choose_height(
-    page: FigurePage,
-    extent: Extent,
-    map_count: int,
-    maps_width: float,
-    footer_height: float,
-    *,
-    is_below: bool,
-) -> int:
-    """Return the height that a page of the default width needs for a number of maps, px."""
-    scale = page.scale
-    columns = map_count
-    if map_count > _MAX_MAPS_IN_ROW:
-        columns = min(map_count, max(1, round(np.sqrt(map_count * _GRID_ASPECT / extent.aspect))))
-    slot_width = (maps_width - (columns - 1) * _PANEL_GAP * scale) / columns
-    slot_height = min(slot_width / extent.aspect, MAX_MAP_HEIGHT_PX) + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
-    rows = math.ceil(map_count / columns)
-    maps_height = rows * slot_height - _PANEL_GAP * scale
-    head_height = _HEAD * scale
-    if is_below:
-        head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale
-    min_height = _MIN_HEIGHT_PX
-    if map_count == 1 and extent.aspect < MAX_ASPECT_BESIDE:
-        min_height = _MIN_HEIGHT_BESIDE * scale
-    return int(np.clip(head_height + maps_height + footer_height, min_height, MAX_HEIGHT_PX))
-
-
-def _arrange_below(
-    page: FigurePage, maps_width: float, footer_height: float, *, has_fixed_size: bool
-) -> _Arrangement:
-    """Arrange the maps below the curves, which are as wide as the page."""
-    width, height = page.size
-    scale = page.scale
-    head = _HEAD * scale
-    curves_height = _CURVES_HEIGHT * scale
-    if has_fixed_size:
-        curves_height = min(curves_height, _MAX_CURVES_FRACTION * (height - head - footer_height))
-    curves_end = head + curves_height
-    return _Arrangement(
-        curves=PageBox(page.margin, head, width - 2 * page.margin, curves_height),
-        maps=PageBox(page.margin, curves_end + head, maps_width, height - footer_height - curves_end - head),
-        bar_row=curves_end + _BAR_ROW_BELOW_CURVES * scale,
-        bar_min_left=page.margin,
-        footer_left=page.margin,
-        is_below=True,
-    )
-
-
-def _arrange_beside(
-    page: FigurePage, maps_fraction: float, footer_height: float, footer_left: float, *, has_curves: bool
-) -> _Arrangement:
-    """Arrange one map to the right of the curves or, if there are no curves, maps over the whole page."""
-    width, height = page.size
-    scale = page.scale
-    head = _HEAD * scale
-    maps_left = (1.0 - maps_fraction) * width + page.margin
-    maps_width = maps_fraction * width - 2 * page.margin
-    return _Arrangement(
-        curves=PageBox(page.margin, head, 0.5 * width - page.margin, height - head),
-        maps=PageBox(maps_left, head, maps_width, height - head - footer_height),
-        bar_row=_BAR_ROW * scale,
-        bar_min_left=0.5 * width if has_curves else maps_left,
-        footer_left=footer_left,
-        is_below=False,
-    )
 
 
 @plain_style()
@@ -462,16 +303,19 @@ def _draw_curve_panel(
     page: FigurePage, curves: Sequence[TimeCurve], box: PageBox, label: str, unit: str
 ) -> None:
     """Draw curves in a box, px, that leaves space for axis labels and for end labels."""
-    axes = add_curve_axes(page, curves, _CURVE_MARGINS, box=box, unit=unit)
+    axes = add_curve_axes(page, curves, CURVE_MARGINS, box=box, unit=unit)
     draw_curves(axes, curves, page.theme, label=label, unit=unit)
 
 
 def _draw_maps(
-    page: FigurePage, snapshots: Sequence[DistanceSnapshot], extent: Extent, limit: float, area: PageBox
-) -> list[PageBox]:
-    """Draw the map of each snapshot below its title; return the boxes of the maps, px."""
+    page: FigurePage,
+    snapshots: Sequence[DistanceSnapshot],
+    extent: Extent,
+    limit: float,
+    panels: Sequence[PagePanel],
+) -> None:
+    """Draw the map of each snapshot in its panel, below its title."""
     scale = page.scale
-    panels = _arrange_panels(area, len(snapshots), extent.aspect, _CAPTION_HEIGHT * scale, _PANEL_GAP * scale)
     for snapshot, panel in zip(snapshots, panels, strict=True):
         box = panel.box
         max_width = panel.caption_width
@@ -479,53 +323,8 @@ def _draw_maps(
         _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
         title_row = box.top - _CAPTION_TITLE_ROW * scale
         facts_row = box.top - _CAPTION_FACTS_ROW * scale
-        page.write(snapshot.title, box.left, title_row, points=TEXT + 1.5, bold=True, max_width=max_width)
+        page.write(snapshot.title, box.left, title_row, points=CAPTION_TITLE, bold=True, max_width=max_width)
         page.write(snapshot.facts, box.left, facts_row, color=page.theme.faint, max_width=max_width)
-    return [panel.box for panel in panels]
-
-
-def _arrange_panels(
-    area: PageBox, count: int, aspect: float, caption_height: float, gap: float
-) -> list[PagePanel]:
-    """Arrange panels of equal size in a grid, as large as possible.
-
-    Parameters
-    ----------
-    area : PageBox, px
-    count : int
-    aspect : float
-        Width of a panel divided by its height.
-    caption_height, gap : float, px
-        Space above each panel, and between panels.
-
-    Returns
-    -------
-    list of (PageBox, float), px
-        Box of each panel, and the width of the caption above it.
-    """
-    left, top, width, height = area
-    panel_width = 0.0
-    columns = 1
-    for candidate in range(1, count + 1):
-        rows = math.ceil(count / candidate)
-        max_width = (width - (candidate - 1) * gap) / candidate
-        max_height = (height - (rows - 1) * gap) / rows - caption_height
-        candidate_width = min(max_width, max(max_height, 1.0) * aspect)
-        if candidate_width >= panel_width:
-            panel_width = candidate_width
-            columns = candidate
-    slot = (width - (columns - 1) * gap) / columns
-    panel_height = panel_width / aspect
-    indent = 0.0
-    if count == 1:
-        indent = (slot - panel_width) / 2
-    panels = []
-    for number in range(count):
-        row, column = divmod(number, columns)
-        x = left + column * (slot + gap) + indent
-        y = top + row * (panel_height + caption_height + gap) + caption_height
-        panels.append(PagePanel(PageBox(x, y, panel_width, panel_height), slot - indent))
-    return panels
 
 
 def _draw_snapshot(
@@ -589,7 +388,7 @@ def _paint_distances(
     return pixels
 
 
-def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> float:
+def _draw_bar(page: FigurePage, limit: float, arrangement: CoverageArrangement) -> float:
     """Draw the color scale above the maps, at the right, with a label if there is enough space.
 
     Parameters
@@ -597,7 +396,7 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     page : FigurePage
     limit : float, m
         End of the scale.
-    arrangement : _Arrangement
+    arrangement : CoverageArrangement
 
     Returns
     -------
@@ -607,8 +406,8 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: _Arrangement) -> floa
     middle = arrangement.bar_row
     theme = page.theme
     scale = page.scale
-    right = arrangement.maps.right - _BAR_INDENT * scale
-    width = _BAR_WIDTH * scale
+    right = arrangement.maps.right - BAR_INDENT * scale
+    width = BAR_WIDTH * scale
     box = PageBox(right - width, middle - _BAR_RISE * scale, width, _BAR_HEIGHT * scale)
     axes = page.add_axes(box)
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))

@@ -391,18 +391,36 @@ class FigurePage:
             panels.append(PagePanel(PageBox(x, y, width, height), slot_width))
         return panels
 
-    def measure_footer(self, handles: Sequence[Artist], start: float = 0) -> float:
-        """Return the height that `draw_footer` needs, px."""
+    def measure_footer(
+        self, handles: Sequence[Artist], start: float = 0, bar_left: float | None = None
+    ) -> float:
+        """Return the height that `draw_footer` needs, px.
+
+        Parameters
+        ----------
+        handles : sequence of matplotlib.artist.Artist
+            Entries of the legend.
+        start : float, px
+            Left edge of the footer.
+        bar_left : float, px, optional
+            Left edge of the maps, below which the scale bar starts; by default that of the footer.
+        """
         start = max(start, self.margin)
+        if bar_left is None:
+            bar_left = start
         legend = self._measure_legend(handles, start)
-        if self._fits_next_to_bar(legend, len(handles), start):
+        if self._fits_next_to_bar(legend, len(handles), bar_left):
             return _ONE_LINE_FOOTER * self.scale
+        return self._compute_two_line_height(legend)
+
+    def _compute_two_line_height(self, legend: _LegendExtent) -> float:
+        """Return the height of a footer with the legend below the scale bar, px."""
         return _SPACE_ABOVE_LEGEND * self.scale + legend.height + _SPACE_BELOW_LEGEND * self.scale
 
     def draw_footer(
         self, handles: Sequence[Artist], boxes: Sequence[PageBox], zoom: float, start: float = 0
     ) -> None:
-        """Draw the scale bar and the legend below maps, in one line if there is enough space.
+        """Draw the scale bar below the left edge of the maps, and the legend next to the bar or below it.
 
         Parameters
         ----------
@@ -413,7 +431,7 @@ class FigurePage:
         zoom : float, px/m
             Scale at which the maps are drawn.
         start : float, px
-            Left edge of the footer. To the left of the maps, it uses only the bottom of the page.
+            Left edge of the legend.
         """
         start = max(start, self.margin)
         end = self.size[0] - self.margin
@@ -421,35 +439,29 @@ class FigurePage:
         right = max(box.right for box in boxes)
         bottom = max(box.bottom for box in boxes)
         legend = self._measure_legend(handles, start)
-        if self._fits_next_to_bar(legend, len(handles), start):
+        if self._fits_next_to_bar(legend, len(handles), left):
             y = bottom + _ONE_LINE_MIDDLE * self.scale
-            # The bar starts below the left edge of the maps, or farther left if the legend needs the space.
-            bar_space = end - start - legend.width - _SCALE_BAR_LABEL * self.scale
-            max_bar_length = min(self._max_bar_length, bar_space)
-            max_bar_left = end - legend.width - _SCALE_BAR_LABEL * self.scale - max_bar_length
-            bar_left = max(min(left, max_bar_left), start)
-            if self.margin < start <= bar_left < left:
-                # To the left of the maps, only the bottom of the page is free.
-                y = self.size[1] - (_ONE_LINE_FOOTER - _ONE_LINE_MIDDLE) * self.scale
-            bar_end = self._draw_scale_bar(bar_left, y, zoom, max_bar_length)
+            # The bar is shorter if the legend needs the space.
+            bar_space = end - left - legend.width - _SCALE_BAR_LABEL * self.scale
+            bar_end = self._draw_scale_bar(left, y, zoom, min(self._max_bar_length, bar_space))
             min_legend_right = bar_end + _LEGEND_GAP * self.scale + legend.width
             legend_right = min(max(right, min_legend_right), end)
             self._draw_legend(handles, legend.columns, "center right", (legend_right, y))
         else:
             y = bottom + _UPPER_LINE_MIDDLE * self.scale
-            self._draw_scale_bar(left, y, zoom, self._max_bar_length)
-            middle = ((start + end) / 2, bottom + _LEGEND_TOP * self.scale)
-            self._draw_legend(handles, legend.columns, "upper center", middle)
+            self._draw_scale_bar(left, y, zoom, min(self._max_bar_length, right - left))
+            # The legend is below the middle of the maps, as far as the edges of the footer permit.
+            half_width = legend.width / 2
+            middle = min(max((left + right) / 2, start + half_width), end - half_width)
+            row = bottom + _LEGEND_TOP * self.scale
+            self._draw_legend(handles, legend.columns, "upper center", (middle, row))
 
-    def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, start: float) -> bool:
-        """Return whether a legend of some entries is a single line that fits next to the scale bar."""
-        return legend.columns == entries and legend.width <= self._compute_legend_space(start)
-
-    def _compute_legend_space(self, start: float) -> float:
-        """Return the width that a legend may have in the same line as a scale bar, px."""
+    def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, bar_left: float) -> bool:
+        """Return whether a legend of some entries is a single line that fits to the right of a scale bar."""
         label_width = _SCALE_BAR_LABEL * self.scale
         bar_length = _MIN_SCALE_BAR_FRACTION * self._max_bar_length
-        return self.size[0] - self.margin - start - bar_length - label_width
+        space = self.size[0] - self.margin - bar_left - bar_length - label_width
+        return legend.columns == entries and legend.width <= space
 
     def _draw_scale_bar(self, left: float, y: float, zoom: float, max_length: float) -> float:
         """Draw a scale bar of a round length up to a maximum, px; return the right end of its label, px."""

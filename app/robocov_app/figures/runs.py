@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,6 @@ from robocov_app.figures.extent import enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
     HEADING,
-    TEXT,
     TITLE,
     FigurePage,
     PageBox,
@@ -35,6 +35,7 @@ from robocov_app.figures.page import (
     check_not_empty,
     get_figure,
 )
+from robocov_app.figures.run_titles import build_run_title
 from robocov_app.look.hues import ColorScheme
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -111,9 +112,11 @@ def plot_environment(
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
         handles = arena.build_map_handles(environment, theme)
-        axes = _create_map_page(environment, theme, size, handles, title=environment.name, facts=facts)
-    else:
-        arena.set_meter_axes(axes, environment, theme)
+        map_page = _create_map_page(environment, theme, size, handles, title=environment.name, facts=facts)
+        arena.draw_map(map_page.axes, environment, theme)
+        map_page.draw_footer(handles)
+        return map_page.page.figure
+    arena.set_meter_axes(axes, environment, theme)
     arena.draw_map(axes, environment, theme)
     return get_figure(axes)
 
@@ -152,14 +155,16 @@ def plot_trajectories(
         raise ParameterError(f"colors: expected 'paper' or 'robots', got {quote(colors)}")
     theme = get_theme(theme)
     if axes is None:
-        title = _join_facts([record.label, record.environment.name])
+        title = _join_facts([build_run_title(record), record.environment.name])
         facts = _join_facts(
             [_format_cost(record, mean_distance, mean_time), _format_time(record), _format_robots(record)]
         )
         handles = arena.build_run_handles(record, theme, colors)
-        axes = _create_map_page(record.environment, theme, size, handles, title=title, facts=facts)
-    else:
-        arena.set_meter_axes(axes, record.environment, theme)
+        map_page = _create_map_page(record.environment, theme, size, handles, title=title, facts=facts)
+        arena.draw_run(map_page.axes, record, theme, colors)
+        map_page.draw_footer(arena.select_drawn(handles, [map_page.axes]))
+        return map_page.page.figure
+    arena.set_meter_axes(axes, record.environment, theme)
     arena.draw_run(axes, record, theme, colors)
     return get_figure(axes)
 
@@ -237,18 +242,23 @@ def plot_comparison(
     if size is None:
         height = layout.compute_page_height(len(records), extent.aspect, page.measure_footer(handles))
         page = FigurePage((page.size[0], height), theme, _SHEET_SCALE)
-    panels = page.arrange_panels(
+    arrange_panels = partial(
+        page.arrange_panels,
         len(records),
         layout.columns,
         aspect=extent.aspect,
         caption_width=layout.caption_width,
         caption_height=layout.caption_height,
         top=layout.top,
-        bottom=page.measure_footer(handles),
     )
+    panels = arrange_panels(bottom=page.measure_footer(handles))
+    # Below maps that are narrower than the page, the footer may need more space.
+    panels = arrange_panels(bottom=page.measure_footer(handles, bar_left=panels[0].box.left))
+    all_axes = []
     for number, panel in enumerate(panels):
         axes = page.add_map_axes(panel.box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         arena.draw_run(axes, records[number], theme, colors)
+        all_axes.append(axes)
         if layout.has_one_line_captions:
             _write_one_line(page, captions, number, panel, layout.caption_width)
         else:
@@ -256,7 +266,8 @@ def plot_comparison(
     first_box = panels[0].box
     _write_heading(page, captions.shared, first_box, layout.caption_height + _HEADING_RISE * page.scale)
     footer_boxes = [_widen_box(panel) if layout.has_one_line_captions else panel.box for panel in panels]
-    page.draw_footer(handles, footer_boxes, first_box.width / extent.width)
+    drawn_handles = arena.select_drawn(handles, all_axes)
+    page.draw_footer(drawn_handles, footer_boxes, first_box.width / extent.width)
     return page.figure
 
 
@@ -353,11 +364,12 @@ def _build_captions(
     for cost, row in zip(costs, facts, strict=True):
         different = [fact for fact, is_same in zip(row, is_shared, strict=True) if not is_same]
         different_facts.append(_join_facts([cost, *different]))
+    names = [build_run_title(record) for record in records]
     return _Captions(
         shared=_join_facts(shared),
-        names=[record.label for record in records],
+        names=names,
         facts=different_facts,
-        name_widths=[page.measure_text(record.label, points=TITLE, bold=True) for record in records],
+        name_widths=[page.measure_text(name, points=TITLE, bold=True) for name in names],
         facts_widths=[page.measure_text(text) for text in different_facts],
         gap=_CAPTION_GAP * page.scale,
     )
@@ -461,8 +473,8 @@ def _create_map_page(
     *,
     title: str,
     facts: str,
-) -> Axes:
-    """Create a page with one map, a title and facts above it, and the legend below."""
+) -> "_MapPage":
+    """Create a page with axes for one map, a title and facts above it, and space for the legend below."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
     if size is None:
@@ -470,14 +482,44 @@ def _create_map_page(
     else:
         page = FigurePage(size, theme)
     above = _MAP_HEAD * page.scale
-    free_height = page.size[1] - above - page.measure_footer(handles)
+    box = _place_map(page, aspect, above, page.measure_footer(handles))
+    # Below a map that is narrower than the page, the footer may need more space.
+    box = _place_map(page, aspect, above, page.measure_footer(handles, bar_left=box.left))
+    _write_above_map(page, title, facts, box)
+    axes = page.add_map_axes(box, low_x, low_y, high_x, high_y)
+    return _MapPage(page=page, axes=axes, box=box, zoom=box.width / (high_x - low_x))
+
+
+class _MapPage(NamedTuple):
+    """A page with one map.
+
+    Attributes
+    ----------
+    page : FigurePage
+    axes : matplotlib.axes.Axes
+        Axes of the map.
+    box : PageBox
+        Box of the map, px.
+    zoom : float, px/m
+        Scale at which the map is drawn.
+    """
+
+    page: FigurePage
+    axes: Axes
+    box: PageBox
+    zoom: float
+
+    def draw_footer(self, handles: Sequence[Artist]) -> None:
+        """Draw the scale bar and a legend below the map."""
+        self.page.draw_footer(handles, [self.box], self.zoom)
+
+
+def _place_map(page: FigurePage, aspect: float, above: float, below: float) -> PageBox:
+    """Return the largest box of an aspect ratio with space above and below it, in the middle, px."""
+    free_height = page.size[1] - above - below
     width = min(page.content_width, free_height * aspect)
     height = width / aspect
-    box = PageBox((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
-    _write_above_map(page, title, box, up=_NAME_ROW, points=TITLE, is_title=True)
-    _write_above_map(page, facts, box, up=_FACTS_ROW, points=TEXT, is_title=False)
-    page.draw_footer(handles, [box], width / (high_x - low_x))
-    return page.add_map_axes(box, low_x, low_y, high_x, high_y)
+    return PageBox((page.size[0] - width) / 2, above + (free_height - height) / 2, width, height)
 
 
 def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]) -> tuple[int, int]:
@@ -492,17 +534,18 @@ def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]
     return int(width), int(height)
 
 
-def _write_above_map(
-    page: FigurePage, text: str, box: PageBox, *, up: float, points: float, is_title: bool
-) -> None:
-    """Write a line `up` pixels, at scale 1, above a map; center it if it is wider than the map."""
-    left, top, width, _ = box
-    text_width = min(page.measure_text(text, points=points, bold=is_title), page.content_width)
-    if text_width > width:
-        left = max(left + (width - text_width) / 2, page.margin)
-    color = page.theme.ink if is_title else page.theme.faint
-    row = top - up * page.scale
-    page.write(text, left, row, points=points, bold=is_title, color=color, max_width=page.content_width)
+def _write_above_map(page: FigurePage, title: str, facts: str, box: PageBox) -> None:
+    """Write the title and the facts above a map; center them as a block if they are wider than the map."""
+    title_width = page.measure_text(title, points=TITLE, bold=True)
+    text_width = min(max(title_width, page.measure_text(facts)), page.content_width)
+    left = box.left
+    if text_width > box.width:
+        left = max(box.left + (box.width - text_width) / 2, page.margin)
+    max_width = page.content_width
+    title_row = box.top - _NAME_ROW * page.scale
+    facts_row = box.top - _FACTS_ROW * page.scale
+    page.write(title, left, title_row, points=TITLE, bold=True, max_width=max_width)
+    page.write(facts, left, facts_row, color=page.theme.faint, max_width=max_width)
 
 
 def _join_facts(facts: Sequence[str]) -> str:
@@ -562,15 +605,18 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
         np.clip(top + panels_height + page.measure_footer(handles), _MIN_HEIGHT_PX, _MAX_SHEET_HEIGHT_PX)
     )
     page = FigurePage((_SHEET_WIDTH_PX, height), theme, _SHEET_SCALE)
-    panels = page.arrange_panels(
+    arrange_panels = partial(
+        page.arrange_panels,
         len(drawn),
         columns,
         aspect=aspect,
         caption_width=0.0,
         caption_height=above,
         top=top,
-        bottom=page.measure_footer(handles),
     )
+    panels = arrange_panels(bottom=page.measure_footer(handles))
+    # Below maps that are narrower than the page, the footer may need more space.
+    panels = arrange_panels(bottom=page.measure_footer(handles, bar_left=panels[0].box.left))
     for environment, panel in zip(drawn, panels, strict=True):
         low_x, low_y, _, _ = environment.region.bounds
         axes = page.add_map_axes(panel.box, low_x, low_y, low_x + map_width, low_y + map_height)

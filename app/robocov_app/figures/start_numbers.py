@@ -7,13 +7,15 @@ from robocov.typing import FloatArray
 
 _DIRECTIONS = 16
 """Number of directions from a start in which its number may be written."""
-_NUMBER_DISTANCE = 1.15
-"""Distance of the center of a number from its start, in sizes of the mark."""
+_NUMBER_DISTANCE = 0.6
+"""Distance of the center of a number from the edge of the mark, in text sizes."""
 _MAX_DISTANCE = 4.0
 """Marks that are farther from a start than this, in sizes of its mark, do not matter."""
 
 
-def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float) -> FloatArray:
+def place_start_numbers(
+    starts: FloatArray, marks: FloatArray, *, mark_size: float, text_size: float
+) -> FloatArray:
     """Place a number next to each start, away from marks and other numbers.
 
     Parameters
@@ -23,6 +25,8 @@ def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float)
         Points that numbers should not hide, such as other starts and points of trajectories.
     mark_size : float
         Diameter of the mark of a start, in the unit of the positions.
+    text_size : float
+        Text size of the numbers, in the same unit.
 
     Returns
     -------
@@ -36,11 +40,13 @@ def place_start_numbers(starts: FloatArray, marks: FloatArray, mark_size: float)
 
     Examples
     --------
-    >>> place_start_numbers(np.array([[0.0, 0.0]]), np.array([[10.0, 0.0], [20.0, 0.0]]), 10.0).round(1)
-    array([[ 4.4, 10.6]])
+    >>> marks = np.array([[10.0, 0.0], [20.0, 0.0]])
+    >>> place_start_numbers(np.array([[0.0, 0.0]]), marks, mark_size=10.0, text_size=11.0).round(1)
+    array([[ 4.4, 10.7]])
     """
     angles = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
-    offsets = _NUMBER_DISTANCE * mark_size * np.column_stack([np.cos(angles), np.sin(angles)])
+    distance = 0.5 * mark_size + _NUMBER_DISTANCE * text_size
+    offsets = distance * np.column_stack([np.cos(angles), np.sin(angles)])
     centers = np.empty_like(starts)
     for number, start in enumerate(starts):
         obstacles = np.concatenate([marks, starts, centers[:number]])

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Annotation, Text
 from page_layout import assert_layout_is_clear, boxes_overlap
 
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.team import Team
@@ -237,8 +238,32 @@ class TestTrajectories:
             final_positions = partition(final_positions, ROOMS.region).centroids
         positions = np.concatenate([record.positions, final_positions[None]])
         goals = np.concatenate([record.goals, final_positions[None]])
-        axes = plot_trajectories(replace(record, positions=positions, goals=goals)).axes[0]
-        assert len(find_marks(axes, "+").get_xydata()) == 0
+        figure = plot_trajectories(replace(record, positions=positions, goals=goals))
+        assert not has_marks(figure.axes[0], "+")
+        assert "cell centroid" not in list_legend_texts(figure)
+
+    def test_the_cell_of_a_single_robot_has_no_legend_entry(self):
+        assert "final Voronoi cell" in list_legend_texts(plot_trajectories(record_walk(ROOMS, 2)))
+        assert "final Voronoi cell" not in list_legend_texts(plot_trajectories(record_walk(ROOMS, 1)))
+
+    def test_cells_on_a_density_are_outlines(self):
+        weighted = ROOMS.with_density(Gaussians((Gaussian((1.0, 1.0), weight=4.0, sigma=1.0),)))
+        cells = find_collection(plot_trajectories(record_walk(weighted, 5)).axes[0], PolyCollection)
+        assert len(cells.get_facecolors()) == 0
+        assert len(cells.get_paths()) == 5
+
+    def test_marks_and_numbers_follow_the_size_of_large_robots(self):
+        small = plot_trajectories(record_walk(ROOMS, 3)).axes[0]
+        record = record_walk(ROOMS, 3)
+        large_team = Team.homogeneous(3, radius=5.0 * float(record.team.radius[0]))
+        large = plot_trajectories(replace(record, team=large_team)).axes[0]
+        assert find_marks(large, "o").get_markersize() > 2.0 * find_marks(small, "o").get_markersize()
+
+    def test_titles_contain_changed_gains(self):
+        record = record_walk(ROOMS, 3)
+        changed = replace(record, gains={**record.gains, "k_rep": 2.0})
+        assert list_texts(plot_trajectories(record))[0].startswith("RAPF  ·")
+        assert list_texts(plot_trajectories(changed))[0].startswith("RAPF, k_rep = 2  ·")
 
     def test_a_controller_without_goals_has_no_centroids(self):
         figure = plot_trajectories(record_walk(ROOMS, 5, controller="rpf"))

@@ -241,12 +241,21 @@ def test_moving_obstacles_have_a_path_and_a_legend_entry():
     assert n_paths == 1
 
 
-def test_the_scale_bar_and_a_legend_of_four_entries_are_in_one_line():
-    figure = plot_coverage(build_curves(1), [build_snapshot(ROOMS)])
+@pytest.mark.parametrize("environment", [ROOMS, SHAFT, HALL])
+def test_the_scale_bar_is_below_the_left_edge_of_the_map(environment):
+    figure = plot_coverage(build_curves(1), [build_snapshot(environment)])
+    map_box = figure.axes[-1].get_window_extent()
     (legend,) = figure.legends
-    assert len(legend.get_texts()) == 4
     renderer = figure.canvas.get_renderer()
     legend_box = legend.get_window_extent(renderer)
     scale_bar_box = figure.artists[0].get_window_extent(renderer)
-    assert scale_bar_box.x1 < legend_box.x0
-    assert legend_box.y0 < scale_bar_box.y0 < legend_box.y1
+    assert scale_bar_box.x0 == pytest.approx(map_box.x0)
+    assert scale_bar_box.y1 < map_box.y0
+    assert scale_bar_box.x1 < legend_box.x0 or legend_box.y1 < scale_bar_box.y0
+    assert legend_box.y0 > 0.0
+
+
+def test_curves_next_to_a_tall_map_take_more_than_half_of_the_page():
+    figure = plot_coverage(build_curves(1), [build_snapshot(SHAFT)])
+    curves = next(axes for axes in figure.axes if axes.get_xlabel() == "time (s)")
+    assert curves.get_position().width > 0.5

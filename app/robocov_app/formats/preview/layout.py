@@ -102,7 +102,7 @@ def lay_out_page(
     page = FigurePage((int(width), _MAX_WIDTH_PX), theme, _SCALE)
     wrapped_lines = wrap_lines(page, lines, width - left - margin)
     lines_height = (LINE_HEIGHT_PX * len(wrapped_lines) + _MARGIN_BELOW_LINES_PX) * page.scale
-    height_below = page.measure_footer(handles) + lines_height
+    height_below = page.measure_footer(handles, bar_left=left) + lines_height
     gaps_height = (rows - 1) * _ROW_GAP_PX * page.scale
     height = title_height + rows * (caption_height + arena_height) + gaps_height + height_below
     page = FigurePage((int(width), int(max(height, _MIN_HEIGHT_PX))), theme, _SCALE)

@@ -22,7 +22,7 @@ from robocov_app.figures import arena
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox, to_plot_color
-from robocov_app.look.legend import CELL_CENTROID, GOAL, merge_legends
+from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.assets import ASSETS
 from robocov_app.replication.formatting import format_amount
@@ -37,8 +37,6 @@ NARROW_PX = 1050
 """Widths of two journal columns (7.16 inches) and of one (3.5 inches)."""
 _COST_HEIGHT_PX = 1050
 _COST_MARGINS = CurveMargins(left=34, top=34, bottom=44, right=46)
-_HIDDEN_M = 0.25
-"""Distance within which the disc of a robot hides its goal, on a map of ten meters."""
 _ARRIVED = 0.05
 """A cost counts as settled from the time after which it stays within 5% of its last value."""
 _SAME_COST = 0.0005
@@ -95,18 +93,9 @@ def draw_figure(
     if number in COST_FIGURES:
         return draw_costs(pair, theme)
     records = [run.record for run in pair]
-    with_goals = [record for record in records if arena.has_goals(record)]
-    are_goals_hidden = all(_are_goals_hidden(record) for record in with_goals)
-    hidden_labels = (CELL_CENTROID, GOAL) if are_goals_hidden else ()
     titles = [run.record.label for run in pair]
     costs = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in pair]
-    return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme, hidden_labels)
-
-
-def _are_goals_hidden(record: Record) -> bool:
-    """Return whether, at the end, all robots are so near their goals that their discs hide them."""
-    offsets = record.goals[-1] - record.positions[-1]
-    return bool((np.hypot(*offsets.T) < _HIDDEN_M).all())
+    return draw_side_by_side(records, list(zip(titles, costs, strict=True)), theme)
 
 
 def _get_pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
@@ -239,7 +228,9 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
         *arena.build_map_handles(environment, theme)[1:],
     ]
-    page, (axes,) = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
+    page, boxes = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
+    draw_panel_footer(page, boxes, environment, handles)
+    axes = add_panel_axes(page, boxes[0], environment)
     arena.draw_map(axes, environment, theme)
     cells = partition(positions, environment.region)
     hues = [k % len(theme.robots) for k in range(len(positions))]
@@ -254,12 +245,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
 
 
 @plain_style()
-def draw_side_by_side(
-    records: Sequence[Record],
-    headings: Iterable[tuple[str, str]],
-    theme: Theme,
-    hidden_labels: Sequence[str] = (),
-) -> Figure:
+def draw_side_by_side(records: Sequence[Record], headings: Iterable[tuple[str, str]], theme: Theme) -> Figure:
     """Draw runs on the same map next to each other.
 
     Parameters
@@ -268,8 +254,6 @@ def draw_side_by_side(
     headings : iterable of (str, str)
         Title and final cost above each panel.
     theme : Theme
-    hidden_labels : sequence of str
-        Labels that are left out of the legend.
 
     Returns
     -------
@@ -278,8 +262,9 @@ def draw_side_by_side(
     handles = merge_legends(
         (arena.build_run_handles(record, theme, "paper") for record in records), arena.get_label
     )
-    handles = [handle for handle in handles if arena.get_label(handle) not in hidden_labels]
-    page, panels = build_panels(records[0].environment, len(records), WIDE_PX, handles, theme, above=30.0)
+    environment = records[0].environment
+    page, boxes = build_panels(environment, len(records), WIDE_PX, handles, theme, above=30.0)
+    panels = [add_panel_axes(page, box, environment) for box in boxes]
     for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):
         arena.draw_run(axes, record, theme, "paper")
         box = axes.get_position()
@@ -288,6 +273,7 @@ def draw_side_by_side(
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
         page.write(f"({letter})  {title}", left, top, points=TITLE, bold=True)
         page.write(cost, right, top, points=SMALL, color=theme.faint, align="right")
+    draw_panel_footer(page, boxes, environment, arena.select_drawn(handles, panels))
     return page.figure
 
 
@@ -311,26 +297,26 @@ def build_panels(
     theme: Theme,
     *,
     above: float,
-) -> tuple[FigurePage, list[Axes]]:
-    """Build a page with several axes for the same map in a row, a legend and a scale bar.
+) -> tuple[FigurePage, list[PageBox]]:
+    """Build a page with several boxes for the same map in a row, and space for a legend and a scale bar.
 
     Parameters
     ----------
     environment : Environment
     count : int
-        Number of axes.
+        Number of boxes.
     width : int
         Width of the page, px.
     handles : sequence of Artist
         Handles of the legend.
     theme : Theme
     above : float
-        Space above the axes, px at scale 1.
+        Space above the boxes, px at scale 1.
 
     Returns
     -------
     page : FigurePage
-    panels : list of Axes
+    boxes : list of PageBox
     """
     min_x, min_y, max_x, max_y = environment.region.bounds
     # A first page, of any height, serves to measure the margin and the footer.
@@ -340,6 +326,17 @@ def build_panels(
     top = above * PAGE_SCALE
     page = FigurePage((width, round(top + panel_height + sketch.measure_footer(handles))), theme, PAGE_SCALE)
     lefts = [page.margin + k * (panel_width + page.margin) for k in range(count)]
-    boxes = [PageBox(left, top, panel_width, panel_height) for left in lefts]
-    page.draw_footer(handles, boxes, panel_width / (max_x - min_x))
-    return page, [page.add_map_axes(box, min_x, min_y, max_x, max_y) for box in boxes]
+    return page, [PageBox(left, top, panel_width, panel_height) for left in lefts]
+
+
+def add_panel_axes(page: FigurePage, box: PageBox, environment: Environment) -> Axes:
+    """Add axes for a map in a box of `build_panels`."""
+    return page.add_map_axes(box, *environment.region.bounds)
+
+
+def draw_panel_footer(
+    page: FigurePage, boxes: Sequence[PageBox], environment: Environment, handles: Sequence[Artist]
+) -> None:
+    """Draw the scale bar and a legend below the boxes of `build_panels`."""
+    min_x, _, max_x, _ = environment.region.bounds
+    page.draw_footer(handles, boxes, boxes[0].width / (max_x - min_x))

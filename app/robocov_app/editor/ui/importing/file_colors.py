@@ -20,7 +20,7 @@ from robocov_app.formats.colors import (
     parse_css_color_on_white,
 )
 from robocov_app.formats.foreign_map import Painted, Thumbnail
-from robocov_app.render.camera import Camera
+from robocov_app.render.camera import Box, Camera
 
 MAX_COLORS = 12  # number of colors that are listed; others can be chosen by a click on the picture
 COLOR_TOLERANCE = 24.0  # colors of a picture that differ by at most this in each channel count as one
@@ -72,12 +72,15 @@ class ColorSheet:
             return red, green, blue
         return nearest
 
-    def draw(self, surface: Surface, camera: Camera) -> None:
-        """Draw the file in the view of a camera."""
+    def draw(self, surface: Surface, camera: Camera, bounds: Box) -> None:
+        """Draw the part of the file within bounds, low x, low y, high x and high y, m, in a camera's view."""
         clip = surface.get_clip()
-        view = Rect(camera.view)
-        surface.set_clip(view)
-        surface.fill(WHITE, view)
+        low_x, low_y, high_x, high_y = bounds
+        (left, top), (right, bottom) = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]])).round()
+        # Edges of the map below reach half a line width beyond the bounds.
+        box = Rect(left, top, right - left + 1, bottom - top + 1).inflate(2, 2)
+        surface.set_clip(box)
+        surface.fill(WHITE, box)
         if self.thumbnail is not None:
             _draw_thumbnail(surface, camera, self.thumbnail)
         for shape in self.painted:

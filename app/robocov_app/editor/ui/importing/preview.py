@@ -104,7 +104,7 @@ class ImportPreview:
         def draw_maps() -> Surface:
             picture = _draw_comparison(screen.get_size(), imported.comparison, self.cameras, scale, theme)
             if sheet is not None:
-                sheet.draw(picture, self.cameras[0])
+                sheet.draw(picture, self.cameras[0], imported.comparison.bounds)
             return picture
 
         screen.blit(self._picture.get(imported, look, draw_maps), (0, 0))
