@@ -33,8 +33,8 @@ _FIRST_LINE_PX = 16
 """Distance of the middle of the first line of a message from the top of its box."""
 _MESSAGE_SIDE_PX = 10
 """Minimum distance of a message from the left and right edges of the arena."""
-_MESSAGE_BOTTOM_PX = 1
-"""Distance of a message from the bottom of the arena, where it covers the margin but not the map."""
+_MESSAGE_BOTTOM_PX = 34
+"""Distance of a message from the bottom of the arena, which leaves the strip with the scale bar visible."""
 _TAG_MARGIN_PX = 6
 _TAG_HEIGHT_PX = 20
 _TAG_RADIUS_PX = 4
@@ -207,7 +207,7 @@ def draw_status(
 def draw_message(
     screen: Surface, text: str, arena: Box, theme: Theme, scale: float, *, is_error: bool
 ) -> None:
-    """Draw a message in the margin at the bottom of the arena; nothing if the text is empty.
+    """Draw a message above the strip at the bottom of the arena; nothing if the text is empty.
 
     In an arena that is too narrow for words, the message extends beyond the arena, but not beyond the screen.
 
@@ -227,7 +227,8 @@ def draw_message(
         return
     size = round(_MESSAGE_TEXT_PX * scale)
     left, top, width, height = arena
-    max_width = min(width - 2 * _MESSAGE_SIDE_PX * scale, _MAX_MESSAGE_WIDTH_PX * scale)
+    free_width = width - 2 * (_MESSAGE_SIDE_PX + _MESSAGE_MARGIN_PX) * scale
+    max_width = min(free_width, _MAX_MESSAGE_WIDTH_PX * scale)
     max_width = max(max_width, _MIN_MESSAGE_WIDTH_PX * scale)
     lines: list[str] = []
     for paragraph in text.split("\n"):

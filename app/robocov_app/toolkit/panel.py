@@ -102,7 +102,7 @@ class CommandPanel(CommandPart):
         label : str
             Its text.
         command : str
-            Name of the command. Its title and keys are the tool tip.
+            Name of the command. Its title and keys are the tooltip.
         selected : bool
             Whether it has the accent color.
         small : bool

@@ -1,4 +1,4 @@
-"""Sentence case of messages, tool tips and labels."""
+"""Sentence case of messages, tooltips and labels."""
 
 _PUNCTUATION = ",:;"
 

@@ -129,7 +129,7 @@ def _choose_pitch(tool_count: int, height: float) -> float:
 
 
 def _build_tip(tool: Tool[Any, Any], command: Command) -> str:
-    """Return the tool tip of a tool: its title with its key, and how it is used."""
+    """Return the tooltip of a tool: its title with its key, and how it is used."""
     return f"{tool.title} ({command.key_text})\n{to_sentence_case(tool.hint)}"
 
 

@@ -63,7 +63,7 @@ class WindowPart:
             self.ui.needs_redraw = True
 
     def draw(self, screen: Surface) -> None:
-        """Draw the widgets, the open list and the tool tip."""
+        """Draw the widgets, the open list and the tooltip."""
         self.ui.draw(screen)
         self.ui.draw_overlays(screen)
 

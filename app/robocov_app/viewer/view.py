@@ -31,6 +31,9 @@ class ViewState:
         Whether the window is on a phone, whose page has the buttons of the bar and of the rail.
     is_recording : bool
         Whether a video of the window is being recorded.
+    has_branches : bool
+        Whether the chart shows other branches. They are hidden while a lesson's question is open, because
+        they would give away the answer.
     """
 
     layers: set[str]
@@ -42,6 +45,7 @@ class ViewState:
     is_motion_reduced: bool = False
     is_compact: bool = False
     is_recording: bool = False
+    has_branches: bool = True
 
     def toggle_layer(self, name: str) -> None:
         """Show or hide a layer."""

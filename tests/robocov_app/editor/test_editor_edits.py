@@ -73,7 +73,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     change = create.set_boundary(sketch, ring)
     assert change.sketch.boundary == tuple(ring)
     assert change.selection == Selection(boundary=True)
-    assert change.description == "boundary drawn again"
+    assert change.description == "boundary redrawn"
     change = create.add_disc_start(sketch, (2.0, 2.0), 0.5)
     assert change.sketch.starts[-1] == ("start", DiscStart((2.0, 2.0), 0.5))
     change = create.add_disc_start(change.sketch, (2.0, 2.0), 0.5)

@@ -75,9 +75,9 @@ def test_each_force_is_described_with_its_cause():
     assert list_texts(report) == [
         "at (2.00, 4.00) m, 0.20 m/s east",
         "pulled with 0.31 N toward its goal, 3.0 m away",
-        "pushed with 0.12 N by robot 7, 80 cm west (2 robots in range)",
-        "pushed with 0.30 N by the obstacle, 42 cm south",
-        "held back with 0.40 N by viscosity",
+        "repelled with 0.12 N by robot 7, 80 cm west (2 robots in range)",
+        "repelled with 0.30 N by the obstacle, 42 cm south",
+        "slowed with 0.40 N by viscosity",
         "resultant of these forces 0.30 N north",
         "32 cm clear of the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
@@ -90,7 +90,7 @@ def test_each_force_is_described_with_its_cause():
 def test_robots_at_similar_distances_are_named_together():
     report = build_report([[4, 4], [3, 4], [4, 5.2], [4, 0.5]], repulsion_robots=[[0.3, -0.2], *[[0, 0]] * 3])
     pushed = (
-        "pushed with 0.36 N southeast by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
+        "repelled southeast with 0.36 N by robot 2, 1.0 m west and robot 3, 1.2 m north (3 robots in range)"
     )
     assert get_line(report, "repulsion_robots").text == pushed
 
@@ -107,7 +107,7 @@ def test_robots_at_similar_distances_are_named_together():
 def test_an_obstacle_is_named_by_its_kind(point, name):
     position = np.array(point) - [0.5, 0.0]
     report = build_report([position], points=[point], environment=ROOMS, repulsion_obstacle=[[-1.0, 0.0]])
-    assert get_line(report, "repulsion_obstacle").text == f"pushed with 1.0 N by {name}, 50 cm east"
+    assert get_line(report, "repulsion_obstacle").text == f"repelled with 1.0 N by {name}, 50 cm east"
 
 
 @pytest.mark.parametrize(
@@ -144,17 +144,18 @@ def test_two_balancing_forces_are_named():
         swarm_cohesion=[[0.001, 0]],
     )
     assert report.verdict == "at rest, stuck: its goal is 2.6 m away, behind an obstacle"
-    assert "stuck: the pull to its goal (0.31 N) and the push of the obstacle (0.30 N) balance" in list_texts(
-        report
+    assert (
+        "stuck: the pull to its goal (0.31 N) and the repulsion of the obstacle (0.30 N) balance"
+        in list_texts(report)
     )
-    assert "pushed with 1 mN east by swarm cohesion" in list_texts(report)
+    assert "pushed east with 1 mN by swarm cohesion" in list_texts(report)
 
 
 def test_three_balancing_forces_are_named():
     forces = {"attraction": [[0, 1]], "repulsion_obstacle": [[0.87, -0.5]], "wind": [[-0.87, -0.5]]}
     report = build_report([[3, 3]], goals=[[3, 5]], **forces)
     assert report.verdict == "at rest 2.0 m short of its goal: the forces balance"
-    balance = "the pull to its goal (1.0 N) and the push of obstacles (1.0 N) and wind (1.0 N) balance"
+    balance = "the pull to its goal (1.0 N) and the repulsion of obstacles (1.0 N) and wind (1.0 N) balance"
     assert balance in list_texts(report)
 
 
@@ -163,6 +164,8 @@ def test_a_robot_pressed_against_an_obstacle_is_held_by_it():
     report = build_report([[3.9, 5]], points=[[4, 5]], **east)
     assert report.verdict == "at rest, stuck: its goal is 1.1 m away, behind an obstacle"
     assert "stuck: the pull to its goal (10 N) presses it against the obstacle" in list_texts(report)
+    resultant = "resultant of these forces 10 N east, opposed by the obstacle"
+    assert get_line(report, "resultant").text == resultant
     assert "touches the obstacle east of it" in list_texts(report)
     assert "acceleration limited to 2.0 m/s² (the forces ask for 10 m/s²)" in list_texts(report)
     blind = build_report([[3.9, 5]], sensing_range=0.05, **east)
@@ -297,11 +300,11 @@ def test_a_goal_at_the_centroid_is_named():
 
 def test_unexplained_forces_are_described():
     calm = build_report([[4, 4]], forces=[[1.0, 0.0]])
-    assert get_line(calm, UNEXPLAINED_FORCE).text == "pushed with 1.0 N east by its controller"
+    assert get_line(calm, UNEXPLAINED_FORCE).text == "pushed east with 1.0 N by its controller"
     windy = build_report([[4, 4]], forces=[[1.0, 0.0]], wind=[[0.0, 0.5]])
     assert (
         get_line(windy, UNEXPLAINED_FORCE).text
-        == "pushed with 1.1 N southeast by other forces of its controller"
+        == "pushed southeast with 1.1 N by other forces of its controller"
     )
     for report in (calm, windy):
         assert_forces_sum_up(report)
@@ -331,11 +334,11 @@ def test_a_force_that_is_not_finite_is_reported():
 
 def test_braking_before_the_goal_is_not_described_as_a_pull():
     report = build_report([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
-    assert get_line(report, "attraction").text == "slowed by 3.0 N west on the way to its goal, 20 cm away"
+    assert get_line(report, "attraction").text == "braked with 3.0 N on the way to its goal, 20 cm away"
     assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
     aside = build_report([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
     assert (
-        get_line(aside, "attraction").text == "pulled with 1.4 N northeast on the way to its goal, 2.0 m away"
+        get_line(aside, "attraction").text == "pulled northeast with 1.4 N on the way to its goal, 2.0 m away"
     )
 
 

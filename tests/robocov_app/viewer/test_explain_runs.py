@@ -19,7 +19,7 @@ from robocov_app.viewer.explanation.situation import UNEXPLAINED_FORCE
 @pytest.mark.parametrize(
     ("controller", "reason"),
     [
-        (Rapf(), "stuck: the pull to its centroid (2.0 N) and the push of the wall (2.0 N) balance"),
+        (Rapf(), "stuck: the pull to its centroid (2.0 N) and the repulsion of the wall (2.0 N) balance"),
         (Lloyd(), "stuck: the pull to its centroid (10 N) presses it against the wall"),
     ],
 )
@@ -66,7 +66,7 @@ def test_a_single_robot_that_senses_nothing():
     assert explain_run(simulation, 2.0)[0].verdict == "moving 0.98 m/s northeast to its centroid"
     (report,) = explain_run(simulation, 60.0)
     assert report.verdict == "arrived: at rest on its centroid"
-    assert {"no robot in communication range", "senses nothing within 50 cm", "not pushed by robots"} < {
+    assert {"no robot in communication range", "senses nothing within 50 cm", "not repelled by robots"} < {
         *list_texts(report)
     }
 

@@ -123,7 +123,25 @@ def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
 
 
-def test_the_run_before_a_comparison_goes_on_until_a_controller_is_chosen(driver: Driver) -> None:
+@pytest.mark.parametrize("key", ["f1", "k"])
+def test_a_run_waits_while_a_page_or_list_covers_the_map(key: str, driver: Driver) -> None:
+    driver.session.playback.is_playing = True
+    driver.run_frames(10)
+    driver.press_key(key)
+    time = driver.session.displayed.time
+    driver.run_frames(10)
+    assert driver.session.displayed.time == time
+    driver.press_key("escape")
+    driver.run_frames(10)
+    assert driver.session.displayed.time > time
+    driver.session.playback.is_playing = False
+    driver.press_key(key)
+    driver.press_key("escape")
+    driver.run_frames(10)
+    assert not driver.session.playback.is_playing
+
+
+def test_the_run_before_a_comparison_stays_until_a_controller_is_chosen(driver: Driver) -> None:
     driver.session.playback.is_playing = True
     driver.run_frames(30)
     time = driver.session.displayed.time

@@ -38,6 +38,16 @@ def small_window(tmp_path: Path) -> Iterator[Driver]:
         yield driver
 
 
+@pytest.mark.parametrize("column_count", [1, 2, 3, 4])
+def test_two_commands_follow_each_heading_in_its_column(column_count: int, small_window: Driver) -> None:
+    window = small_window.window
+    lines = help_page._list_lines(window.commands.commands, window.groups)
+    cells = help_page._place_lines(lines, column_count)
+    for heading, first, second in zip(cells, cells[1:], cells[2:], strict=False):
+        if isinstance(heading.line, str):
+            assert heading.column == first.column == second.column, heading.line
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("size", "scale"), SIZES)
 def test_all_keys_are_shown_in_readable_text(

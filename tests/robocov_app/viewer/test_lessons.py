@@ -365,6 +365,39 @@ def test_a_lesson_can_be_paused_left_and_resumed(tmp_path: Path) -> None:
         assert lesson.number == 0
 
 
+def test_curves_of_branches_are_hidden_while_a_question_is_open(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        guide = driver.window.lesson
+        guide.is_unattended = False
+        guide.start(write_short_lesson(tmp_path, task=None))
+        driver.press_key("right")
+        assert guide.player is not None
+        for _ in range(2):
+            driver.run_frames(1)
+            assert not driver.window.chart.ghosts
+            driver.press_key("2")
+            driver.run_frames(30)
+            assert guide.player.state == "ended"
+            guide.player.go_to(1)
+        # The user takes over, and sees the curve of the chapter that has just been played.
+        driver.press_key("f2")
+        driver.run_frames(10)
+        assert driver.window.chart.ghosts
+
+
+@pytest.mark.parametrize("command", ["share", "share:command", "share:copy", "screenshot"])
+def test_a_lesson_continues_after_sharing(command: str, tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        driver.window.do(command)
+        driver.window.dialogs.close()
+        assert driver.window.lesson.shown is not None
+        time = driver.session.displayed.time
+        driver.run_frames(10)
+        assert driver.session.displayed.time > time
+
+
 def test_answers_and_chapters_are_clicked(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pygame
+import pytest
 from driven_window import open_viewer
 from hypothesis import given
 from hypothesis import strategies as st
 from sample_sessions import RAPF
 
 from robocov_app.look.theme import LIGHT
+from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import draw_message, wrap_text
 from robocov_app.toolkit.window.layout import Box
@@ -48,6 +50,19 @@ def test_a_long_message_is_wrapped_within_the_arena(tmp_path: Path) -> None:
         assert columns.max() < left + width
         assert rows.min() > top
         assert rows.max() < top + height
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
+def test_a_message_leaves_the_scale_bar_and_the_status_of_the_map_visible(
+    size: tuple[int, int], tmp_path: Path
+) -> None:
+    with open_viewer(tmp_path, size=size) as driver:
+        left, top, width, height = driver.window.layout.arena
+        strip = pygame.Rect(left, top + height - int(STRIP_HEIGHT_PX), width, int(STRIP_HEIGHT_PX))
+        before = copy_pixels(driver.window.screen.subsurface(strip)).copy()
+        driver.viewer.show_message("many words " * 20)
+        driver.run_frames(1)
+        assert np.array_equal(copy_pixels(driver.window.screen.subsurface(strip)), before)
 
 
 def test_a_long_report_is_scrolled_to_its_end_by_the_wheel(tmp_path: Path) -> None:

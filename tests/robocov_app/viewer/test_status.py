@@ -11,6 +11,7 @@ from robocov.mapfile import load_map
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.scenario import SessionScenario
 from robocov_app.viewer.window.status import describe_cursor, list_facts
 
@@ -30,6 +31,11 @@ def test_the_status_line_contains_time_cost_and_speed(viewer: Presenter) -> None
     assert facts[1].startswith("J = ")
     assert facts[1].endswith(" m³")
     assert facts[-3:] == ["1×", "60 steps/s", "60 fps"]
+
+
+def test_the_cost_in_the_status_line_names_its_controller_if_there_are_several(viewer: Presenter) -> None:
+    viewer.session.add_pane(ControllerChoice("lloyd"))
+    assert list_facts(viewer, 60.0, 60.0, None)[1].startswith("RAPF: J = ")
 
 
 def test_an_old_cost_is_shown_with_its_time(viewer: Presenter) -> None:

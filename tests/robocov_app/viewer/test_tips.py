@@ -1,4 +1,4 @@
-"""Tool tips of the tool rail and of parameters, with and without a sketch."""
+"""Tooltips of the tool rail and of parameters, with and without a sketch."""
 
 from __future__ import annotations
 

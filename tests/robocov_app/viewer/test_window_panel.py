@@ -1,4 +1,4 @@
-"""The window, used by mouse and keys: the panel, its menus, fields and tool tips."""
+"""The window, used by mouse and keys: the panel, its menus, fields and tooltips."""
 
 from __future__ import annotations
 
@@ -367,7 +367,7 @@ def test_the_panel_does_not_depend_on_earlier_sizes_and_panes(tmp_path: Path) ->
         assert np.array_equal(draw_panel(driver), expected)
 
 
-# tool tips
+# tooltips
 
 
 def test_tool_tips_show_the_action_and_its_key(driver: Driver) -> None:

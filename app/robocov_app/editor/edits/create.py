@@ -69,7 +69,7 @@ def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
 
 def set_boundary(sketch: Sketch, points: Sequence[Point]) -> Change:
     """Set or replace the boundary, and select it."""
-    description = "boundary drawn again"
+    description = "boundary redrawn"
     if sketch.boundary is None:
         description = "boundary drawn"
     boundary = _build_outline(points, "a boundary")

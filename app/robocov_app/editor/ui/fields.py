@@ -29,7 +29,7 @@ class PanelField:
     write : callable
         Takes the editor and the typed text, and applies it. Raises MapError if the text is invalid.
     tip : str
-        Tool tip.
+        Tooltip.
     """
 
     read: Callable[[Editor], str]

@@ -23,7 +23,7 @@ class Fact(NamedTuple):
     text : str
         Value of the fact; "…" if the map has not been measured yet.
     tip : str
-        Tool tip.
+        Tooltip.
     """
 
     label: str

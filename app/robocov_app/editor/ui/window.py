@@ -108,7 +108,7 @@ class EditorWindow(CommandWindow):
     pointer : EditorPointer
         The mouse over the map.
     play_mode : PlayMode
-        Shows the viewer in this window to try the map.
+        Shows the viewer in this window to test the map.
     team_preview : TeamPreview
         Shows the team at a start.
     field_focus : FieldFocus

@@ -1,4 +1,4 @@
-"""Commands: one table for each window. Keys, menus, buttons, help, tool tips and palette come from it."""
+"""Commands: one table for each window. Keys, menus, buttons, help, tooltips and palette come from it."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -40,7 +40,7 @@ class Command:
     name : str
         Unique name: the word that is typed for a command with an argument, otherwise as in "save:run".
     title : str
-        Text in menus, tool tips and help.
+        Text in menus, tooltips and help.
     group : str
         Heading in the help.
     run : callable
@@ -73,7 +73,7 @@ class Command:
 
     @property
     def tip(self) -> str:
-        """Title and keys, for a tool tip."""
+        """Title and keys, for a tooltip."""
         keys = " or ".join(format_key(key) for key in self.keys)
         if not keys:
             return self.title

@@ -50,8 +50,8 @@ _TITLE_STRENGTH = 0.8
 """Fraction of the color of text in the titles of commands."""
 _KNOB_STRENGTH = 0.35
 """Fraction of the color of text in the scroll bar."""
-_HEADING_ROWS = 2.6
-"""Rows that must be free for a heading, so that it is never the last line of a column."""
+_HEADING_ROWS = 3.5
+"""Rows that must be free for a heading, so that at least two commands follow it in its column."""
 
 _LINE_KEYS = {"up": -1.0, "down": 1.0}
 """Number of rows by which a key scrolls the page."""

@@ -70,7 +70,7 @@ def show_button(
     key : str, optional
         By default the text.
     tip : str
-        Tool tip.
+        Tooltip.
     disabled_reason : str
         Why it cannot be pressed; empty if it can.
     selected : bool
@@ -208,7 +208,7 @@ def show_check_box(page: Page, text: str, *, value: bool, key: str = "", tip: st
     key : str, optional
         By default the text.
     tip : str
-        Tool tip.
+        Tooltip.
 
     Returns
     -------

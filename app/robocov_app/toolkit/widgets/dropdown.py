@@ -43,7 +43,7 @@ def show_dropdown(page: Page, key: str, options: Sequence[str], value: str, *, t
     value : str
         The current option, shown while the list is closed.
     tip : str
-        Tool tip.
+        Tooltip.
 
     Returns
     -------

@@ -55,7 +55,7 @@ def show_icon_button(
         Name of the button.
     key : str
     tip : str
-        Tool tip.
+        Tooltip.
     disabled_reason : str
         Why it cannot be pressed; empty if it can.
     selected : bool

@@ -39,13 +39,13 @@ def show_label(
     style : str
         "header" (small, bold, gray), "unit" (small, gray), "bold", or empty for normal text.
     tip : str
-        Tool tip.
+        Tooltip.
     align : str
         "left", "center" or "right".
     note : str
         Small gray text after a text at the left, shown if there is space for it.
     sketch : TipSketch, optional
-        Drawing in the tool tip.
+        Drawing in the tooltip.
     """
     rect = page.cell()
     page.add_widget(Widget("label", key or text, rect, text, tip=tip, sketch=sketch))

@@ -30,7 +30,7 @@ _MAX_RUNS = 3
 
 @dataclass
 class Widget:
-    """A widget as it appeared in the last run, for tool tips, the focus and tests.
+    """A widget as it appeared in the last run, for tooltips, the focus and tests.
 
     Attributes
     ----------
@@ -43,10 +43,10 @@ class Widget:
     text : str
     value : object
     tip : str
-        Tool tip; if it has several lines, the first one is its title.
+        Tooltip; if it has several lines, the first one is its title.
     enabled : bool
     sketch : TipSketch or None
-        Drawing in the tool tip.
+        Drawing in the tooltip.
     """
 
     kind: str
@@ -229,7 +229,7 @@ class Page(RowLayout):
         self._runs_again = True
 
     def draw_overlays(self, screen: Surface) -> None:
-        """Draw the open list and the tool tip, which may be larger than the page."""
+        """Draw the open list and the tooltip, which may be larger than the page."""
         if self.open_list is not None:
             self.open_list.draw(screen, self.theme, self.scale)
         widget = next((widget for widget in self.find_hovered_widgets() if widget.tip), None)
@@ -305,7 +305,7 @@ class Page(RowLayout):
         widget : Widget
             The widget. Its rectangle is clipped to the visible part.
         disabled_reason : str
-            Why the widget is disabled, which is appended to its tool tip; empty if it is enabled.
+            Why the widget is disabled, which is appended to its tooltip; empty if it is enabled.
         """
         if widget.key == self.focus:
             self.focused_rect = widget.rect.copy()

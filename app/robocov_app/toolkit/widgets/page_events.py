@@ -44,7 +44,7 @@ class PageEvents:
         return handler is not None and handler(event)
 
     def _handle_motion(self, event: pygame.event.Event) -> bool:
-        """Handle a move of the mouse: restart the tool tip, or run the page while a widget is dragged."""
+        """Handle a move of the mouse: restart the tooltip, or run the page while a widget is dragged."""
         page = self._page
         page.pointer = event.pos
         if page.open_list is not None:

@@ -90,7 +90,7 @@ def show_slider(
     step : float
         Spacing of the possible values; 0 if any value is possible.
     tip : str
-        Tool tip.
+        Tooltip.
     disabled_reason : str
         Why it cannot be moved; empty if it can.
 

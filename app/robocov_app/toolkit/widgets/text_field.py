@@ -47,7 +47,7 @@ def show_text_field(
     placeholder : str
         Faint text in the empty field.
     tip : str
-        Tool tip.
+        Tooltip.
     live : bool
         Whether to return every change, rather than only the text that is confirmed with Enter.
 

@@ -1,4 +1,4 @@
-"""Tool tips: short texts, some with a drawing, that appear when the mouse rests on a widget."""
+"""Tooltips: short texts, some with a drawing, that appear when the mouse rests on a widget."""
 
 from collections.abc import Callable
 from time import perf_counter
@@ -12,10 +12,10 @@ from robocov_app.render.fonts import measure_text, render_text
 from robocov_app.toolkit.overlay import draw_rounded_box, wrap_text
 
 TIP_DELAY_S = 0.6
-"""Time for which the mouse must rest before a tool tip appears."""
+"""Time for which the mouse must rest before a tooltip appears."""
 
 TIP_TEXT_COLOR: Color = (245, 247, 250)
-"""Tool tips are light on dark in both themes."""
+"""Tooltips are light on dark in both themes."""
 # Lengths in pixels at scale 1.
 _TEXT_PX = 11.0
 _LINE_PX = 16.0
@@ -32,7 +32,7 @@ _LIGHT_FILL_STRENGTH = 0.92
 _EDGE_STRENGTH = 0.24
 
 TipSketch: TypeAlias = Callable[[float], Surface]
-"""Function that renders a drawing for a tool tip, with premultiplied alpha, at a scale."""
+"""Function that renders a drawing for a tooltip, with premultiplied alpha, at a scale."""
 
 
 TipSide: TypeAlias = Literal["below", "left", "right"]
@@ -40,14 +40,14 @@ TipSide: TypeAlias = Literal["below", "left", "right"]
 
 
 class _Line(NamedTuple):
-    """A line of a tool tip."""
+    """A line of a tooltip."""
 
     text: str
     is_title: bool
 
 
 class ToolTip:
-    """Decides when the tool tip of a widget is due.
+    """Decides when the tooltip of a widget is due.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def draw_tool_tip(
     side: TipSide = "below",
     sketch: TipSketch | None = None,
 ) -> None:
-    """Draw a tool tip next to a widget, where it covers neither the widget nor its neighbors.
+    """Draw a tooltip next to a widget, where it covers neither the widget nor its neighbors.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from robocov_app.toolkit.window.window_display import WindowDisplay
 FPS = 60
 """Frames per second on a screen while something moves."""
 IDLE_S = 0.8
-"""Time without changes after which the loop waits for events; longer than the delay of tool tips."""
+"""Time without changes after which the loop waits for events; longer than the delay of tooltips."""
 MAX_WAIT_S = 0.1
 """Maximum time between two checks for changes while the loop waits."""
 

@@ -58,7 +58,7 @@ class LayerBar(BasicFocusGroup):
     view : ViewState
         Visible layers.
     commands : CommandTable
-        Commands of the window, for tool tips and keys.
+        Commands of the window, for tooltips and keys.
     run_command : callable
         Runs a command by its name.
 
@@ -343,7 +343,7 @@ class LayerBar(BasicFocusGroup):
         self.focus = None
 
     def _draw_tool_tip(self, screen: Surface) -> None:
-        """Draw the tool tip of the chip under the mouse once it is due."""
+        """Draw the tooltip of the chip under the mouse once it is due."""
         if not self._hovered or not self._tool_tip.is_due or not pygame.display.get_init():
             return
         for chip, box in [*self.chips, *self.rows]:
@@ -365,7 +365,7 @@ def _get_id(chip: Chip) -> str:
 
 
 def _describe_chip(chip: Chip, tip: str) -> str:
-    """Return the tool tip of a chip: the effect of a click, and the key."""
+    """Return the tooltip of a chip: the effect of a click, and the key."""
     if chip.kind in ("layer", "row"):
         verb = "Hide" if chip.is_on else "Show"
         return f"{verb}: {tip}"

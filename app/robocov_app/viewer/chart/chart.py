@@ -130,7 +130,13 @@ class Chart:
 
     @property
     def _frame(self) -> ChartFrame:
-        return ChartFrame(self.layout, self.theme, self.viewer.session, self.quantity)
+        return ChartFrame(
+            self.layout,
+            self.theme,
+            self.viewer.session,
+            self.quantity,
+            has_branches=self.viewer.view.has_branches,
+        )
 
     def switch_quantity(self) -> str:
         """Show the other quantity, and return the status message."""
@@ -200,7 +206,8 @@ class Chart:
         key = (
             tuple(pane.number for pane in timeline.panes),
             len(timeline.events),
-            len(timeline.ghosts),
+            len(frame.ghosts),
+            frame.has_branches,
             len(timeline.document.nodes),
             timeline.head.number,
             frame.times,
@@ -225,7 +232,9 @@ class Chart:
         self._page_time = self.viewer.now
         curves = [curve.values for curve in frame.list_curves()]
         ghosts = [ghost.values for ghost in frame.list_ghosts()]
-        self._branch_lines = list_branch_lines(frame.timeline) if self._has_curves else []
+        self._branch_lines = []
+        if self._has_curves and frame.has_branches:
+            self._branch_lines = list_branch_lines(frame.timeline)
         tree_height = measure_tree(len(self._branch_lines))
         scale = build_chart_scale(frame.times, layout, curves + ghosts, tree_height)
         self._scale = scale

@@ -24,12 +24,15 @@ class ChartFrame:
     theme : Theme
     session : Session
     quantity : PlottedQuantity
+    has_branches : bool
+        Whether other branches are shown.
     """
 
     layout: Layout
     theme: Theme
     session: Session
     quantity: PlottedQuantity
+    has_branches: bool = True
 
     @property
     def scale(self) -> float:
@@ -44,7 +47,12 @@ class ChartFrame:
     @property
     def times(self) -> TimeScale:
         """The time axis, in pixels of the window."""
-        return build_time_scale(self.layout, self.timeline, self.theme.small_text)
+        return build_time_scale(self.layout, self.timeline, self.ghosts, self.theme.small_text)
+
+    @property
+    def ghosts(self) -> list[GhostCurve]:
+        """Curves of other branches, for all quantities; empty if they are hidden."""
+        return self.timeline.ghosts if self.has_branches else []
 
     def list_curves(self) -> list[Curve]:
         """Return the curve of each pane."""
@@ -52,7 +60,7 @@ class ChartFrame:
 
     def list_ghosts(self) -> list[GhostCurve]:
         """Return the curves of other branches, for the plotted quantity."""
-        return [ghost for ghost in self.timeline.ghosts if ghost.quantity == self.quantity.name]
+        return [ghost for ghost in self.ghosts if ghost.quantity == self.quantity.name]
 
     def draw_rule(self, surface: pygame.Surface, column: float, color: Color, *, top: int) -> None:
         """Draw a vertical line across the chart, whose upper edge is at row `top` of the surface."""

@@ -10,6 +10,7 @@ from robocov_app.look.axes import Axis, choose_growing_time_limit, choose_growin
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.window.layout import Layout
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.curves import GhostCurve
 from robocov_app.viewer.session.timeline import Timeline
 
 LEFT_PX = 52
@@ -61,7 +62,9 @@ class TimeScale:
         return (column - self.left) / max(self.width, 1.0) * self.end
 
 
-def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> TimeScale:
+def build_time_scale(
+    layout: Layout, timeline: Timeline, ghosts: Sequence[GhostCurve], text_size: float
+) -> TimeScale:
     """Build the time axis, which ends somewhat after the latest time of all curves.
 
     Parameters
@@ -69,6 +72,8 @@ def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> Ti
     layout : Layout
         Layout of the window.
     timeline : Timeline
+    ghosts : sequence of GhostCurve
+        Curves of other branches.
     text_size : float
         Size of the captions at scale 1.
 
@@ -83,7 +88,7 @@ def build_time_scale(layout: Layout, timeline: Timeline, text_size: float) -> Ti
     elif len(timeline.panes) > 1:
         names_width = _measure_captions(timeline.panes, round(text_size * layout.scale))
         caption_width = min(names_width + 20 * layout.scale, _MAX_NAMES_FRACTION * width)
-    ghost_ends = [float(ghost.times[-1]) for ghost in timeline.ghosts]
+    ghost_ends = [float(ghost.times[-1]) for ghost in ghosts]
     end = choose_growing_time_limit(max([timeline.end_time, *ghost_ends]))
     return TimeScale(left + LEFT_PX * layout.scale, left + width - caption_width, end)
 

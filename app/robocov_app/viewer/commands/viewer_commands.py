@@ -1,4 +1,4 @@
-"""Commands of the viewer that need no window, with the keys and texts for buttons, tool tips and help."""
+"""Commands of the viewer that need no window, with the keys and texts for buttons, tooltips and help."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -189,8 +189,8 @@ def _list_edit_commands(viewer: Presenter) -> list[Command]:
     group.add("duplicate", "Duplicate selected obstacle", viewer.selection.duplicate, "ctrl+d")
     group.add("finish", "Finish drawing", viewer.finish_drawing, "return", "enter")
     group.add("cancel", "Cancel", viewer.cancel, "escape")
-    group.add("wider", "Wider walls; a larger brush", enlarge, "]", repeats=True)
-    group.add("narrower", "Narrower walls; a smaller brush", shrink, "[", repeats=True)
+    group.add("wider", "Wider wall or brush", enlarge, "]", repeats=True)
+    group.add("narrower", "Narrower wall or brush", shrink, "[", repeats=True)
     group.add("robot", "Inspect a robot", robots.select, argument=robot_argument)
     return group.commands
 

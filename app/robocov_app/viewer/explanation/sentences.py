@@ -27,6 +27,7 @@ _FAST_ACCELERATION = 1.001  # fraction of the maximum acceleration above which t
 _FULL_SPEED = (0.995, 1.005)  # fractions of the maximum speed between which a robot is at that speed
 _MAX_LISTED_RANGE_M = 1e100
 
+_REPULSIONS = ("repulsion_robots", "repulsion_obstacle")
 _FORCE_NAMES = {
     "repulsion_robots": "robots",
     "repulsion_obstacle": "obstacles",
@@ -73,13 +74,15 @@ def list_force_lines(situation: RobotSituation) -> list[ReportLine]:
         lines.append(_build_force_line(describe(situation, kind, force), kind, force))
     if situation.viscosity > 0.0:
         drag = abs(situation.drag)
-        text = "no viscous drag"
+        text = "not slowed by viscosity"
         if drag >= MIN_FORCE_N:
-            text = f"held back with {format_force(drag)} by viscosity"
+            text = f"slowed with {format_force(drag)} by viscosity"
         lines.append(_build_force_line(text, "viscosity", situation.drag))
     size = abs(situation.resultant)
     direction = format_direction(situation.resultant) if size >= MIN_FORCE_N else ""
     text = f"resultant of these forces {format_force(size)} {direction}".rstrip()
+    if situation.holding_names:
+        text += f", opposed by {situation.holding_names}"
     lines.append(_build_force_line(text, "resultant", situation.resultant))
     return lines
 
@@ -99,11 +102,11 @@ def _describe_attraction(situation: RobotSituation, kind: str, force: complex) -
     if abs(force) < MIN_FORCE_N:
         text = "not pulled toward"
     elif alignment < 0.0:
-        text = f"slowed by {size} {direction} on the way to"
+        text = f"braked with {size} on the way to"
     elif alignment > _STRAIGHT_ALIGNMENT:
         text = f"pulled with {size} toward"
     else:
-        text = f"pulled with {size} {direction} on the way to"
+        text = f"pulled {direction} with {size} on the way to"
     return f"{text} {goal.name}, {goal.distance_text}"
 
 
@@ -117,8 +120,8 @@ def _describe_robot_repulsion(situation: RobotSituation, kind: str, force: compl
     names = " and ".join(neighbor.position_text for neighbor in nearest)
     source = f"{names} ({format_robot_count(len(neighbors))} in range)"
     if len(nearest) == 1 and compute_alignment(force, nearest[0].offset) < -_STRAIGHT_ALIGNMENT:
-        return f"pushed with {format_force(abs(force))} by {source}"
-    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
+        return f"repelled with {format_force(abs(force))} by {source}"
+    return f"repelled {format_direction(force)} with {format_force(abs(force))} by {source}"
 
 
 def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: complex) -> str:
@@ -127,10 +130,10 @@ def _describe_obstacle_repulsion(situation: RobotSituation, kind: str, force: co
         return _describe_push(situation, kind, force)
     source = obstacle.position_text
     if abs(force) < MIN_FORCE_N:
-        return f"not pushed by {source}"
+        return f"not repelled by {source}"
     if compute_alignment(force, obstacle.offset) < -_STRAIGHT_ALIGNMENT:
-        return f"pushed with {format_force(abs(force))} by {source}"
-    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
+        return f"repelled with {format_force(abs(force))} by {source}"
+    return f"repelled {format_direction(force)} with {format_force(abs(force))} by {source}"
 
 
 def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
@@ -138,9 +141,10 @@ def _describe_push(situation: RobotSituation, kind: str, force: complex) -> str:
     source = _name_force(kind)
     if kind == UNEXPLAINED_FORCE and len(situation.forces) > 1:
         source = "other forces of its controller"
+    verb = "repelled" if kind in _REPULSIONS else "pushed"
     if abs(force) < MIN_FORCE_N:
-        return f"not pushed by {source}"
-    return f"pushed with {format_force(abs(force))} {format_direction(force)} by {source}"
+        return f"not {verb} by {source}"
+    return f"{verb} {format_direction(force)} with {format_force(abs(force))} by {source}"
 
 
 _FORCE_DESCRIPTIONS: dict[str, Callable[[RobotSituation, str, complex], str]] = {
@@ -209,9 +213,9 @@ def _name_force_with_size(situation: RobotSituation, kind: str) -> str:
     if kind == "attraction" and situation.goal is not None:
         name = f"the pull to {situation.goal.name}"
     elif kind == "repulsion_obstacle" and situation.obstacle is not None:
-        name = f"the push of {situation.obstacle.name}"
-    elif kind in ("repulsion_obstacle", "repulsion_robots"):
-        name = f"the push of {name}"
+        name = f"the repulsion of {situation.obstacle.name}"
+    elif kind in _REPULSIONS:
+        name = f"the repulsion of {name}"
     return f"{name} ({format_force(abs(situation.forces[kind]))})"
 
 

@@ -499,6 +499,6 @@ def _load_label(name: str) -> str:
 
 
 def _build_tip(parameter: Parameter, unit: str = "") -> str:
-    """Return the tool tip of a parameter: its name and symbol as the title, its meaning and its unit."""
+    """Return the tooltip of a parameter: its name and symbol as the title, its meaning and its unit."""
     meaning = f"{parameter.meaning} ({unit})" if unit else parameter.meaning
     return f"{parameter.label} ({parameter.symbol})\n{meaning[:1].upper()}{meaning[1:]}"

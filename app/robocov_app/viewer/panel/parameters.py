@@ -136,7 +136,7 @@ class NumberParameter:
     unit : str
         Unit; empty for none.
     meaning : str
-        Meaning of the parameter, for the tool tip.
+        Meaning of the parameter, for the tooltip.
     value, default : float or None
         Current and default value; None for no limit.
     low, high : float

@@ -1,4 +1,4 @@
-"""Sketches in tool tips of parameters: the same scene with a small and with a large value."""
+"""Sketches in tooltips of parameters: the same scene with a small and with a large value."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -14,7 +14,7 @@ from robocov_app.render.fonts import render_text
 from robocov_app.render.surface_cache import cache_surfaces
 from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, TipSketch
 
-# Tool tips are light on dark in both themes.
+# Tooltips are light on dark in both themes.
 _FAINT: Color = (158, 169, 186)
 _OBSTACLE: Color = (104, 117, 138)
 _ROBOT: Color = (255, 190, 92)

@@ -26,6 +26,8 @@ class Playback:
         Whether the session plays rather than pauses.
     stop_when_settled : bool
         Whether to pause when the team has settled.
+    is_suspended : bool
+        Whether playing waits until a dialog or page that covers the map is closed.
     """
 
     def __init__(self, timeline: Timeline) -> None:
@@ -33,6 +35,7 @@ class Playback:
         self.clock = Clock(timeline.scenario.dt)
         self.is_playing = True
         self.stop_when_settled = False
+        self.is_suspended = False
 
     @property
     def seek_seconds(self) -> float:
@@ -62,7 +65,7 @@ class Playback:
         if self._timeline.is_seeking:
             self._timeline.continue_seek(SEEK_SLICE_S)
             return 0
-        if not self.is_playing:
+        if not self.is_playing or self.is_suspended:
             return 0
         self.clock.dt = self._timeline.scenario.dt
         return self.clock.advance(seconds, self._play_step)

@@ -15,6 +15,8 @@ OBSTACLE_COMMANDS = ("duplicate", "delete")
 FLOOR_COMMANDS = ("robot:add", "", "undo", "redo", "", "fit")
 SHARE_COMMANDS = ("share:copy", "screenshot", "video", "", "share:command", "share:python")
 LINK_COMMAND = "share:link"
+COMMANDS_OF_SHARE_MENU = frozenset({"share", LINK_COMMAND, *SHARE_COMMANDS} - {""})
+"""The command that opens the share menu, and those in it; a lesson continues after them."""
 
 
 class WindowMenus:

@@ -48,7 +48,10 @@ def list_facts(
     facts = [f"{paused}t = {time:.2f} s"]
     known_cost = viewer.costs.known.get(viewer.pane.number)
     if known_cost is not None:
-        facts += _list_cost_facts(known_cost, time)
+        cost_facts = _list_cost_facts(known_cost, time)
+        if len(session.timeline.panes) > 1:
+            cost_facts[0] = f"{session.displayed.get_setup(viewer.pane).controller.label}: {cost_facts[0]}"
+        facts += cost_facts
     if video_duration is not None:
         facts.append(f"● video {video_duration:.0f} s")
     facts.append(_describe_speed(viewer, step_rate))

@@ -29,6 +29,7 @@ from robocov_app.viewer.commands.viewer_commands import GROUPS, list_parameter_c
 from robocov_app.viewer.commands.window_commands import ViewerWindowActions, list_window_commands
 from robocov_app.viewer.costs.cost_curves import CostCurves
 from robocov_app.viewer.lessons.guide import LessonGuide
+from robocov_app.viewer.lessons.player import LessonPlayer, LessonState
 from robocov_app.viewer.panel.panel import ViewerPanel
 from robocov_app.viewer.panel.robot_inspector import RobotInspector
 from robocov_app.viewer.presenter import Presenter
@@ -37,7 +38,7 @@ from robocov_app.viewer.sharing.share import ShareActions
 from robocov_app.viewer.window.arrangement import Arrangement
 from robocov_app.viewer.window.dialogs import build_branch_dialog, build_comparison_dialog, build_file_dialog
 from robocov_app.viewer.window.map_picture import PictureSources, ViewerMapPicture
-from robocov_app.viewer.window.menus import WindowMenus
+from robocov_app.viewer.window.menus import COMMANDS_OF_SHARE_MENU, WindowMenus
 from robocov_app.viewer.window.pointer import PointerActions, PointerTargets, ViewerPointer
 from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import HINT, list_facts
@@ -307,7 +308,7 @@ class ViewerWindow(CommandWindow):
         if (
             self.video_recorder.video is not None
             or self.canvas.camera.is_moving
-            or (session.playback.is_playing and not is_at_rest)
+            or (session.playback.is_playing and not session.playback.is_suspended and not is_at_rest)
         ):
             return None
         return (
@@ -335,10 +336,11 @@ class ViewerWindow(CommandWindow):
         viewer.files.workspace.save_draft(viewer.files.view)
         for message, is_error in self.run_saver.poll():
             viewer.show_message(message, is_error=is_error)
-        if self.lesson.shown is not None and self.dialogs.is_open:
-            # A lesson waits for the answer, for example whether to recover unsaved work.
-            return
-        self.lesson.advance(seconds)
+        is_map_covered = self.dialogs.is_open or self.help_page.is_open
+        viewer.session.playback.is_suspended = is_map_covered
+        if not is_map_covered:
+            self.lesson.advance(seconds)
+        viewer.view.has_branches = not _has_open_question(self.lesson.shown)
         # After a wait for events, the elapsed time is simulated in slices of one frame each, because the
         # clock limits the time of a single frame.
         slices = max(round(seconds * FPS), 1) if self.is_idle else 1
@@ -380,7 +382,8 @@ class ViewerWindow(CommandWindow):
             self.layer_bar.toggle_menu()
             return
         closes_help = name == "cancel" and self.help_page.is_open
-        if not closes_help and self.lesson.handle_command(name):
+        is_for_window = closes_help or name in COMMANDS_OF_SHARE_MENU
+        if not is_for_window and self.lesson.handle_command(name):
             return
         super().do(name)
         self.panel.report = None
@@ -422,3 +425,10 @@ class ViewerWindow(CommandWindow):
         is_left_press = event.type == pygame.MOUSEBUTTONDOWN and event.button == LEFT_BUTTON
         if not (is_left_press and self.lesson.click(event.pos)):
             super().handle_mouse(event)
+
+
+def _has_open_question(lesson: LessonPlayer | None) -> bool:
+    """Return whether the chapter of a lesson has a question whose answer it has not shown yet."""
+    if lesson is None or lesson.chapter.question is None:
+        return False
+    return lesson.state in (LessonState.ASKING, LessonState.PLAYING)

@@ -62,7 +62,7 @@ def build_environment(
     Raises
     ------
     MapError
-        If the map has no room for a robot, or if it is too large.
+        If no robot fits into the map, or if it is too large.
     """
     conversion = Conversion(foreign, shaping, source_name)
     boundary_parts = build_valid_boundary(conversion)
