@@ -148,7 +148,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
-        method=_list_method(results),
+        method=_collect_method_sentences(results),
         entries=_build_entries_table(results, labels),
     )
     return escape_controls(page)
@@ -440,13 +440,17 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     return front
 
 
-def _list_method(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """List the sentences on the method of some results. Texts that differ only in spaces are listed once."""
-    sentences: dict[str, str] = {}
+def _collect_method_sentences(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Collect the sentences that describe the method of the results, each once.
+
+    Of sentences that differ only in spaces, the last one is listed.
+    """
+    sentences_by_letters: dict[str, str] = {}
     for result in results:
         for sentence in result["method"]:
-            sentences["".join(sentence.split())] = sentence
-    return list(sentences.values())
+            letters = "".join(sentence.split())
+            sentences_by_letters[letters] = sentence
+    return list(sentences_by_letters.values())
 
 
 def _describe_entries_without_messages(

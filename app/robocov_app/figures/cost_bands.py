@@ -7,9 +7,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.typing import FloatArray
-from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves, format_end_label
+from robocov_app.figures.curves import (
+    CurveMargins,
+    StyledCurve,
+    TimeCurve,
+    add_curve_axes,
+    draw_styled_curves,
+    format_end_label,
+)
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import FigurePage
+from robocov_app.figures.page import FigurePage, ValueAxis
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT
@@ -41,13 +48,7 @@ class Band(NamedTuple):
 
 
 @plain_style()
-def plot_cost_bands(
-    bands: Sequence[Band],
-    size: tuple[int, int],
-    label: str,
-    unit: str,
-    value_range: tuple[float, float] | None = None,
-) -> Figure:
+def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], value_axis: ValueAxis) -> Figure:
     """Plot the values of runs against time, with one color for each controller.
 
     Parameters
@@ -55,12 +56,8 @@ def plot_cost_bands(
     bands : sequence of Band
         Several runs are drawn as their median with a band between the quartiles, a single run as a line.
     size : (width, height), px
-    label : str
-        Label of the value axis.
-    unit : str
-        Unit of the final values at the ends of the curves.
-    value_range : (low, high), optional
-        Range of the values for which the limits of the value axis are chosen; by default that of the bands.
+    value_axis : ValueAxis
+        Its unit is that of the final values at the ends of the curves.
 
     Returns
     -------
@@ -70,26 +67,15 @@ def plot_cost_bands(
     weight = 1.0
     if page.size[0] < _FULL_WEIGHT_WIDTH_PX:
         weight = _SMALL_WEIGHT
-    curves = []
-    quartile_bands: list[tuple[FloatArray, FloatArray] | None] = []
+    styled_curves = []
     for band in bands:
         low, middle, high = compute_quartiles(band.values)
-        curves.append(_build_curve(page, band, middle, unit))
-        if len(band.values) > 1:
-            quartile_bands.append((low, high))
-        else:
-            quartile_bands.append(None)
-    draw_curves(
-        add_curve_axes(page, curves, _MARGINS, unit=unit),
-        curves,
-        LIGHT,
-        styles=[band.style for band in bands],
-        bands=quartile_bands,
-        label=label,
-        unit=unit,
-        weight=weight,
-        value_range=value_range,
-    )
+        curve = _build_curve(page, band, middle, value_axis.unit)
+        quartile_band = (low, high) if len(band.values) > 1 else None
+        styled_curves.append(StyledCurve(curve, band.style, quartile_band))
+    curves = [item.curve for item in styled_curves]
+    axes = add_curve_axes(page, curves, _MARGINS, unit=value_axis.unit)
+    draw_styled_curves(axes, styled_curves, LIGHT, value_axis, weight=weight)
     return page.figure
 
 

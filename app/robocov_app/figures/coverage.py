@@ -40,6 +40,7 @@ from robocov_app.figures.page import (
     FigurePage,
     PageBox,
     PagePanel,
+    ValueAxis,
     check_not_empty,
     to_plot_color,
 )
@@ -304,7 +305,7 @@ def _draw_curve_panel(
 ) -> None:
     """Draw curves in a box, px, that leaves space for axis labels and for end labels."""
     axes = add_curve_axes(page, curves, CURVE_MARGINS, box=box, unit=unit)
-    draw_curves(axes, curves, page.theme, label=label, unit=unit)
+    draw_curves(axes, curves, page.theme, ValueAxis(label, unit))
 
 
 def _draw_maps(

@@ -13,9 +13,10 @@ from robocov_app.figures.page import (
     FigurePage,
     PageBox,
     PlotColor,
+    ValueAxis,
     get_figure,
     set_even_ticks,
-    set_value_axis,
+    set_value_limits,
     style_axes,
     to_plot_color,
 )
@@ -27,6 +28,7 @@ from robocov_app.look.theme import Theme
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot arrives (s)"
 WEIGHTED_DISTANCE = "mean distance to the nearest robot, weighted by φ (m)"
+DISTANCE_AXIS = ValueAxis(DISTANCE, "m")
 
 _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4
@@ -62,6 +64,22 @@ class TimeCurve(NamedTuple):
     controller: str
     times: FloatArray
     values: FloatArray
+
+
+class StyledCurve(NamedTuple):
+    """A curve with its style, and a band around it.
+
+    Attributes
+    ----------
+    curve : TimeCurve
+    style : CurveStyle
+    band : ((T,) array, (T,) array), optional
+        Lower and upper edge of the band.
+    """
+
+    curve: TimeCurve
+    style: CurveStyle
+    band: tuple[FloatArray, FloatArray] | None = None
 
 
 class CurveMargins(NamedTuple):
@@ -109,7 +127,7 @@ class _CurveEnd(NamedTuple):
 
 
 def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
-    """Return the label of a curve with its last finite value.
+    """Return the label of a curve with its last finite value, if it has one.
 
     Parameters
     ----------
@@ -122,8 +140,10 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     -------
     str
     """
-    last = float(curve.values[np.isfinite(curve.values)][-1])
-    value = append_unit(_format_end_value(last, unit), unit)
+    finite_values = curve.values[np.isfinite(curve.values)]
+    if not len(finite_values):
+        return curve.label
+    value = append_unit(_format_end_value(float(finite_values[-1]), unit), unit)
     return f"{curve.label}  {value}"
 
 
@@ -205,93 +225,93 @@ def draw_curves(
     axes: Axes,
     curves: Sequence[TimeCurve],
     theme: Theme,
+    value_axis: ValueAxis = DISTANCE_AXIS,
     *,
-    styles: Sequence[CurveStyle] | None = None,
-    bands: Sequence[tuple[FloatArray, FloatArray] | None] | None = None,
-    label: str = DISTANCE,
-    unit: str = "m",
     weight: float = 1.0,
-    value_range: tuple[float, float] | None = None,
+) -> None:
+    """Draw curves in the styles of their controllers; see `draw_styled_curves`."""
+    styles = choose_curve_styles([curve.controller for curve in curves])
+    styled_curves = [StyledCurve(curve, style) for curve, style in zip(curves, styles, strict=True)]
+    draw_styled_curves(axes, styled_curves, theme, value_axis, weight=weight)
+
+
+def draw_styled_curves(
+    axes: Axes,
+    styled_curves: Sequence[StyledCurve],
+    theme: Theme,
+    value_axis: ValueAxis,
+    *,
+    weight: float = 1.0,
 ) -> None:
     """Draw curves, each with its mark, name and final value next to its end.
 
-    Solid curves are below dashed ones, so that equal curves can be seen.
+    Solid curves are below dashed ones, so that equal curves can be seen. Curves without a finite value are
+    left out.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    curves : sequence of TimeCurve
+    styled_curves : sequence of StyledCurve
     theme : Theme
-    styles : sequence of CurveStyle, optional
-        By default the styles of the controllers.
-    bands : sequence of ((T,) array, (T,) array) or None, optional
-        Lower and upper edge of a band around each curve.
-    label : str
-        Label of the value axis.
-    unit : str
-        Unit of the values at the ends.
+    value_axis : ValueAxis
     weight : float
         Factor by which line widths and marks are multiplied.
-    value_range : (low, high), optional
-        Range of the values for which the limits of the value axis are chosen; by default that of the curves
-        and bands.
     """
-    if styles is None:
-        styles = choose_curve_styles([curve.controller for curve in curves])
-    if bands is None:
-        bands = [None] * len(curves)
-    _set_axes(axes, curves, bands, value_range)
-    style_axes(axes, theme, "time (s)", label, grid="y")
-    for curve, style, band in zip(curves, styles, bands, strict=True):
-        if band is not None:
-            low, high = band
-            color = to_plot_color(style.get_color(theme))
-            axes.fill_between(curve.times, low, high, color=color, alpha=0.16, linewidth=0.0)
+    _set_axes(axes, styled_curves, value_axis)
+    style_axes(axes, theme, "time (s)", value_axis.label, grid="y")
+    for item in styled_curves:
+        if item.band is not None:
+            low, high = item.band
+            color = to_plot_color(item.style.get_color(theme))
+            axes.fill_between(item.curve.times, low, high, color=color, alpha=0.16, linewidth=0.0)
     ends = []
-    for curve, style in zip(curves, styles, strict=True):
-        color = to_plot_color(style.get_color(theme))
-        _draw_line(axes, curve, style, color, weight)
-        last = int(np.flatnonzero(np.isfinite(curve.values))[-1])
-        end = _CurveEnd(
-            time=float(curve.times[last]),
-            value=float(curve.values[last]),
-            color=color,
-            mark=style.mark,
-            text=format_end_label(curve, unit),
-        )
-        ends.append(end)
-    _draw_end_labels(axes, ends, weight)
+    for item in styled_curves:
+        if not np.isfinite(item.curve.values).any():
+            continue
+        color = to_plot_color(item.style.get_color(theme))
+        _draw_line(axes, item, color, weight)
+        ends.append(_build_end(item, color, value_axis.unit))
+    if ends:
+        _draw_end_labels(axes, ends, weight)
 
 
-def _set_axes(
-    axes: Axes,
-    curves: Sequence[TimeCurve],
-    bands: Sequence[tuple[FloatArray, FloatArray] | None],
-    value_range: tuple[float, float] | None,
-) -> None:
-    """Set the limits and ticks of axes for curves and bands, or for a range of values."""
-    times = np.concatenate([curve.times for curve in curves])
-    lines = [curve.values for curve in curves]
-    for band in bands:
-        if band is not None:
-            lines += band
+def _build_end(item: StyledCurve, color: PlotColor, unit: str) -> _CurveEnd:
+    """Return the last finite value of a curve, with its label."""
+    curve = item.curve
+    last = int(np.flatnonzero(np.isfinite(curve.values))[-1])
+    return _CurveEnd(
+        time=float(curve.times[last]),
+        value=float(curve.values[last]),
+        color=color,
+        mark=item.style.mark,
+        text=format_end_label(curve, unit),
+    )
+
+
+def _set_axes(axes: Axes, styled_curves: Sequence[StyledCurve], value_axis: ValueAxis) -> None:
+    """Set the limits and ticks of axes for curves and their bands."""
+    times = np.concatenate([item.curve.times for item in styled_curves])
+    lines = [item.curve.values for item in styled_curves]
+    for item in styled_curves:
+        if item.band is not None:
+            lines += item.band
     start = float(times.min())
     # Limits must differ, even if there is a single time.
     axes.set_xlim(start, max(float(times.max()), start + 1e-9))
     set_even_ticks(axes.xaxis, MAX_TIME_INTERVALS)
     values = np.concatenate([line[np.isfinite(line)] for line in lines])
-    set_value_axis(axes.yaxis, values, value_range=value_range)
+    set_value_limits(axes.yaxis, values, value_axis)
 
 
-def _draw_line(axes: Axes, curve: TimeCurve, style: CurveStyle, color: PlotColor, weight: float) -> None:
+def _draw_line(axes: Axes, item: StyledCurve, color: PlotColor, weight: float) -> None:
     """Draw the line of a curve; dashed lines are above solid ones, which are visible in their gaps."""
-    dash_lengths = style.list_dash_lengths()
+    dash_lengths = item.style.list_dash_lengths()
     axes.plot(
-        curve.times,
-        curve.values,
+        item.curve.times,
+        item.curve.values,
         color=color,
         linewidth=weight * _LINE_WIDTH_PT,
-        linestyle=style.dashes,
+        linestyle=item.style.dashes,
         dash_capstyle="butt",
         zorder=_DASHED_ORDER if dash_lengths else _SOLID_ORDER,
     )

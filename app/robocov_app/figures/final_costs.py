@@ -19,7 +19,7 @@ from robocov_app.figures.dot_rows import (
     label_rows,
 )
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TEXT, get_figure, set_value_axis, to_plot_color
+from robocov_app.figures.page import TEXT, ValueAxis, get_figure, set_value_limits, to_plot_color
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
@@ -46,13 +46,11 @@ class Sample(NamedTuple):
 @plain_style()
 def plot_final_costs(
     groups: Sequence[tuple[str, Sequence[Sample]]],
-    label: str,
+    value_axis: ValueAxis,
     *,
     width: int,
     scale: float,
     theme: Theme = LIGHT,
-    origin: float = 0.0,
-    value_range: tuple[float, float] | None = None,
 ) -> Figure:
     """Plot samples in rows, grouped for example by map: a box with the quartiles, and values as points.
 
@@ -61,17 +59,12 @@ def plot_final_costs(
     groups : sequence of (str, sequence of Sample)
         Name of each group, which may be empty, and its samples. Values that are not finite are left out.
         Samples of fewer than `MIN_BOX_VALUES` values have no box.
-    label : str
-        Label of the value axis.
+    value_axis : ValueAxis
     width : int, px
         Width of the page; its height depends on the number of samples.
     scale : float
         Scale of texts and lines.
     theme : Theme
-    origin : float
-        Start of the axis, unless all values are far from it.
-    value_range : (low, high), optional
-        Range of the values for which the limits of the axis are chosen; by default that of the samples.
 
     Returns
     -------
@@ -83,16 +76,10 @@ def plot_final_costs(
     axes, short_names = create_row_axes(positions.total, names, theme, width=width, scale=scale)
     finite_values = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
     for sample, values, row in zip(samples, finite_values, positions.rows, strict=True):
-        draw_box(axes, values, row, sample.style, theme)
-    label_rows(axes, positions.rows, short_names, theme, label)
+        _draw_sample(axes, values, row, sample.style, theme)
+    label_rows(axes, positions.rows, short_names, theme, value_axis.label)
     draw_row_marks(axes, positions.rows, [sample.style for sample in samples], theme)
-    set_value_axis(
-        axes.xaxis,
-        np.concatenate(finite_values),
-        margin=_MARGIN_FRACTION,
-        origin=origin,
-        value_range=value_range,
-    )
+    set_value_limits(axes.xaxis, np.concatenate(finite_values), value_axis, _MARGIN_FRACTION)
     group_names = [name for name, _ in groups]
     _write_headings(axes, group_names, positions.headings, theme)
     return get_figure(axes)
@@ -117,8 +104,10 @@ def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], 
             )
 
 
-def draw_box(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
+def _draw_sample(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
     """Draw one row of sorted values: points, median, and a box with whiskers if there are enough values."""
+    if not len(values):
+        return
     draw_row_points(axes, values, row, style, theme)
     low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= MIN_BOX_VALUES:

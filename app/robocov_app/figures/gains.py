@@ -18,8 +18,9 @@ from robocov_app.figures.page import (
     SMALL,
     FigurePage,
     PageBox,
+    ValueAxis,
     get_figure,
-    set_value_axis,
+    set_value_limits,
     style_axes,
     to_plot_color,
 )
@@ -121,7 +122,8 @@ def plot_gains(
         if unlimited_position is not None:
             positions = np.where(np.isnan(positions), unlimited_position, positions)
         _draw_results(axes, results, positions, is_joined=not choices)
-    set_value_axis(axes.yaxis, np.concatenate([results.values for results in all_results]))
+    values = np.concatenate([results.values for results in all_results])
+    set_value_limits(axes.yaxis, values, ValueAxis(label))
     style_axes(axes, LIGHT, _shorten_name(gain), label, grid="y")
     if len(all_results) > 1:
         axes.legend(frameon=False, fontsize=SMALL, labelcolor=to_plot_color(LIGHT.ink), borderaxespad=0.2)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from matplotlib.artist import Artist
@@ -113,29 +114,50 @@ def set_even_ticks(axis: Axis, max_intervals: int) -> None:
     axis.set_major_formatter("{x:g}")
 
 
-def set_value_axis(
-    axis: Any,
-    values: FloatArray,
-    *,
-    margin: float = VALUE_MARGIN,
-    origin: float = 0.0,
-    value_range: tuple[float, float] | None = None,
+@dataclass(frozen=True)
+class ValueAxis:
+    """An axis of values.
+
+    Attributes
+    ----------
+    label : str
+    unit : str
+        Unit of values that are written in the plot.
+    origin : float
+        Start of the axis, unless all values are far from it.
+    value_range : (low, high), optional
+        Range of the values for which the limits are chosen; by default that of the plotted values.
+        Panels with the same range have the same limits.
+    """
+
+    label: str
+    unit: str = ""
+    origin: float = 0.0
+    value_range: tuple[float, float] | None = None
+
+
+def set_value_limits(
+    axis: Any, values: FloatArray, value_axis: ValueAxis, margin: float = VALUE_MARGIN
 ) -> None:
-    """Set the limits and ticks of an axis for finite values, see `choose_value_limits`.
+    """Set the limits and ticks of an axis, see `choose_value_limits`.
 
     Parameters
     ----------
     axis : matplotlib.axis.Axis
     values : (m,) array
-    margin, origin : float
-        See `choose_value_limits`.
-    value_range : (low, high), optional
-        Range of the values, by default that of `values`. Panels with the same range have the same limits.
+        Plotted values, finite. Without any, the axis begins at its origin and has a length of 1.
+    value_axis : ValueAxis
+    margin : float
+        Free space on both sides, as a fraction of the range.
     """
-    if value_range is None:
-        value_range = (float(values.min()), float(values.max()))
-    low, high = value_range
-    limits = choose_value_limits(low, high, margin=margin, origin=origin)
+    low = value_axis.origin
+    high = low + 1.0
+    if value_axis.value_range is not None:
+        low, high = value_axis.value_range
+    elif len(values):
+        low = float(values.min())
+        high = float(values.max())
+    limits = choose_value_limits(low, high, margin=margin, origin=value_axis.origin)
     axis.axes.set(**{f"{axis.axis_name}lim": limits})
     set_even_ticks(axis, MAX_VALUE_INTERVALS)
 

@@ -32,6 +32,7 @@ from robocov_app.figures.page import (
     FigurePage,
     PageBox,
     PagePanel,
+    ValueAxis,
     check_not_empty,
     get_figure,
 )
@@ -718,15 +719,8 @@ def plot_metrics(runs: Sequence[MeasuredRun], theme: Theme | str, title: str) ->
     for number, (curves, panel) in enumerate(zip(curves_of_panels, METRIC_PANELS, strict=True)):
         axes = _create_metric_axes(page, number, curves, label_width)
         maximum = max(float(np.nanmax(curve.values)) for curve in curves)
-        draw_curves(
-            axes,
-            curves,
-            theme,
-            label=panel.label,
-            unit=panel.unit,
-            weight=0.8,
-            value_range=(0.0, maximum),
-        )
+        value_axis = ValueAxis(panel.label, panel.unit, value_range=(0.0, maximum))
+        draw_curves(axes, curves, theme, value_axis, weight=0.8)
     return page.figure
 
 

@@ -211,14 +211,25 @@ class EpisodeEnv:
         """Return the state for pickling or copying, without the window and the painter."""
         return {**vars(self), "_painter": None, "_window": None, "_clock": None}
 
-    def _get_episode(self) -> Episode:
+    def get_episode(self) -> Episode:
+        """Return the current episode.
+
+        Raises
+        ------
+        RobocovError
+            Before the first episode.
+        """
         if self.episode is None:
             raise RobocovError("environment: call reset() first")
         return self.episode
 
+    def format_actions(self, actions: FloatArray) -> dict[str, FloatArray] | FloatArray:
+        """Return the actions of all robots, (n, 2), in the form that `step` expects."""
+        return actions
+
     def render(self) -> Frame | None:
         """Return an image, (height, width, 3) from 0 to 255, in the mode "rgb_array"; None in other modes."""
-        episode = self._get_episode()
+        episode = self.get_episode()
         if self.render_mode != "rgb_array":
             return None
         painter = self._get_painter(episode)
@@ -266,7 +277,7 @@ class EpisodeEnv:
         if self._window is None:
             self._open_window()
         pygame.event.pump()
-        episode = self._get_episode()
+        episode = self.get_episode()
         self._get_painter(episode).draw(self._window, self._build_scene(episode))
         pygame.display.flip()
         self._clock.tick(1.0 / self.task.period)

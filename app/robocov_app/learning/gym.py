@@ -128,7 +128,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         terminated, truncated : bool
         info : dict
         """
-        episode = self._get_episode()
+        episode = self.get_episode()
         outcome = self.next_outcome or episode.advance(action)
         self.next_outcome = None
         self._update_window()
@@ -139,13 +139,13 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         return self._build_rows(), reward, is_terminated, is_truncated, info
 
     def _build_rows(self) -> Float32Array:
-        episode = self._get_episode()
+        episode = self.get_episode()
         rows = episode.build_rows()
         rows[~episode.working] = 0.0
         return rows
 
     def _build_info(self, contact_time: FloatArray) -> dict[str, Any]:
-        episode = self._get_episode()
+        episode = self.get_episode()
         return {
             **episode.summarize(),
             "contact_s": contact_time.copy(),

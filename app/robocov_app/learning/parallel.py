@@ -159,7 +159,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         observations, rewards, terminations, truncations, infos : dict
             Results by agent, for each robot that was working before the actions or is working after them.
         """
-        episode = self._get_episode()
+        episode = self.get_episode()
         checked = self._check_actions(actions)
         acting = self.agents
         is_truncated = episode.cycle + 1 >= self.max_cycles
@@ -199,7 +199,11 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
 
     def state(self) -> Float32Array:
         """Return positions and velocities of all robots, for a central critic; see `Episode.build_state`."""
-        return self._get_episode().build_state()
+        return self.get_episode().build_state()
+
+    def format_actions(self, actions: FloatArray) -> dict[str, FloatArray]:
+        """Return the actions of all robots, (n, 2), by the names of the current agents."""
+        return self._select(self.agents, actions)
 
     def _select(self, agents: list[str], values: Iterable[_Value]) -> dict[str, _Value]:
         """Return the values of some agents by name, given one value for each robot."""

@@ -224,8 +224,8 @@ class ControllerPolicy:
         self._next_scan_step = 0
         self._actions = np.empty((0, 2))
 
-    def __call__(self, env: Any) -> Any:
-        """Return the actions of the team.
+    def __call__(self, env: Any) -> dict[str, FloatArray] | FloatArray:
+        """Return the actions of the team in the current state of an environment.
 
         The memory of the controller is reset in each episode. Repeated calls between two steps of the
         environment return the same actions.
@@ -240,12 +240,10 @@ class ControllerPolicy:
         dict or (n, 2) array, N or m/s
             Actions by agent for a parallel environment; otherwise an array.
         """
-        unwrapped = env.unwrapped
-        actions = self._update_actions(unwrapped.episode).copy()
-        if not hasattr(unwrapped, "agents"):
-            return actions
-        actions_by_agent = dict(zip(unwrapped.possible_agents, actions, strict=True))
-        return {agent: actions_by_agent[agent] for agent in unwrapped.agents}
+        environment = env.unwrapped
+        actions = self._update_actions(environment.get_episode()).copy()
+        formatted_actions: dict[str, FloatArray] | FloatArray = environment.format_actions(actions)
+        return formatted_actions
 
     def _update_actions(self, episode: Episode) -> FloatArray:
         """Return the actions of the current decision; ask the controller if it has not decided yet."""

@@ -118,14 +118,14 @@ class Outbox:
             sent_position=np.zeros(robot_count, dtype=bool),
         )
 
-    def append(self, messages: Sequence[Sequence[Message]], working: BoolArray) -> Outbox:
+    def append(self, messages: Sequence[Sequence[Message]], is_working: BoolArray) -> Outbox:
         """Return the outbox with new messages at the ends of the queues.
 
         Parameters
         ----------
         messages : sequence of sequence of Message
             New messages of each robot; empty if there are none.
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the working robots. The queues of the other robots are emptied.
 
         Returns
@@ -133,10 +133,10 @@ class Outbox:
         Outbox
         """
         queues = list(self.queues)
-        for robot in np.flatnonzero(~working).tolist():
+        for robot in np.flatnonzero(~is_working).tolist():
             queues[robot] = ()
         if messages:
-            for robot in np.flatnonzero(working).tolist():
+            for robot in np.flatnonzero(is_working).tolist():
                 queues[robot] = (*queues[robot], *messages[robot])
         return replace(self, queues=tuple(queues))
 
@@ -268,7 +268,7 @@ class Radio:
         step: int,
         reported_positions: FloatArray,
         true_positions: FloatArray,
-        working: BoolArray,
+        is_working: BoolArray,
     ) -> Inbox:
         """Send the positions of the robots, and deliver the positions that arrive in this step.
 
@@ -282,7 +282,7 @@ class Radio:
             The robots' own estimates of their positions.
         true_positions : (n, 2) array, m
             True positions, which determine which robots are in range.
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the working robots.
 
         Returns
@@ -291,7 +291,7 @@ class Radio:
             Messages after the positions were exchanged.
         """
         if self._is_sending(step):
-            is_received = self._find_receivers(step, true_positions, working)
+            is_received = self._draw_reception_mask(step, true_positions, is_working)
             if self._period_bytes is not None:
                 inbox, is_sender = self._allocate_bandwidth_to_positions(inbox)
                 is_received &= is_sender
@@ -385,7 +385,7 @@ class Radio:
         step: int,
         messages: Sequence[Sequence[Message]],
         true_positions: FloatArray,
-        working: BoolArray,
+        is_working: BoolArray,
     ) -> tuple[Inbox | None, int]:
         """Send controller messages at the end of a step, within the limits of the conditions.
 
@@ -399,7 +399,7 @@ class Radio:
             New messages of each robot; empty if there are none. Messages of failed robots are dropped.
         true_positions : (n, 2) array, m
             True positions, which determine which robots are in range.
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the working robots.
 
         Returns
@@ -412,17 +412,17 @@ class Radio:
         if inbox is None and not any(messages):
             return None, 0
         if inbox is None:
-            inbox = Inbox.create_empty(len(working))
-        outbox = inbox.outbox.append(messages, working)
+            inbox = Inbox.create_empty(len(is_working))
+        outbox = inbox.outbox.append(messages, is_working)
         if not (self._is_sending(step) and any(outbox.queues)):
             return replace(inbox, outbox=outbox), 0
         outbox, departing = self._take_from_queues(outbox)
-        links = Neighbors.from_ranges(true_positions, self._ranges).restrict_to_working(working)
+        links = Neighbors.from_ranges(true_positions, self._ranges).restrict_to_working(is_working)
         transmissions = []
         sent_bytes = 0
         for sender, sent_messages in enumerate(departing):
             if sent_messages:
-                is_linked = np.zeros(len(working), dtype=bool)
+                is_linked = np.zeros(len(is_working), dtype=bool)
                 is_linked[links.list_neighbors(sender)] = True
                 transmissions += self._transmit(sender, sent_messages, step, is_linked)
                 sent_bytes += sum(message.size for message in sent_messages)
@@ -497,7 +497,7 @@ class Radio:
         ]
 
     def read_reports(
-        self, inbox: Inbox, step: int, working: BoolArray
+        self, inbox: Inbox, step: int, is_working: BoolArray
     ) -> tuple[Neighbors, FloatArray, FloatArray]:
         """Return the newest positions that working robots have received and have not forgotten.
 
@@ -507,7 +507,7 @@ class Radio:
             Messages after the positions of the step were exchanged.
         step : int
             Index of the step, from 0 at time zero.
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the working robots.
 
         Returns
@@ -521,8 +521,8 @@ class Radio:
         """
         silence = (step - inbox.arrival_steps) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
-        robot, neighbor = np.nonzero((inbox.arrival_steps >= 0) & is_recent & working[:, None])
-        neighbors = Neighbors.from_pairs(len(working), robot, neighbor, self._ranges)
+        robot, neighbor = np.nonzero((inbox.arrival_steps >= 0) & is_recent & is_working[:, None])
+        neighbors = Neighbors.from_pairs(len(is_working), robot, neighbor, self._ranges)
         ages = (step - inbox.sent_steps[robot, neighbor]) * self._dt
         return neighbors, inbox.positions[robot, neighbor], np.asarray(ages)
 
@@ -536,9 +536,12 @@ class Radio:
         previous_periods = math.floor((step - 1) * periods_per_step + TIME_TOLERANCE_S)
         return periods > previous_periods
 
-    def _find_receivers(self, step: int, positions: FloatArray, working: BoolArray) -> BoolArray:
-        """Find the receivers of each robot's position, as an (n, n) mask of receivers by senders."""
-        links = Neighbors.from_ranges(positions, self._ranges).restrict_to_working(working)
+    def _draw_reception_mask(self, step: int, positions: FloatArray, is_working: BoolArray) -> BoolArray:
+        """Return which robot (row) receives the position of which other robot (column), (n, n) bool.
+
+        Robots receive each other within range, unless the message is lost at random.
+        """
+        links = Neighbors.from_ranges(positions, self._ranges).restrict_to_working(is_working)
         receiver, sender = links.list_pairs()
         is_received = np.zeros((len(positions), len(positions)), dtype=bool)
         is_received[receiver, sender] = True

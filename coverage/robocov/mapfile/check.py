@@ -88,6 +88,8 @@ class MapReport:
         Smallest and largest value of the density.
     mean_density : float
         Mean of the density over the free space.
+    environment : Environment
+        The map; not part of `to_dict`.
 
     See Also
     --------
@@ -107,7 +109,7 @@ class MapReport:
     density: str | None = None
     density_range: tuple[float, float] | None = None
     mean_density: float = 1.0
-    _environment: Environment = field(kw_only=True, repr=False, compare=False)
+    environment: Environment = field(kw_only=True, repr=False, compare=False)
 
     @cached_property
     def unreachable_area(self) -> float:
@@ -116,7 +118,7 @@ class MapReport:
         It contains sealed rooms, and everything behind gaps that are narrower than a robot. It is computed
         when it is read for the first time, because this takes longer than all other measures.
         """
-        return compute_unreachable_area(self._environment, self.radius)
+        return compute_unreachable_area(self.environment, self.radius)
 
     @property
     def free_fraction(self) -> float:
@@ -193,7 +195,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         density=None if density is None else density.kind,
         density_range=None if density is None else (density.min_value, _find_maximum(density)),
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
-        _environment=environment,
+        environment=environment,
     )
 
 

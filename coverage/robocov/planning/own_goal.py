@@ -181,9 +181,8 @@ def _refine_goal(
     """Return the position of minimum cost near a node, and the excess cost of the previous goal.
 
     The cost is approximated by a parabola in x and one in y, each through the costs of the node and of its
-    two neighbors: at the offset t from the node, in spacings of nodes, the cost changes by
-    slope t + curvature t² / 2. Along an axis on which a neighbor is missing, the goal stays at the node. If
-    the previous goal is more than one spacing away, the parabolas do not hold, and the excess is infinite.
+    two neighbors. Along an axis on which a neighbor is missing, the goal stays at the node. If the previous
+    goal is more than one spacing away, the parabolas do not hold, and the excess is infinite.
     """
     # The order is that of `SIDE_STEPS`. Axis 0 is x, and axis 1 is y.
     right, up, left, down = neighbors
@@ -195,12 +194,31 @@ def _refine_goal(
             excess = math.inf
         if NO_NODE in (ahead, behind):
             continue
-        slope = 0.5 * (costs[ahead] - costs[behind])
-        curvature = costs[ahead] + costs[behind] - 2.0 * costs[node]
-        if curvature > 0.0:
-            shift = min(max(-slope / curvature, -_MAX_SHIFT_SPACINGS), _MAX_SHIFT_SPACINGS)
+        parabola = _fit_parabola(costs[behind], costs[node], costs[ahead])
+        if parabola.curvature > 0.0:
+            shift = parabola.find_minimum()
             goal[axis] += shift * map_window.spacing
-            previous_cost = slope * offset + 0.5 * curvature * offset * offset
-            min_cost = slope * shift + 0.5 * curvature * shift * shift
-            excess += previous_cost - min_cost
+            excess += parabola.evaluate(offset) - parabola.evaluate(shift)
     return goal, excess
+
+
+class _Parabola(NamedTuple):
+    """The change of a cost at an offset t from a node, in spacings of nodes: slope t + curvature t² / 2."""
+
+    slope: float
+    curvature: float
+
+    def evaluate(self, offset: float) -> float:
+        """Return the change of the cost at an offset from the node, in spacings."""
+        return self.slope * offset + 0.5 * self.curvature * offset * offset
+
+    def find_minimum(self) -> float:
+        """Return the offset of the minimum within `_MAX_SHIFT_SPACINGS`, for a positive curvature."""
+        return min(max(-self.slope / self.curvature, -_MAX_SHIFT_SPACINGS), _MAX_SHIFT_SPACINGS)
+
+
+def _fit_parabola(behind: float, middle: float, ahead: float) -> _Parabola:
+    """Fit a parabola to the costs of a node and of its two neighbors along an axis."""
+    slope = 0.5 * (ahead - behind)
+    curvature = ahead + behind - 2.0 * middle
+    return _Parabola(slope, curvature)

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 
 from robocov_app.figures.dot_rows import MAX_POINTS, arrange_rows, create_row_axes
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.final_costs import draw_box
+from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.page import ValueAxis
 from robocov_app.figures.pairs import set_ratio_axis
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
@@ -23,6 +24,12 @@ def create_axes(rows: float = 1.0) -> Axes:
     with plain_style():
         axes, _ = create_row_axes(rows, ["name"], LIGHT, width=420, scale=1.0)
     return axes
+
+
+def plot_sample(values: np.ndarray) -> Axes:
+    """Return axes with one row; the last of their lines is the mark of the controller."""
+    samples = [Sample("name", STYLE, values)]
+    return plot_final_costs([("", samples)], ValueAxis("distance (m)"), width=420, scale=1.0).axes[0]
 
 
 groups_of_rows = st.lists(
@@ -58,11 +65,10 @@ def test_the_page_grows_with_the_number_of_rows() -> None:
 def test_a_box_has_quartiles_median_and_whiskers() -> None:
     """The value 20 is an outlier, since it is more than 1.5 interquartile ranges above the box."""
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 20.0])
-    axes = create_axes()
-    draw_box(axes, values, 0.5, STYLE, LIGHT)
+    axes = plot_sample(values)
     (box,) = axes.patches
     box_x = box.get_xy()[:, 0]
-    points, left_whisker, right_whisker, median = axes.lines
+    points, left_whisker, right_whisker, median, _ = axes.lines
     assert (box_x.min(), box_x.max()) == pytest.approx(tuple(np.percentile(values, [25, 75])))
     assert sorted(points.get_xdata()) == values.tolist()
     assert left_whisker.get_xdata()[0] == 1.0
@@ -72,18 +78,21 @@ def test_a_box_has_quartiles_median_and_whiskers() -> None:
 
 @pytest.mark.parametrize(
     ("values", "n_lines"),
-    [pytest.param([1.0, 2.0], 2, id="points and median"), pytest.param([1.0], 1, id="point")],
+    [
+        pytest.param([1.0, 2.0], 2, id="points and median"),
+        pytest.param([1.0], 1, id="point"),
+        pytest.param([np.nan], 0, id="no value"),
+    ],
 )
 def test_few_values_have_no_box(values: list[float], n_lines: int) -> None:
-    axes = create_axes()
-    draw_box(axes, np.array(values), 0.5, STYLE, LIGHT)
+    axes = plot_sample(np.array(values))
     assert not axes.patches
-    assert len(axes.lines) == n_lines
+    *lines, _ = axes.lines
+    assert len(lines) == n_lines
 
 
 def test_only_some_of_very_many_values_are_drawn() -> None:
-    axes = create_axes()
-    draw_box(axes, np.linspace(0.0, 1.0, 5000), 0.5, STYLE, LIGHT)
+    axes = plot_sample(np.linspace(0.0, 1.0, 5000))
     points = axes.lines[0].get_xdata()
     assert len(points) == MAX_POINTS
     assert (points[0], points[-1]) == (0.0, 1.0)

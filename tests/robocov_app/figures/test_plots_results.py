@@ -12,8 +12,9 @@ from matplotlib.lines import Line2D
 from page_layout import assert_layout_is_clear
 
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
+from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.final_costs import Sample, plot_final_costs
-from robocov_app.figures.page import get_figure, to_plot_color
+from robocov_app.figures.page import FigurePage, ValueAxis, get_figure, to_plot_color
 from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.figures.statistics import bootstrap
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
@@ -51,11 +52,11 @@ PAIRS = Pairs("RAPF / RPF", choose_style("rapf"), RATIOS, bootstrap(RATIOS))
 
 
 def plot_bands(bands: list[Band], size: tuple[int, int] = (860, 360), unit: str = "m") -> Figure:
-    return plot_cost_bands(bands, size, "distance (m)", unit)
+    return plot_cost_bands(bands, size, ValueAxis("distance (m)", unit))
 
 
 def plot_boxes(groups: list[tuple[str, list[Sample]]], width: int = 420) -> Axes:
-    return plot_final_costs(groups, "distance (m)", width=width, scale=1.0).axes[0]
+    return plot_final_costs(groups, ValueAxis("distance (m)"), width=width, scale=1.0).axes[0]
 
 
 def plot_ratios(pairs: Pairs) -> Axes:
@@ -218,3 +219,24 @@ class TestPairs:
         pairs = Pairs("RAPF / RPF", choose_style("rapf"), np.array([0.5]), bootstrap([0.5]))
         for line in plot_ratios(pairs).lines:
             assert np.isfinite(np.asarray(line.get_xdata(), dtype=float)).all()
+
+
+def test_a_curve_without_finite_values_is_not_drawn() -> None:
+    curves = [
+        TimeCurve("RAPF", "rapf", TIME, np.full_like(TIME, 2.0)),
+        TimeCurve("RPF", "rpf", TIME, np.full_like(TIME, np.nan)),
+    ]
+    page = FigurePage((600, 400), LIGHT)
+    axes = add_curve_axes(page, curves, CurveMargins(left=30, top=30, bottom=30, right=30))
+    draw_curves(axes, curves, LIGHT)
+    assert [text.get_text() for text in axes.texts] == ["RAPF  2.000 m"]
+
+
+def test_curves_without_any_finite_value_have_empty_axes() -> None:
+    curves = [TimeCurve("RAPF", "rapf", TIME, np.full_like(TIME, np.nan))]
+    page = FigurePage((600, 400), LIGHT)
+    axes = add_curve_axes(page, curves, CurveMargins(left=30, top=30, bottom=30, right=30))
+    draw_curves(axes, curves, LIGHT)
+    assert not axes.lines
+    low, high = axes.get_ylim()
+    assert low == 0.0 < high

@@ -10,6 +10,7 @@ from reported_results import HOSTILE, build_recorded_result, build_run
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.figures.gains import GainGrid, GainResults, plot_gain_grid, plot_gains
+from robocov_app.figures.page import ValueAxis
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report.analysis.groups import choose_group_styles
@@ -28,8 +29,7 @@ FIGURES = {
             Band("RPF", STYLES["rpf"], TIME, np.ones((1, 40))),
         ],
         PANEL,
-        "distance (m)",
-        "m",
+        ValueAxis("distance (m)", "m"),
     ),
     "boxes": lambda name="RAPF": plot_final_costs(
         [
@@ -41,7 +41,7 @@ FIGURES = {
                 ],
             )
         ],
-        "distance (m)",
+        ValueAxis("distance (m)"),
         width=800,
         scale=1.25,
     ),
@@ -107,8 +107,8 @@ def test_many_points_become_one_path() -> None:
 
 def test_the_same_figure_gives_the_same_bytes() -> None:
     band = Band("RAPF", STYLES["rapf"], TIME, np.outer([1, 2, 3], TIME))
-    first = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
-    second = inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x")
+    first = inline_svg(plot_cost_bands([band], PANEL, ValueAxis("distance (m)", "m")), "k", "x")
+    second = inline_svg(plot_cost_bands([band], PANEL, ValueAxis("distance (m)", "m")), "k", "x")
     assert first == second
 
 

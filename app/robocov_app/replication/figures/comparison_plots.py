@@ -13,7 +13,7 @@ from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.final_costs import Sample, plot_final_costs
 from robocov_app.figures.gains import GainGrid, draw_gain_grid
-from robocov_app.figures.page import TITLE, FigurePage, PageBox
+from robocov_app.figures.page import TITLE, FigurePage, PageBox, ValueAxis
 from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
@@ -119,23 +119,15 @@ def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme
     with_samples = [group for group in groups if group[1]]
     if not with_samples:
         return None
-    label = "J/J_ref at the end (1: the reference)"
-    return partial(
-        plot_final_costs,
-        with_samples,
-        label,
-        width=WIDE_PX,
-        scale=PAGE_SCALE,
-        theme=theme,
-        origin=1.0,
-    )
+    value_axis = ValueAxis("J/J_ref at the end (1: the reference)", origin=1.0)
+    return partial(plot_final_costs, with_samples, value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
 
 
 @plain_style()
 def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw gaps, in percent, on a square-root axis, which shows small gaps as well as large ones."""
-    label = "gap at the end (%)"
-    figure = plot_final_costs([("", samples)], label, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
+    value_axis = ValueAxis("gap at the end (%)")
+    figure = plot_final_costs([("", samples)], value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low = min(float(values.min()), 0.0)

@@ -10,10 +10,12 @@ from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.curves import DISTANCE
 from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.page import ValueAxis
 from robocov_app.report.analysis.scaling import compute_medians, scale_distances
 from robocov_app.report.plots.plot import (
     FINAL_DISTANCE_LABEL,
     SCALED_DISTANCE_LABEL,
+    DrawnPanel,
     GroupStyles,
     PagePlot,
     Panel,
@@ -44,9 +46,7 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
         without any known cost are left out. The panels of a map have the same axes.
     """
     times, distances = _sample_histories(result)
-    panels = []
-    panel_bands = []
-    panel_values = []
+    drawn_panels = []
     for panel in list_panels(result, key):
         bands = []
         for group in panel.groups:
@@ -56,13 +56,11 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
             if rows:
                 bands.append(Band(group.label, styles[group.label], times, np.array(rows)))
         if bands:
-            panels.append(panel)
-            panel_bands.append(bands)
-            panel_values.append(np.concatenate([compute_quartiles(band.values) for band in bands]))
-    ranges = compute_map_ranges(panels, panel_values)
+            values = np.concatenate([compute_quartiles(band.values) for band in bands])
+            drawn_panels.append(DrawnPanel(panel, bands, values))
+    ranges = compute_map_ranges(drawn_panels)
     return [
-        _build_cost_plot(panel, bands, ranges[panel.map_name])
-        for panel, bands in zip(panels, panel_bands, strict=True)
+        _build_cost_plot(drawn.panel, drawn.contents, ranges[drawn.panel.map_name]) for drawn in drawn_panels
     ]
 
 
@@ -98,7 +96,7 @@ def _build_cost_plot(panel: Panel, bands: list[Band], value_range: tuple[float, 
     texts = "; ".join(_describe_band(band, unit) for band in bands)
     description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
     # The unit is in the label of the axis, because there is little space for the names of the curves.
-    draw = partial(plot_cost_bands, bands, label=label, unit="", value_range=value_range)
+    draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(label, value_range=value_range))
     return build_panel_plot(panel, description, draw)
 
 
@@ -130,9 +128,7 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
     """
     medians = compute_medians(result)
     meters = dict.fromkeys(result.completed_runs, 1.0)
-    panels = []
-    panel_samples = []
-    panel_values = []
+    drawn_panels = []
     for panel in list_panels(result, key):
         scales = medians if panel.is_together else meters
         samples = []
@@ -141,13 +137,12 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
             if len(distances):
                 samples.append(Sample(group.label, styles[group.label], distances))
         if max((len(sample.values) for sample in samples), default=0) > 1:
-            panels.append(panel)
-            panel_samples.append(samples)
-            panel_values.append(np.concatenate([sample.values for sample in samples]))
-    ranges = compute_map_ranges(panels, panel_values)
+            values = np.concatenate([sample.values for sample in samples])
+            drawn_panels.append(DrawnPanel(panel, samples, values))
+    ranges = compute_map_ranges(drawn_panels)
     return [
-        _build_final_cost_plot(panel, samples, ranges[panel.map_name])
-        for panel, samples in zip(panels, panel_samples, strict=True)
+        _build_final_cost_plot(drawn.panel, drawn.contents, ranges[drawn.panel.map_name])
+        for drawn in drawn_panels
     ]
 
 
@@ -161,9 +156,11 @@ def _build_final_cost_plot(panel: Panel, samples: list[Sample], value_range: tup
         unit = " m"
     texts = "; ".join(_describe_sample(sample, unit) for sample in samples)
 
+    value_axis = ValueAxis(label, value_range=value_range)
+
     def draw(size: tuple[int, int]) -> Figure:
         width, _ = size
-        return plot_final_costs([("", samples)], label, width=width, scale=1.0, value_range=value_range)
+        return plot_final_costs([("", samples)], value_axis, width=width, scale=1.0)
 
     return build_panel_plot(panel, f"{label}. {texts}.", draw)
 

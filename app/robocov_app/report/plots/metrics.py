@@ -9,6 +9,7 @@ from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.curves import TIME
+from robocov_app.figures.page import ValueAxis
 from robocov_app.figures.runs import to_free_area_percent
 from robocov_app.look.labels import append_unit
 from robocov_app.report.embedding import ReplayRun
@@ -197,6 +198,6 @@ def _build_metric_plot(metric_curves: _MetricCurves, bands: Sequence[Band], key:
         last_value = append_unit(f"{last:.4g}", unit)
         texts.append(f"{band.label}: from {first:.4g} to {last_value}")
     description = f"{title}: {label} against time. {'; '.join(texts)}."
-    figure = plot_cost_bands(bands, PANEL_SIZE_PX, label, unit)
+    figure = plot_cost_bands(bands, PANEL_SIZE_PX, ValueAxis(label, unit))
     svg_key = f"{key}-{title.lower().replace(' ', '-')}"
     return PagePlot(title, inline_svg(figure, svg_key, description))

@@ -1,7 +1,8 @@
 """The plots of a page, and their panels for several settings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,6 +30,8 @@ WIDE_SIZE_PX = (860, 360)
 TOGETHER_TITLE = "All maps and teams together"
 FINAL_DISTANCE_LABEL = "final mean distance (m)"
 SCALED_DISTANCE_LABEL = "final distance / median of map and team"
+
+_Content = TypeVar("_Content")
 
 
 class PagePlot(NamedTuple):
@@ -92,16 +95,30 @@ def list_panels(result: ReportedResult, key: str) -> list[Panel]:
     return panels
 
 
-def compute_map_ranges(
-    panels: Sequence[Panel], panel_values: Sequence[FloatArray]
-) -> dict[str, tuple[float, float]]:
+@dataclass(frozen=True, eq=False)
+class DrawnPanel(Generic[_Content]):
+    """A panel with what it shows.
+
+    Attributes
+    ----------
+    panel : Panel
+    contents : list
+        Bands or samples, one for each group of runs.
+    values : array
+        Values for which the limits of the axis are chosen, at least one of them finite.
+    """
+
+    panel: Panel
+    contents: list[_Content]
+    values: FloatArray
+
+
+def compute_map_ranges(panels: Sequence[DrawnPanel[Any]]) -> dict[str, tuple[float, float]]:
     """Compute the range of the values on each map, so that the panels of a map have the same axis.
 
     Parameters
     ----------
-    panels : sequence of Panel
-    panel_values : sequence of arrays
-        Values in each panel, at least one of them finite.
+    panels : sequence of DrawnPanel
 
     Returns
     -------
@@ -109,8 +126,8 @@ def compute_map_ranges(
         Ranges by `Panel.map_name`.
     """
     map_values: dict[str, list[FloatArray]] = {}
-    for panel, values in zip(panels, panel_values, strict=True):
-        map_values.setdefault(panel.map_name, []).append(values.ravel())
+    for drawn in panels:
+        map_values.setdefault(drawn.panel.map_name, []).append(drawn.values.ravel())
     ranges = {}
     for map_name, arrays in map_values.items():
         values = np.concatenate(arrays)
