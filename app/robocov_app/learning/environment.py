@@ -214,6 +214,10 @@ class EpisodeEnv:
     def get_episode(self) -> Episode:
         """Return the current episode.
 
+        Returns
+        -------
+        Episode
+
         Raises
         ------
         RobocovError
@@ -224,7 +228,17 @@ class EpisodeEnv:
         return self.episode
 
     def format_actions(self, actions: FloatArray) -> dict[str, FloatArray] | FloatArray:
-        """Return the actions of all robots, (n, 2), in the form that `step` expects."""
+        """Return the actions of all robots in the form that `step` expects.
+
+        Parameters
+        ----------
+        actions : (n, 2) array, N or m/s
+
+        Returns
+        -------
+        dict or (n, 2) array
+            Actions by agent for a parallel environment; otherwise an array.
+        """
         return actions
 
     def render(self) -> Frame | None:

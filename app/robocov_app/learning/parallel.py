@@ -202,7 +202,16 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         return self.get_episode().build_state()
 
     def format_actions(self, actions: FloatArray) -> dict[str, FloatArray]:
-        """Return the actions of all robots, (n, 2), by the names of the current agents."""
+        """Return the actions of all robots by the names of the current agents.
+
+        Parameters
+        ----------
+        actions : (n, 2) array, N or m/s
+
+        Returns
+        -------
+        dict of str to (2,) array
+        """
         return self._select(self.agents, actions)
 
     def _select(self, agents: list[str], values: Iterable[_Value]) -> dict[str, _Value]:
