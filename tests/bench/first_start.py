@@ -59,7 +59,7 @@ const isDark = () => {
   while (performance.now() < end) {
     const before = isDark();
     const start = performance.now();
-    for (const down of [true, false]) tell({kind: 'key', key, held: 0, down});
+    for (const down of [true, false]) send({kind: 'key', key, held: 0, down});
     while (isDark() === before && performance.now() - start < limit) await pause(4);
     times.push((performance.now() - start) / 1000);
     await pause(1000 * interval);

@@ -63,18 +63,18 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
     from robocov_app.web.access import CONTROL_LABEL
     from robocov_app.web.confined import confine_files
     from robocov_app.web.server import WebDisplay
-    from robocov_app.web.window_process import WindowAddress, get_address_receiver
+    from robocov_app.web.window_process import WindowAddress, get_server_access
 
     # With --each, pages connect through the server of all visitors, which needs the address of the window.
-    receive_address = get_address_receiver()
-    is_relayed = receive_address is not None
+    server_access = get_server_access()
+    visitor_link = None if server_access is None else server_access.link
     with (
-        WebDisplay(options.host, options.port, folder, is_relayed=is_relayed) as display,
+        WebDisplay(options.host, options.port, folder, visitor_link) as display,
         confine_files(folder),
         ending_on_signals(),
     ):
-        if receive_address is not None:
-            receive_address(WindowAddress(display.port, display.token))
+        if server_access is not None:
+            server_access.send_address(WindowAddress(display.port, display.token))
         else:
             echo(f"{CONTROL_LABEL}{display.link}", flush=True)
             echo(f"Watch it:           {display.watch_link}", flush=True)

@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import ipaddress
 
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.web.access import find_network_address
 
 
-def build_invitation(host: str, link: str) -> dict[str, str]:
+def build_invitation(link: ShareLink) -> dict[str, str | bool]:
     """Build the invitation that the controlling page can show on a projector.
 
     Parameters
     ----------
-    host : str
-        Address at which the server listens.
-    link : str
-        Link for watching; empty if there is none.
+    link : ShareLink
 
     Returns
     -------
     dict
-        ``link``, and ``qr_code`` as a data URI, which is empty if segno is not installed. The dictionary is
-        empty if only this computer can reach the server.
+        ``link``; ``qr_code`` as a data URI, which is empty if segno is not installed; and
+        ``opens_own_window``. The dictionary is empty if only this computer can reach the server.
     """
-    if not link or _is_loopback(find_network_address(host)):
+    if _is_loopback(find_network_address(link.host)):
         return {}
-    return {"link": link, "qr_code": build_qr_code(link)}
+    return {
+        "link": link.address,
+        "qr_code": build_qr_code(link.address),
+        "opens_own_window": link.opens_own_window,
+    }
 
 
 def build_qr_code(link: str) -> str:

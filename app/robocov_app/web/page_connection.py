@@ -48,7 +48,7 @@ class SharedWindow:
     uploads : dict
         Modification time of each uploaded file by its name, s since the epoch.
     invitation : dict
-        Link for watching and its QR code, for pages opened with the control link; see `build_invitation`.
+        Link for others and its QR code, for pages opened with the control link; see `build_invitation`.
     """
 
     pages: Pages
@@ -66,7 +66,7 @@ class SharedWindow:
         }
     )
     uploads: dict[str, float] = field(default_factory=dict)
-    invitation: dict[str, str] = field(default_factory=dict)
+    invitation: dict[str, str | bool] = field(default_factory=dict)
 
     def update_sizes(self) -> None:
         """Pass the sizes that the window and the map should have to the window."""

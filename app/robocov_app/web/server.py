@@ -25,6 +25,7 @@ import pygame
 
 from robocov.errors import InputError
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.web import events
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
@@ -85,13 +86,16 @@ class WebDisplay:
         Port to listen at; 0 for any free port.
     folder : Path
         Folder for saved and uploaded files.
-    is_relayed : bool
-        Whether pages are connected through another server, so that the links of this one are of no use.
+    visitor_link : ShareLink or None
+        Link of the server of all visitors, through which pages are connected, so that the links of this
+        server are of no use; None if pages are connected directly.
 
     Attributes
     ----------
     link, watch_link : str
         Addresses of the page for controlling and for watching, set while the server runs.
+    share_link : ShareLink
+        The link that invites others, set while the server runs.
     fps : int
         Frames per second of the window while something moves.
     shared : SharedWindow
@@ -104,10 +108,15 @@ class WebDisplay:
 
     link: str
     watch_link: str
+    share_link: ShareLink
     fps = SERVED_FPS
 
     def __init__(
-        self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path(), *, is_relayed: bool = False
+        self,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        folder: Path = Path(),
+        visitor_link: ShareLink | None = None,
     ) -> None:
         """Prepare the server; it starts when the context is entered."""
         self.host = host
@@ -128,7 +137,7 @@ class WebDisplay:
             file_executor=self._file_executor,
         )
         self.saved_files: tuple[str, ...] = ()
-        self._is_relayed = is_relayed
+        self._visitor_link = visitor_link
         self._offer: dict[str, Any] = {"number": 0, "name": ""}
         self._status = ""
         self._controls: dict[str, Any] | None = None
@@ -152,7 +161,8 @@ class WebDisplay:
             raise self._start_error
         self.link = build_link(self.host, self.port, self.token)
         self.watch_link = build_link(self.host, self.port, self.watch_token)
-        self.shared.invitation = build_invitation(self.host, self.share_link)
+        self.share_link = self._visitor_link or ShareLink(self.watch_link, self.host)
+        self.shared.invitation = build_invitation(self.share_link)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -170,13 +180,6 @@ class WebDisplay:
         controls = (window.replacement or window).controls
         self._controls = None if controls is None else asdict(controls)
         self.shared.window_input.post(window)
-
-    @property
-    def share_link(self) -> str:
-        """Address at which others can watch the window; empty if there is none."""
-        if self._is_relayed:
-            return ""
-        return self.watch_link
 
     def offer_file(self, name: str) -> None:
         """Let the page in control download a file of the folder."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote, urlencode
 
 from robocov.errors import InputError, OutputError, RobocovError, describe_error
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.web.access import are_equal, build_link, get_token, parse_cookies, parse_query
 from robocov_app.web.connections import (
     INTERNAL_ERROR,
@@ -131,6 +132,7 @@ class VisitorServer:
         self._spare: WindowProcess | None = None  # already open, for the next new visitor
         self._processes: list[SpawnProcess] = []
         self._is_ending = False
+        self._link: ShareLink  # set by `serve`
         self._admission = asyncio.Lock()
         self._openings = asyncio.Semaphore(MAX_OPENING)
 
@@ -150,11 +152,12 @@ class VisitorServer:
         listener = Listener(self._answer, self._talk)
         host = self._options.host
         port = await listener.listen(host, self._options.port)
+        self._link = ShareLink(build_link(host, port, self.token), host, opens_own_window=True)
         _cancel_on_signals()
         try:
             # Open the first window now, so that errors in the options are reported at once.
             self._spare = await self._open(self._folders.create())
-            print_line(f"For everyone: {build_link(host, port, self.token)}")
+            print_line(f"For everyone: {self._link.address}")
             print_line("Press Ctrl+C to stop.")
             while True:
                 await asyncio.sleep(CHECK_INTERVAL_S)
@@ -318,7 +321,7 @@ class VisitorServer:
         async with self._openings:
             if self._is_ending:
                 raise InputError("the server is ending")
-            process, receiver = start_process(self._command, self._options, folder)
+            process, receiver = start_process(self._command, self._options, folder, self._link)
             self._processes.append(process)
             return await wait_until_open(process, receiver, folder)
 

@@ -20,6 +20,7 @@ from typing import Any, TypeAlias
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.terminal.interruption import block_interrupts, unblock_interrupts
+from robocov_app.toolkit.window.share_link import ShareLink
 
 OPENING_TIMEOUT_S = 120.0
 ENDING_TIMEOUT_S = 5.0
@@ -59,20 +60,36 @@ class OpeningFailure:
 
 
 OpeningResult: TypeAlias = WindowAddress | OpeningFailure
-AddressReceiver: TypeAlias = Callable[[WindowAddress], object]
-
-_address_receiver: ContextVar[AddressReceiver | None] = ContextVar("address_receiver", default=None)
 
 
-def get_address_receiver() -> AddressReceiver | None:
-    """Return the function that sends the address of this process's window to the server of all visitors.
+@dataclass(frozen=True)
+class VisitorServerAccess:
+    """Access to the server of all visitors from the process of a visitor's window.
+
+    Attributes
+    ----------
+    send_address : callable
+        Sends the address of the window to the server.
+    link : ShareLink
+        Link with which everyone opens a window of their own.
+    """
+
+    send_address: Callable[[WindowAddress], object]
+    link: ShareLink
+
+
+_server_access: ContextVar[VisitorServerAccess | None] = ContextVar("server_access", default=None)
+
+
+def get_server_access() -> VisitorServerAccess | None:
+    """Return the access to the server of all visitors.
 
     Returns
     -------
-    callable or None
+    VisitorServerAccess or None
         None if this process does not run the window of a visitor.
     """
-    return _address_receiver.get()
+    return _server_access.get()
 
 
 @dataclass(eq=False)
@@ -113,7 +130,9 @@ class WindowProcess:
             self.folder.rmdir()
 
 
-def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[SpawnProcess, Connection]:
+def start_process(
+    command: WindowCommand, options: Any, folder: Path, link: ShareLink
+) -> tuple[SpawnProcess, Connection]:
     """Start the process of a window.
 
     Parameters
@@ -124,6 +143,8 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
         Options of the command; folder, host and port are replaced.
     folder : Path
         Folder for the files of the visitor.
+    link : ShareLink
+        Link with which everyone opens a window of their own.
 
     Returns
     -------
@@ -134,7 +155,7 @@ def start_process(command: WindowCommand, options: Any, folder: Path) -> tuple[S
     own_options = replace(options, each=False, host="127.0.0.1", port=0, folder=folder)
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_run_window, args=(command, own_options, sender), daemon=False)
+    process = context.Process(target=_run_window, args=(command, own_options, sender, link), daemon=False)
     if os.name == "posix":
         # Starting this tracker unblocks signals, so it must be started before they are blocked.
         resource_tracker.ensure_running()
@@ -174,7 +195,7 @@ async def wait_until_open(process: SpawnProcess, receiver: Connection, folder: P
     raise InputError(result.message)
 
 
-def _run_window(command: WindowCommand, options: Any, sender: Connection) -> None:
+def _run_window(command: WindowCommand, options: Any, sender: Connection, link: ShareLink) -> None:
     """Show a window until it is closed or the server's process ends; runs in the window's process."""
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -189,7 +210,7 @@ def _run_window(command: WindowCommand, options: Any, sender: Connection) -> Non
             sender.send(result)
 
     Thread(target=end_with_parent, daemon=True).start()
-    _address_receiver.set(send)
+    _server_access.set(VisitorServerAccess(send, link))
     with suppress(KeyboardInterrupt):
         try:
             command(options)

@@ -17,6 +17,7 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.window.clipboard import Clipboard
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
@@ -241,7 +242,7 @@ class FakeRemote:
     """A remote that notes what it is asked for."""
 
     fps = 30
-    share_link = "http://127.0.0.1:8765/?token=watch"
+    share_link = ShareLink("http://127.0.0.1:8765/?token=watch", "127.0.0.1")
 
     def __init__(self) -> None:
         self.offered: list[str] = []
@@ -254,7 +255,7 @@ def test_a_browser_gets_a_link_and_downloads_the_copy(driver: Driver) -> None:
     remote = FakeRemote()
     actions = ShareActions(driver.viewer, lambda: remote)
     actions.copy_link()
-    assert Clipboard().get() == remote.share_link
+    assert Clipboard().get() == "http://127.0.0.1:8765/?token=watch"
     actions.save_copy()
     assert remote.offered == ["hall-copy-1.robocov"]
 

@@ -12,6 +12,8 @@ from sub_path_proxy import PREFIX, SubPathProxy
 
 pytest.importorskip("websockets")
 
+from page_client import connect_page
+
 MAPS = Path(__file__).parents[3] / "maps"
 ENTER = "\ue007"
 DOWNLOADS_HEIGHT = 32
@@ -65,7 +67,7 @@ def wait_for_unchanged_picture(browser):
 
     def is_unchanged():
         pictures.append(read_picture(browser))
-        return pictures[-1] == pictures[-2] and browser.run_script("return work.then(() => true)")
+        return pictures[-1] == pictures[-2] and browser.run_script("return pendingFrames.then(() => true)")
 
     browser.wait_until(is_unchanged)
     return pictures[-1]
@@ -169,15 +171,15 @@ def test_the_invitation_shows_a_link_and_a_qr_code(browser, tmp_path):
         watch_link = browser.find("#invitation p").text
         assert watch_link.startswith("http://")
         assert watch_link != link
-        browser.find("#invitation button").click()
+        browser.find("#close-invitation").click()
         assert not invitation.is_displayed()
 
 
 def record_messages(browser):
     """Record the messages that the page sends; return a function that returns the new ones."""
     browser.run_script(
-        "window.recorded = []; const send = tell;"
-        "tell = (message) => { recorded.push(message); send(message); }"
+        "window.recorded = []; const sendToServer = send;"
+        "send = (message) => { recorded.push(message); sendToServer(message); }"
     )
 
     def take_messages():
@@ -203,9 +205,9 @@ def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser,
         )
         browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
         assert browser.find("#line").text.startswith("You are watching Teacher 1")
-        assert not any(button.is_displayed() for button in browser.find_all("#touch button"))
+        assert list_bar_buttons(browser) == ["2 here"]
         browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
-        browser.run_script("tell({kind: 'control', to: 0})")
+        browser.run_script("send({kind: 'control', to: 0})")
         phone = browser.driver.current_window_handle
         browser.driver.switch_to.window(projector)
         browser.wait_until(lambda: browser.find("#toast").is_displayed())
@@ -230,6 +232,82 @@ def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser,
         assert not browser.read_console()
 
 
+def list_bar_buttons(browser):
+    """Return the labels of the visible buttons in the bar of a phone."""
+    return [button.text for button in browser.find_all("#touch button") if button.is_displayed()]
+
+
+def push_button(browser, selector, label):
+    """Click the first button with a label among those that match a selector."""
+    next(button for button in browser.find_all(selector) if button.text == label).click()
+
+
+def test_the_list_of_people_is_a_sheet_on_a_phone(browser, tmp_path):
+    with (
+        browser.emulate_touch(),
+        serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link,
+        connect_page(link) as teacher,
+    ):
+        teacher.report_page(1280, 720)
+        browser.resize(390, 844, 2.0)
+        browser.driver.get(read_watch_link(link))
+        browser.wait_until(lambda: list_bar_buttons(browser) == ["2 here"])
+        assert find_covering_elements(browser) == []
+        browser.find("#to-people").click()
+        assert find_covering_elements(browser) == ["#people"]
+        assert browser.find("#people").size["height"] < 844 / 2
+        push_button(browser, "#people button", "Ask for control")
+        teacher.receive_message_until(has_request)
+        teacher.pass_control(2)
+        browser.wait_until(lambda: "watching" not in get_classes(browser))
+        assert not browser.find("#people").is_displayed()
+        assert browser.read_console() == []
+
+
+def read_watch_link(link):
+    """Return the link for viewers, which is printed after that of the teacher."""
+    return link.process.stdout.readline().split()[-1]
+
+
+def has_request(message):
+    """Return whether a message reports that someone requests control."""
+    return any(person["requests_control"] for person in message.get("participants", ()))
+
+
+def test_the_buttons_of_a_lesson_are_covered_on_pages_that_watch(browser, tmp_path):
+    browser.resize(1280, 720)
+    with (
+        serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
+        connect_page(link) as teacher,
+    ):
+        teacher.report_page(1280, 720)
+        browser.driver.get(read_watch_link(link))
+        browser.wait_until(lambda: browser.find("#spectator").text == "Teacher 1 leads the lesson")
+        left, top, width, height = browser.measure("#spectator")
+        assert left > 900
+        assert top > 600
+        assert left + width == 1280
+        assert top + height == 720
+        teacher.pass_control(2)
+        browser.wait_until(lambda: not browser.find("#spectator").is_displayed())
+
+
+def test_everyone_can_invite_others_to_windows_of_their_own(browser, tmp_path):
+    browser.resize(1280, 720)
+    with serve_window("demo", "square", "--each", "--host", "0.0.0.0", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.wait_until(lambda: browser.find("#invite").is_displayed())
+        browser.find("#invite").click()
+        assert browser.find("#invitation h1").text == "Open a window of your own"
+        assert browser.find("#invitation img").get_attribute("src").startswith("data:image/svg+xml")
+        assert browser.find("#invitation p").text == link
+        browser.find("#close-invitation").click()
+        browser.run_script("send({kind: 'command', name: 'share:link'})")
+        browser.wait_until(
+            lambda: "a window of their own" in browser.find("#status").get_property("textContent")
+        )
+
+
 def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
     browser.resize(900, 600)
     with (
@@ -247,8 +325,8 @@ def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
         browser.wait_until(lambda: get_canvas_size(browser) == [900, 600])
         # On a slow connection, the page misses frames but no input.
         browser.run_script(
-            "window.frameCount = 0; const showFrame = show;"
-            "show = (...values) => { frameCount++; return showFrame(...values); }"
+            "window.frameCount = 0; const showFrame = drawFrame;"
+            "drawFrame = (...values) => { frameCount++; return showFrame(...values); }"
         )
         proxy.bytes_per_s = 20_000.0
         time.sleep(1.0)
@@ -369,7 +447,7 @@ def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(brow
             browser.wait_until(lambda: browser.find("#play").text == "Play")
             browser.find("#to-tools").click()
             browser.find("[data-command='tool:failure']").click()
-            browser.wait_until(lambda: browser.find("#to-tools").text == "Fail")
+            browser.wait_until(lambda: browser.find("#to-tools").text == "Fail robot")
             browser.find("#to-more").click()
             targets = [button for button in browser.find_all("#more button") if button.is_displayed()]
             assert all(min(button.size.values()) >= 48 for button in targets)
@@ -433,11 +511,11 @@ def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
 
 
 def find_covering_elements(browser):
-    """Return the selectors of the elements of saved files that overlap the window."""
+    """Return the selectors of the bars and sheets that overlap the window."""
     script = (
         "const window = canvas.getBoundingClientRect();"
         "const covers = (box) => box.height > 0 && box.top < window.bottom;"
-        "return ['#saved', '#downloads', '#touch'].filter("
+        "return ['#saved', '#people', '#downloads', '#touch'].filter("
         "(selector) => covers(document.querySelector(selector).getBoundingClientRect()))"
     )
     return browser.run_script(script)
@@ -467,7 +545,7 @@ def test_saved_files_cover_the_window_only_when_the_user_opens_them(browser, tmp
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: "blank" not in get_classes(browser))
-        browser.run_script("tell({kind: 'command', name: 'save:session'})")
+        browser.run_script("send({kind: 'command', name: 'save:session'})")
         browser.wait_until(lambda: "saved" in get_classes(browser))
         check_saved_files(browser, has_touch=False)
         with browser.emulate_touch():

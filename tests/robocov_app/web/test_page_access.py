@@ -13,6 +13,7 @@ pytest.importorskip("websockets")
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.web.server import WebDisplay
 
 
@@ -76,6 +77,9 @@ def test_the_watch_link_does_not_replace_the_cookie_of_a_page_that_may_control(d
 
 def test_the_watch_link_is_shared_unless_pages_connect_through_another_server() -> None:
     with WebDisplay() as display:
-        assert display.share_link == display.watch_link
-    with WebDisplay(is_relayed=True) as display:
-        assert display.share_link == ""
+        assert display.share_link.address == display.watch_link
+        assert not display.share_link.opens_own_window
+    visitor_link = ShareLink("http://192.0.2.1:8765/?token=everyone", "192.0.2.1", opens_own_window=True)
+    with WebDisplay(visitor_link=visitor_link) as display:
+        assert display.share_link is visitor_link
+        assert display.shared.invitation["link"] == visitor_link.address

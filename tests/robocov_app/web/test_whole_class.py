@@ -158,7 +158,7 @@ def test_a_class_watches_while_the_teacher_reloads_and_recovers_after_a_crash(tm
             with Viewers(read_watch_link(link), 60, (0.0, 0.05, 0.3)) as others:
                 wait_until(lambda: all(others.n_frames))
                 browser.press_keys(ENTER)  # Recover
-                script = "for (const down of [true, false]) tell({kind: 'key', key: 's', down, held: 2})"
+                script = "for (const down of [true, false]) send({kind: 'key', key: 's', down, held: 2})"
                 browser.run_script(script)
                 wait_until(lambda: list(folder.glob("*.robocov")))
                 assert others.n_lost == 0

@@ -8,13 +8,16 @@ import pytest
 
 from robocov.errors import InputError
 from robocov_app.commands.options import WindowOptions
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.web.window_process import (
     OpeningFailure,
     WindowAddress,
-    get_address_receiver,
+    get_server_access,
     start_process,
     wait_until_open,
 )
+
+LINK = ShareLink("http://192.0.2.1:8765/?token=everyone", "192.0.2.1", opens_own_window=True)
 
 
 class FakeProcess:
@@ -61,14 +64,15 @@ def test_a_process_that_ends_without_a_result_has_not_opened_a_window(tmp_path):
 def print_and_open(options: WindowOptions) -> int:
     """Print a line and report an address, as a command that shows a window."""
     print("loaded a controller")
-    receive_address = get_address_receiver()
-    assert receive_address is not None
-    receive_address(WindowAddress(options.port, "secret"))
+    server_access = get_server_access()
+    assert server_access is not None
+    assert server_access.link == LINK
+    server_access.send_address(WindowAddress(options.port, "secret"))
     return 0
 
 
 def test_text_that_a_command_prints_is_not_mistaken_for_a_result(tmp_path):
-    process, receiver = start_process(print_and_open, WindowOptions(serve=True, each=True), tmp_path)
+    process, receiver = start_process(print_and_open, WindowOptions(serve=True, each=True), tmp_path, LINK)
     window = asyncio.run(wait_until_open(process, receiver, tmp_path))
     process.join()
     assert window.address == WindowAddress(0, "secret")

@@ -134,8 +134,8 @@ class CommandWindow(BaseWindow):
 
     @property
     def has_status_hint(self) -> bool:
-        """Whether the status line ends with a hint; a shared page shows who controls the window there."""
-        return self.remote is None or not self.remote.share_link
+        """Whether the status line ends with a hint; a page shows who controls the window there."""
+        return self.remote is None
 
     def hide_folder(self, folder: Path) -> None:
         """Omit a folder from the paths in messages; see `BaseWindow`."""

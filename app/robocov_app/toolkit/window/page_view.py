@@ -70,6 +70,8 @@ class WindowControls:
         Whether a dialog, a menu or the help page covers the map.
     map_box : Box or None
         Part of the window that shows the map and no controls.
+    lesson_buttons_box : Box or None
+        Part of the window that shows the buttons of a lesson.
     """
 
     theme: str
@@ -86,6 +88,7 @@ class WindowControls:
     can_delete: bool = False
     is_covered: bool = False
     map_box: Box | None = None
+    lesson_buttons_box: Box | None = None
 
 
 class MapDrawing(Protocol):

@@ -15,6 +15,7 @@ from robocov_app.toolkit.window.input import clean_event, drop_late_repeats
 from robocov_app.toolkit.window.layout import Box
 from robocov_app.toolkit.window.mouse_cursor import MouseCursor
 from robocov_app.toolkit.window.page_view import MapDrawing, PageAppearance, WindowControls
+from robocov_app.toolkit.window.share_link import ShareLink
 from robocov_app.toolkit.window.termination import is_ending
 from robocov_app.toolkit.window.window_display import WindowDisplay
 
@@ -37,13 +38,12 @@ class Remote(Protocol):
     ----------
     fps : int
         Frames per second while something moves.
+    share_link : ShareLink
+        The link with which others open the window.
     """
 
     fps: int
-
-    @property
-    def share_link(self) -> str:
-        """Address at which others can watch the window; empty if there is none."""
+    share_link: ShareLink
 
     def offer_file(self, name: str) -> None:
         """Let the user in control download a file of the window's folder."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from robocov_app.look.theme import Theme
-from robocov_app.toolkit.window.layout import Layout
+from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.viewer.lessons.page import ClickArea, draw_caption, draw_lesson_page
 from robocov_app.viewer.lessons.player import FIRST_LESSON, LessonPlayer, LessonState, load_lesson
 from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
@@ -36,6 +36,9 @@ COMMANDS_WITHIN_LESSON = frozenset(
 )
 """Commands after which the lesson continues; with any other command, the user takes over."""
 
+_BUTTON_NAMES = ("back", "next")
+_BUTTONS_MARGIN_PX = 4
+"""Distance of the part with the buttons from the top of the buttons, and from the left edge of the panel."""
 _ANSWER_KEYS = ("1", "2", "3", "4")
 
 _CHAPTER_STEPS = {"forward": 1, "back": -1}
@@ -181,6 +184,16 @@ class LessonGuide:
                 area.action()
                 return True
         return False
+
+    def find_buttons_box(self, layout: Layout) -> Box | None:
+        """Return the part of the panel from *Back* and *Next* to its lower end; None without them."""
+        tops = [area.box.top for area in self.click_areas if area.name in _BUTTON_NAMES]
+        if not tops:
+            return None
+        margin = round(_BUTTONS_MARGIN_PX * layout.scale)
+        left, top, width, height = layout.panel
+        buttons_top = min(tops) - margin
+        return Box(left + margin, buttons_top, width - margin, top + height - buttons_top)
 
     def scroll(self, distance: float) -> bool:
         """Scroll the text in the sheet down by a distance, px; return whether there is more than fits."""

@@ -69,25 +69,25 @@ class ShareActions:
         return f"Copy saved: {path.name}. It is in your downloads."
 
     def copy_link(self) -> str:
-        """Copy the link with which others watch this window; return a message.
+        """Copy the link with which others open this window; return a message.
 
         Raises
         ------
         ParameterError
             If the window is not served.
         """
-        if not self.has_link:
-            raise ParameterError("this window has no link; robocov demo --serve opens one that has")
         remote = self._get_remote()
-        assert remote is not None
-        self.clipboard.put(remote.share_link)
+        if remote is None:
+            raise ParameterError("this window has no link; robocov demo --serve opens one that has")
+        self.clipboard.put(remote.share_link.address)
+        if remote.share_link.opens_own_window:
+            return "Link copied. Whoever opens it gets a window of their own."
         return "Link copied. Whoever opens it watches this window, and can ask for control."
 
     @property
     def has_link(self) -> bool:
         """Whether others can open this window by a link."""
-        remote = self._get_remote()
-        return remote is not None and bool(remote.share_link)
+        return self._get_remote() is not None
 
     def _describe_run(self) -> tuple[SharedRun, str]:
         """Describe the run; if its map was edited, save the map, and return a note on that."""

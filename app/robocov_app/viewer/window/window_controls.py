@@ -68,6 +68,7 @@ class WindowControlsReader:
             scroll_box=find_scroll_box(size, layout, is_covered=is_covered),
             is_covered=is_covered,
             map_box=_find_map_box(layout),
+            lesson_buttons_box=self._lesson.find_buttons_box(layout),
         )
 
     def _describe_lesson(self) -> str:
