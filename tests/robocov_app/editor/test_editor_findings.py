@@ -9,7 +9,7 @@ import pytest
 from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.canvas.canvas import describe_map
+from robocov_app.editor.canvas.canvas import list_map_facts
 from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.look.theme import DARK, LIGHT
@@ -84,10 +84,10 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
 
 def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> None:
     with open_editor(tmp_path, build_sheet(CROSSED)) as driver:
-        assert describe_map(driver.editor).endswith("draft: 1 problem")
+        assert "draft: 1 error" in list_map_facts(driver.editor)
         driver.press_key("ctrl+a")
         driver.press_key("delete")
-        assert describe_map(driver.editor).startswith("0 obstacles")
+        assert list_map_facts(driver.editor)[0] == "0 obstacles"
 
 
 def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:

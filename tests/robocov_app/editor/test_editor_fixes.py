@@ -58,7 +58,7 @@ def build_rooms(width: float) -> Sketch:
         (build_hall(starts=(("a", PointsStart(((0.05, 4.0),))),)), "spot", "position 1 moved"),
         (
             build_hall(PolygonObstacle(BOX), starts=(("a", DiscStart((3.0, 4.0), 0.3)),)),
-            "no room",
+            "no space",
             "“a” moved",
         ),
     ],

@@ -15,7 +15,7 @@ from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.outlines import Outlines, build_outline
-from robocov_app.editor.canvas.sheet import Sheet, compute_grid_steps, compute_hull_excess
+from robocov_app.editor.canvas.sheet import Sheet, compute_grid_steps, compute_hull_excess, fit_name
 from robocov_app.editor.canvas.sheet_view import View, choose_outside_color
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
@@ -199,6 +199,21 @@ def test_names_are_written_where_they_fit() -> None:
     x, y, room, high = build_outline(ring).name_space
     assert ring.contains(shapely.Point(x, y)) and 1.0 - 1e-9 <= room <= 6.0 + 1e-9 and high >= 1.0 - 1e-9
     assert build_outline(shapely.Polygon()).name_space.width == 0.0
+
+
+@pytest.mark.parametrize(
+    ("size", "lines"),
+    [
+        ((100, 12), ["meeting table"]),
+        ((60, 30), ["meeting", "table"]),
+        ((60, 12), ["meeting…"]),
+        ((30, 30), []),
+        ((100, 8), []),
+    ],
+)
+def test_names_are_wrapped_before_they_are_shortened(size: tuple[int, int], lines: list[str]) -> None:
+    width, height = size
+    assert fit_name("meeting table", 11, width, height) == lines
 
 
 def test_outlines_are_built_once_for_each_obstacle() -> None:

@@ -42,20 +42,24 @@ SCALE_BAR_LABEL_PX = 90
 
 MAX_PAN_FRACTION = 0.45  # of the view: maximum distance of its center from the map
 EMPTY_VIEW_M = (0.0, 0.0, 10.0, 10.0)  # visible part of an empty sheet
+FACT_SEPARATOR = "   ·   "
 MIN_VIEW_M = 0.2  # minimum width and height of a fitted view
 MIN_HULL_EXCESS_M2 = 1e-6  # smaller areas are not in the legend
 
 
-def describe_map(editor: Editor) -> str:
-    """Return the status line for a map: number of obstacles, free area and number of problems."""
+def list_map_facts(editor: Editor) -> list[str]:
+    """Return the texts on a map, least important first: obstacles, free area, errors and warnings."""
     facts = [format_count(len(editor.sketch.obstacles), "obstacle")]
     measurement = editor.measurement
     if measurement is not None:
         facts.append(f"{measurement.free_area:.2f} m² free")
         errors = sum(problem.is_error for problem in measurement.problems)
+        warnings = len(measurement.problems) - errors
         if errors:
-            facts.append(f"draft: {format_count(errors, 'problem')}")
-    return "   ·   ".join(facts)
+            facts.append(f"draft: {format_count(errors, 'error')}")
+        if warnings:
+            facts.append(format_count(warnings, "warning"))
+    return facts
 
 
 def measure_legend_height(editor: Editor, scale: float) -> int:
@@ -326,7 +330,11 @@ class EditorCanvas:
         bar_width = scale_bar.choose_bar_length(canvas) * canvas.camera.zoom
         free_width = box.width - (scale_bar.EDGE_PX + SCALE_BAR_LABEL_PX) * scale - bar_width
         text_size = canvas.scale_text_size(canvas.theme.text)
-        text = shorten_to_width(describe_map(self.editor), text_size, free_width - scale_bar.EDGE_PX * scale)
+        max_width = free_width - scale_bar.EDGE_PX * scale
+        facts = list_map_facts(self.editor)
+        while len(facts) > 1 and canvas.measure_text(FACT_SEPARATOR.join(facts)) > max_width:
+            facts.pop(0)
+        text = shorten_to_width(FACT_SEPARATOR.join(facts), text_size, max_width)
         canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
 
 

@@ -52,10 +52,14 @@ def build_legend_entries(
         (has_team, "robot", _draw_robot),
     ]
     if measurement is not None:
-        badge = partial(overlay.draw_badge, is_error=True, is_small=True)
+        errors = [problem for problem in measurement.problems if problem.is_error]
+        has_warnings = len(errors) < len(measurement.problems)
+        error_badge = partial(overlay.draw_badge, is_error=True, is_small=True)
+        warning_badge = partial(overlay.draw_badge, is_error=False, is_small=True)
         rows.append((bool(measurement.impassable), "too narrow for a robot", _draw_narrow_area))
         rows.append((bool(measurement.cut_off), "cut off", _draw_cut_off_area))
-        rows.append((bool(measurement.problems), "problem", badge))
+        rows.append((bool(errors), "error", error_badge))
+        rows.append((has_warnings, "warning", warning_badge))
     return [LegendEntry(text, glyph) for is_present, text, glyph in rows if is_present]
 
 

@@ -462,7 +462,11 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     start, end, across = _locate_gap(canvas, gap)
     scale = canvas.scale
     sign = "<" if gap.width < 2 * radius else "≥"
-    label = f"gap {format_length(gap.width)} {sign} {format_length(2 * radius)}"
+    width = format_length(gap.width)
+    diameter = format_length(2 * radius)
+    if width == diameter:
+        width = f"{gap.width:.3f} m"
+    label = f"gap {width} {sign} {diameter}"
     side = 1.0
     if abs(across[0]) >= MIN_LENGTH_PX:
         # The label is to the right of the gap.

@@ -28,13 +28,14 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.clipping import is_within_limit
 from robocov_app.render.layers.density import draw_density_shading
 from robocov_app.render.surface_cache import LatestValue
+from robocov_app.toolkit.overlay import wrap_text
 
 # Lengths in pixels at scale 1.
 MIN_FINE_GRID_PX = 11.0  # between the fine lines of the grid
 MIN_COARSE_GRID_PX = 55.0  # between the coarse lines
 REDRAW_MARGIN_PX = 6  # around changed objects
 FLAT_LINE_WIDTH_PX = 1.5  # of parts of obstacles that have no area
-NAME_MARGIN_PX = 8.0  # free space to the left and right of a name, both together
+NAME_MARGIN_PX = 4.0  # free space to the left and right of a name, both together
 LINE_REACH_PX = 2  # at any scale: lines are drawn up to this distance from their ends
 MIN_NAMED_HEIGHT_MARGIN_PX = 4.0  # at any scale: an obstacle with a name is higher than its text by this
 MIN_SPACE_HEIGHT_MARGIN_PX = 2.0  # at any scale: so is the space in which the name is written, by this
@@ -43,6 +44,7 @@ PIXEL_BIAS = 1e-4  # small shift of the camera, because round coordinates would 
 MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pixels for scrolling
 MAX_REDRAWN_FRACTION = 0.5  # of the image; if more has changed, all of it is redrawn
 MAX_BOXES = 40  # more boxes are merged into one
+LINE_HEIGHT_FACTOR = 1.25  # distance of the lines of a name, relative to the size of the text
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
 MIN_NAMED_WIDTH_FACTOR = 3.0  # an obstacle with a name is wider than the height of its text by this factor
 OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
@@ -251,7 +253,7 @@ class Sheet:
                     canvas.draw_outline(points, canvas.theme.error, width, is_closed=False)
 
     def _draw_names(self, canvas: Canvas, items: list[Item]) -> None:
-        """Write the names of obstacles, shortened if necessary; none on obstacles that are too small."""
+        """Write the names of obstacles, if necessary shortened; none on obstacles that are too small."""
         size = canvas.scale_text_size(canvas.theme.small_text)
         color = choose_text_color(canvas.theme.obstacle)
         zoom = canvas.camera.zoom
@@ -265,11 +267,33 @@ class Sheet:
                 continue
             space = outline.name_space
             width = space.width * zoom - NAME_MARGIN_PX * canvas.scale
-            text = fonts.shorten_to_width(name, size, width)
-            is_readable = text == name or len(text) > MIN_LABEL_CHARACTERS
-            if space.height * zoom > size + MIN_SPACE_HEIGHT_MARGIN_PX and is_readable:
-                center = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
-                canvas.draw_text(text, center, size=canvas.theme.small_text, color=color, anchor="middle")
+            height = space.height * zoom - MIN_SPACE_HEIGHT_MARGIN_PX
+            lines = fit_name(name, size, width, height)
+            line_height = LINE_HEIGHT_FACTOR * size
+            x, y = canvas.camera.to_pixels(np.array([space.x, space.y])).tolist()
+            top = y - 0.5 * line_height * (len(lines) - 1)
+            for number, line in enumerate(lines):
+                center = (x, top + line_height * number)
+                canvas.draw_text(line, center, size=canvas.theme.small_text, color=color, anchor="middle")
+
+
+def fit_name(name: str, size: int, width: float, height: float) -> list[str]:
+    """Return the lines of a name, px, that fit into a space: wrapped at spaces, or else shortened to one line.
+
+    The list is empty if too little of the name would be readable.
+    """
+    if height <= size:
+        return []
+    words = name.split()
+    lines = wrap_text(name, size, width)
+    has_whole_words = " ".join(lines) == " ".join(words)
+    text_height = size + LINE_HEIGHT_FACTOR * size * (len(lines) - 1)
+    if has_whole_words and text_height <= height:
+        return lines
+    text = fonts.shorten_to_width(name, size, width)
+    if len(text) > MIN_LABEL_CHARACTERS:
+        return [text]
+    return []
 
 
 def _describe_look(view: View, sketch: Sketch) -> tuple[object, ...]:

@@ -283,7 +283,7 @@ FIXES: Final[dict[ProblemKind, Fix]] = {
     "double": Fix("Merge", _merge_vertices),
     "narrow": Fix("Widen", _widen_gap),
     "spot": Fix("Move", _move_start),
-    "no room": Fix("Move", _move_start),
+    "no space": Fix("Move", _move_start),
     "outside": Fix("Delete", _delete_object),
     "twice": Fix("Delete", _delete_object),
     "sealed": Fix("Fill", _fill_sealed_area),

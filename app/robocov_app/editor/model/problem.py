@@ -14,7 +14,7 @@ ProblemKind: TypeAlias = Literal[
     "no boundary",
     "crossing",
     "spot",
-    "no room",
+    "no space",
     "outside",
     "twice",
     "double",

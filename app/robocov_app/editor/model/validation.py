@@ -141,7 +141,7 @@ def _check_space(
         if isinstance(start, env.DiscStart):
             disc = shapely.Point(start.center).buffer(start.radius)
             message = f"{label}: {reason} its disc"
-            yield Problem(message, disc, owner=name, is_error=is_error, kind="no room")
+            yield Problem(message, disc, owner=name, is_error=is_error, kind="no space")
         else:
             yield Problem(f"{label}: {reason} the free space", None, owner=name, is_error=is_error)
 
