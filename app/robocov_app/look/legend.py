@@ -4,6 +4,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import TypeVar
 
 CELL_CENTROID = "cell centroid"
+CONTACT = "contact"
 FAILED_ROBOT = "failed robot"
 FINAL_POSITION = "final position"
 FINAL_VORONOI_CELL = "final Voronoi cell"

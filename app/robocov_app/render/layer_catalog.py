@@ -226,7 +226,7 @@ def _build_arrow_layers() -> list[Layer]:
 
 
 def _build_robot_layers() -> list[Layer]:
-    """Build the layers of robots, and of the path from the cursor."""
+    """Build the layers of robots, of their contacts, and of the path from the cursor."""
     return [
         Layer(
             "path",
@@ -256,6 +256,13 @@ def _build_robot_layers() -> list[Layer]:
             robots.draw_robots,
             needs=("snapshot",),
             legend=robots.build_robots_legend,
+        ),
+        Layer(
+            "contacts",
+            "Contacts",
+            marks.draw_contacts,
+            needs=("snapshot", "contacts"),
+            legend=marks.build_contacts_legend,
         ),
     ]
 

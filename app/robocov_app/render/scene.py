@@ -41,6 +41,28 @@ def are_centroids(goals: FloatArray, centroids: FloatArray) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts of robots at one time.
+
+    Attributes
+    ----------
+    rows : (c,) int array
+        Rows of the robots that touch a wall, an obstacle or a failed robot.
+    points : (c, 2) array, m
+        Points at which they touch it.
+    points_between_robots : (p, 2) array, m
+        Points at which two working robots touch each other.
+    """
+
+    rows: IntArray
+    points: FloatArray
+    points_between_robots: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.points) + len(self.points_between_robots)
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """The content of a picture at one time; values that are None or empty are not drawn.
 
@@ -94,6 +116,7 @@ class Scene:
     memory_rows : (n,) int array or None
         Rows of the robots in the memory of the controller, which may contain further robots; by default
         0 to n - 1.
+    contacts : Contacts or None
     """
 
     environment: Environment
@@ -120,6 +143,7 @@ class Scene:
     moving: Sequence[MovingObstacle] = ()
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
     memory_rows: IntArray | None = None
+    contacts: Contacts | None = None
 
     def get_failed_radius(self, number: int) -> float:
         """Return the radius of a failed robot, m; if it is unknown, that of the first working robot."""

@@ -359,6 +359,33 @@ def render_cross(
     return _shrink(large, SUPERSAMPLING)
 
 
+@cache_surfaces(1_000_000)
+def render_burst(arm: float, shift: Shift, *, color: Color, halo: Color, width: float) -> pygame.Surface:
+    """Render a star of eight rays, with a thin halo that keeps it readable on any background.
+
+    Parameters
+    ----------
+    arm : float, px
+        Length of the rays.
+    shift : Shift
+    color, halo : Color
+    width : float, px
+
+    Returns
+    -------
+    pygame.Surface
+    """
+    large, center = _create_enlarged_surface(arm + width, shift, SUPERSAMPLING)
+    halo_px = _CROSS_HALO_PX * SUPERSAMPLING
+    for shade, more in ((halo, halo_px), (color, 0.0)):
+        for directions, fraction in ((_AXIS_DIRECTIONS, 1.0), (_DIAGONAL_DIRECTIONS, _DIAGONAL_ARM)):
+            reach = arm * SUPERSAMPLING * fraction + more / 2
+            for direction in directions:
+                bar = _build_bar(center, direction, reach, width * SUPERSAMPLING + more)
+                pygame.draw.polygon(large, shade, bar)
+    return _shrink(large, SUPERSAMPLING)
+
+
 def _build_bar(
     center: tuple[int, int], direction: tuple[int, int], reach: float, width: float
 ) -> list[tuple[float, float]]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 LAYER_GROUPS: dict[str, tuple[str, ...]] = {
     "Coverage": ("cells", "centroids", "distances", "geodesic_cells", "density", "color_bar"),
-    "Motion": ("robots", "failed", "trajectories", "starts", "velocities", "goals", "path"),
+    "Motion": ("robots", "failed", "contacts", "trajectories", "starts", "velocities", "goals", "path"),
     "Forces": (
         "force_attraction",
         "force_repulsion_robots",
@@ -60,14 +60,14 @@ LAYER_PRESETS = (
         "simple",
         "Simple",
         "Robots, their trajectories and their cells",
-        _BASE_LAYERS | {"cells", "density", "trajectories"},
+        _BASE_LAYERS | {"cells", "contacts", "density", "trajectories"},
     ),
     LayerPreset(
         "why",
         "Why?",
         "The goal of each robot, and the forces that move it",
         _BASE_LAYERS
-        | {"cells", "density", "goals", "velocities", "obstacle_points"}
+        | {"cells", "contacts", "density", "goals", "velocities", "obstacle_points"}
         | {"force_attraction", "force_repulsion_robots", "force_repulsion_obstacle"},
     ),
     LayerPreset(

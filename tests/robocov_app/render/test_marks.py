@@ -22,6 +22,7 @@ from robocov.team import Team
 from robocov_app.look.colors import compute_contrast, mix
 from robocov_app.look.theme import DARK, LIGHT
 from robocov_app.render.painter import Painter
+from robocov_app.render.scene import Contacts
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 
@@ -29,6 +30,13 @@ ROBOT_RADIUS_PX = 9.0
 """Drawn radius of a small robot at scale 1."""
 DIAGONAL_DIRECTIONS = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
 AXIS_DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+
+
+def build_contact_scene():
+    """Return a scene in which the first robot touches a wall to the west of it."""
+    scene = build_scene(TWO)
+    points = scene.now.positions[:1] - [scene.team.radius[0], 0.0]
+    return replace(scene, contacts=Contacts(np.array([0]), points, np.empty((0, 2))))
 
 
 def build_failed_scene(failed, positions=TWO):
@@ -259,3 +267,24 @@ def test_unicycles_have_a_nose_in_their_heading(theme, heading):
     direction = np.array([np.cos(heading), -np.sin(heading)])
     assert 9.0 < distance < 18.0
     assert nose @ direction > 0.97 * distance
+
+
+class TestContacts:
+    def test_a_star_is_drawn_next_to_a_robot_that_touches_a_wall(self):
+        scene = build_contact_scene()
+        pixels, painter = list_pixels(scene, "contacts")
+        x, y = painter.camera.to_pixels(scene.now.positions[0])
+        assert len(pixels)
+        assert abs(pixels[:, 1].mean() - y) < 1.0
+        # Its number stays readable.
+        assert pixels[:, 0].max() < x - 0.5 * ROBOT_RADIUS_PX * painter.scale
+
+    def test_scenes_without_known_contacts_have_no_legend(self):
+        _, painter = render_layers(build_scene(TWO), "contacts")
+        assert list_legend_texts(painter, build_scene(TWO)) == []
+        assert list_legend_texts(painter, build_contact_scene()) == ["contact"]
+
+    @THEMES
+    def test_the_legend_symbol_has_the_color_of_errors(self, theme):
+        (image,) = render_legend_symbols(find_layer("contacts"), build_contact_scene(), theme)
+        check_legend_symbol(image, theme, theme.error)

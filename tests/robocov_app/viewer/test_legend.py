@@ -57,6 +57,21 @@ def test_the_chip_of_centroids_names_controllers_without_goals(
         assert "Centroids (not RPF)" in list_texts(window)
 
 
+def test_the_chip_of_contacts_stays_after_the_first_contact(tmp_path: Path) -> None:
+    with open_window(tmp_path) as window:
+        session = window.viewer.session
+        assert "Contacts" not in list_texts(window)
+        low_x, low_y, _, _ = session.displayed.environment.region.bounds
+        radius = session.displayed.get_setup(window.viewer.pane).team.min_radius
+        session.place_robot(1, (low_x + radius, low_y + 1.0))
+        window.run_frame(0.0)
+        assert len(window.canvas.scenes[0].contacts) == 1
+        session.place_robot(1, (low_x + 1.0, low_y + 1.0))
+        window.run_frame(0.0)
+        assert len(window.canvas.scenes[0].contacts) == 0
+        assert "Contacts" in list_texts(window)
+
+
 def test_chips_explain_each_symbol_once(tmp_path: Path) -> None:
     with open_window(tmp_path, "rpf", "lloyd", "atlas") as window:
         texts = list_texts(window)

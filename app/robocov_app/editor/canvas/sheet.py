@@ -278,7 +278,7 @@ class Sheet:
 
 
 def fit_name(name: str, size: int, width: float, height: float) -> list[str]:
-    """Return the lines of a name, px, that fit into a space: wrapped at spaces, or else shortened to one line.
+    """Return the lines of a name that fit into a space, px: wrapped, or else shortened to one line.
 
     The list is empty if too little of the name would be readable.
     """

@@ -1,4 +1,4 @@
-"""Layers of marks: starts, goals and centroids of cells."""
+"""Layers of marks: starts, contacts, goals and centroids of cells."""
 
 from functools import partial
 
@@ -21,6 +21,10 @@ _START_SIZE_PX = 9.0
 _CENTROID_SIZE_PX = 11.0
 _START_SYMBOL_RADIUS_PX = 4.5
 _GOAL_ARM_PX = 5.5
+_CONTACT_ARM_PX = 5.5
+_CONTACT_WIDTH_PX = 1.5
+_CONTACT_GAP_PX = 2.5
+_MIN_DISTANCE_PX = 1e-6
 _RING_WIDTH_PX = 1.6
 _MAX_RING_WIDTH_FRACTION = 0.4
 """Maximum width of the ring of a start, as a fraction of its radius."""
@@ -112,6 +116,45 @@ def _choose_targets(scene: Scene) -> tuple[str, FloatArray]:
     if centroids.shape == goals.shape and are_centroids(goals, centroids):
         return legend.CELL_CENTROID, scene.centroids
     return legend.GOAL, goals
+
+
+def draw_contacts(canvas: Canvas, scene: Scene) -> None:
+    """Draw a star at each point at which a robot touches something, unless there is a crowd of robots.
+
+    Small robots are drawn larger than they are. The star of a contact with a wall is at the rim of the drawn
+    robot, so that it does not cover its number.
+    """
+    contacts = scene.contacts
+    assert contacts is not None
+    if is_crowd(scene.now.positions, canvas.camera):
+        return
+    centers = canvas.camera.to_pixels(scene.now.positions)[contacts.rows]
+    offsets = canvas.camera.to_pixels(contacts.points) - centers
+    distances = np.hypot(*offsets.T)
+    drawn_radii = np.array(compute_drawn_radii(canvas, scene))[contacts.rows]
+    rim_distances = drawn_radii + _CONTACT_GAP_PX * canvas.scale
+    factors = np.maximum(rim_distances / np.maximum(distances, _MIN_DISTANCE_PX), 1.0)
+    stars = centers + factors[:, None] * offsets
+    points_between_robots = canvas.camera.to_pixels(contacts.points_between_robots)
+    canvas.draw_sprites([_build_contact_star(canvas)], np.concatenate([stars, points_between_robots]))
+
+
+def _build_contact_star(canvas: Canvas) -> Sprite:
+    theme = canvas.theme
+    return partial(
+        sprites.render_burst,
+        _CONTACT_ARM_PX * canvas.scale,
+        color=theme.error,
+        halo=theme.background,
+        width=_CONTACT_WIDTH_PX * canvas.scale,
+    )
+
+
+def _draw_contact_symbol(canvas: Canvas, x: float, y: float) -> None:
+    canvas.draw_sprite(_build_contact_star(canvas), (x, y))
+
+
+build_contacts_legend = build_legend(legend.CONTACT, _draw_contact_symbol)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:

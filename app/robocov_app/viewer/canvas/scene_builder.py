@@ -1,16 +1,20 @@
 """Builds the scenes of the panes from the displayed step of a session."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from robocov.typing import FloatArray
 from robocov_app.render.density_text import format_cost, get_cost_name
 from robocov_app.render.distance_map.colors import choose_color_limit
 from robocov_app.render.painter import Painter
-from robocov_app.render.scene import Scene
+from robocov_app.render.scene import Contacts, Scene
+from robocov_app.viewer.canvas.contacts import ContactFinder
 from robocov_app.viewer.costs.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.states import PaneSetup
+from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.view import FADE_S
 from robocov_app.viewer.window.status import MIN_UNCOVERED_AREA_M2
 
@@ -38,6 +42,8 @@ class SceneBuilder:
     def __init__(self, viewer: Presenter) -> None:
         self._viewer = viewer
         self._color_limit = 1.0  # end of the color scale of distances, m
+        self._contact_finder = ContactFinder()
+        self._session_with_contacts: Session | None = None
 
     def build(self, pane: Pane, painter: Painter) -> Scene:
         """Build the scene of a pane at the displayed step, with those costs and scans that are visible."""
@@ -50,7 +56,7 @@ class SceneBuilder:
         row = setup.numbers.index(selected) if selected in setup.numbers else None
         if known_cost is not None and painter.needs_field:
             self._update_color_limit(known_cost.field.max_distance)
-        return pane.build_scene(
+        scene = pane.build_scene(
             setup,
             snapshot,
             displayed.get_trail(pane),
@@ -63,6 +69,18 @@ class SceneBuilder:
             sensed=pane.sensed,
             path=self._get_path(known_cost),
         )
+        return replace(scene, contacts=self._find_contacts(setup, scene))
+
+    def _find_contacts(self, setup: PaneSetup, scene: Scene) -> Contacts | None:
+        """Return the contacts of a scene; None until there is a contact in the session.
+
+        From then on, the layer bar has a chip for contacts. It would be restless if it came and went.
+        """
+        session = self._viewer.session
+        contacts = self._contact_finder.find_contacts(setup.environment, scene)
+        if len(contacts):
+            self._session_with_contacts = session
+        return contacts if self._session_with_contacts is session else None
 
     def _update_color_limit(self, largest: float) -> None:
         """Adapt the color scale to the largest distance, m, but only when it has changed considerably."""

@@ -51,6 +51,7 @@ _LAYER_KEYS = {
     "status": "alt+9",
     "color_bar": "alt+0",
     "density": "alt+d",
+    "contacts": "alt+c",
 }
 
 
