@@ -211,14 +211,14 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         cells = _build_overview_cells(by_label[label], tracks)
         rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
-    head = ("Controller", "Rank", "Score, %", "Runs", "Contacts", "At rest", *headings)
-    return PageTable("Scores, and median gaps to the references in % by tracks", head, rows)
+    head = ("Controller", "Rank", "Score, %", "Runs", "Contacts", "Settled", *headings)
+    return PageTable("Scores, and median gaps on each track, %", head, rows)
 
 
 def _build_overview_cells(
     label_ratings: Mapping[str, Rating], tracks: Mapping[str, Sequence[Rating]]
 ) -> list[str]:
-    """Return the cells for runs, contacts and runs at rest, and for the gap on each complete track."""
+    """Return the cells for runs, contacts and settled runs, and for the gap on each complete track."""
     rows = [row for rating in label_ratings.values() for row in rating.rows]
     run_count = sum(rating.run_count for rating in label_ratings.values())
     suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)

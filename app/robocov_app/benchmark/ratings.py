@@ -34,13 +34,13 @@ HEAD = (
     "95%",
     "Mean",
     "Worst",
-    "To 5%, s",
+    "Within 5%, s",
     "∫J / J_ref, s",
     "Path, m",
     "Work, J",
     "Contacts",
-    "At rest",
-    "Rest, s",
+    "Settled",
+    "Settled, s",
     "B/s",
     "µs/s",
 )
@@ -51,16 +51,16 @@ _SUMMARY_COLUMNS = (
     "Gap, %",
     "95%",
     "Worst",
-    "To 5%, s",
+    "Within 5%, s",
     "Path, m",
     "Contacts",
-    "At rest",
+    "Settled",
     "B/s",
     "µs/s",
 )
 NOTES = (
     "Score: the mean of J_ref / J over all runs. The value of a run is halved if a robot touched a wall or "
-    "another robot, and halved again if the team had not come to rest by the end. A failed run counts 0, "
+    "another robot, and halved again if the team had not settled by the end. A failed run counts 0, "
     "and so does a run that covers a different area from the reference. The score of an entry depends on no "
     "other entry. Only entries with all runs of a track are ranked on it.",
     "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95% interval of the median "
@@ -69,12 +69,11 @@ NOTES = (
     "be too small: it is the median gap to bound, J / J_bound − 1, where J_bound is a proven lower bound. It "
     "is given if all bounds are known. They are certified for J as it is computed, a sum over 128 x 128 "
     "sites, not for the integral that it approximates.",
-    "To 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J over "
+    "Within 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J over "
     "the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so are "
     "the other columns, with these exceptions. Contacts: the runs in which a robot touched a wall or "
-    "another robot. At rest: the fraction of runs at whose end no robot moves 5 cm or more within 4 s. "
-    "Rest: the Kaplan-Meier median of the time at which this begins; runs that do not come to rest are "
-    "censored.",
+    "another robot. Settled: the fraction of runs at whose end no robot moves 5 cm or more within 4 s, "
+    "and the Kaplan-Meier median of the time at which this begins; runs that do not settle are censored.",
     "B/s: bytes that a robot sends per second, received or not: 20 for each position (number, position), "
     "and the sizes of the messages of its controller, in which robots share maps and reports about other "
     "robots. µs/s: processor time of the controller per robot and second of simulation time; it depends on "
@@ -161,7 +160,7 @@ class Rating:
         Returns
         -------
         fraction : float
-            Fraction of the runs in which the team is at rest at the end.
+            Fraction of the runs in which the team has settled.
         time : float or None
             Kaplan-Meier estimate of the median time to rest, s; None if most runs did not come to rest.
         """
@@ -314,13 +313,13 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         "95%": interval,
         "Mean": format_number(mean_gap, ".1f"),
         "Worst": format_number(worst_gap, ".1f"),
-        "To 5%, s": format_number(rating.compute_median("near_final_s"), ".0f"),
+        "Within 5%, s": format_number(rating.compute_median("near_final_s"), ".0f"),
         "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
         "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
         "Work, J": format_number(rating.compute_median("work_J"), ".0f"),
         "Contacts": f"{contacts} of {len(rating.rows)}",
-        "At rest": rest_text,
-        "Rest, s": format_number(rest_time, ".0f"),
+        "Settled": rest_text,
+        "Settled, s": format_number(rest_time, ".0f"),
         "B/s": format_number(rating.compute_rate("sent_bytes"), ".0f"),
         "µs/s": format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
     }

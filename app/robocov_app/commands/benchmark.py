@@ -25,9 +25,9 @@ _OPTIONS_BY_ACTION = {
 _LEGEND = """\
 Gap: J / J_ref - 1, where J is the final cost and J_ref that of the best known placement (median, its 95%
 interval for at least 12 maps, worst); in brackets the median gap to bound, J / J_bound - 1, where J_bound is
-a proven lower bound. To 5%: time from which the cost stays within
+a proven lower bound. Within 5%: time from which the cost stays within
 5% of its final value. Path: mean path length of a robot. Contacts: runs in which a robot touched something.
-At rest: runs that settled. B/s, µs/s: bytes sent and computing time per robot.
+Settled: runs in which the team came to rest. B/s, µs/s: bytes sent and computing time per robot.
 robocov benchmark page explains all columns."""
 """Explanation of the columns of the table of ratings."""
 

@@ -268,7 +268,7 @@ def _list_failures(summary: ContenderSummary) -> str:
     failures = (
         (summary.contact_fraction, "robots touch a wall or each other in {} of the runs"),
         (summary.blocked_fraction, "a wall is between {} of the robots and their goals at the end"),
-        (1.0 - summary.rest_fraction, "the team is not at rest at the end in {} of the runs"),
+        (1.0 - summary.rest_fraction, "the team has not settled at the end in {} of the runs"),
     )
     texts = []
     for fraction, description in failures:
