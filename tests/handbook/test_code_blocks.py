@@ -22,7 +22,7 @@ from markdown_pages import (
     list_handbook_pages,
     read_handbook_page,
 )
-from swept import DirectExecutor
+from small_studies import DirectExecutor
 
 from robocov.errors import InputError
 from robocov_app.benchmark import suite

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from driven_window import open_viewer
 from reported_results import build_result, build_run
-from swept import ROOM, DirectExecutor, build_small_study
+from small_studies import ROOM, DirectExecutor, build_small_study
 
 from robocov.errors import InputError, ParameterError
 from robocov.mapfile import save_map

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, read_error, read_json
+from command_calls import SHORT, read_error, read_json
 from drawn_run import ROOMS, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from called import COMMAND, read_error, read_json
+from command_calls import COMMAND, read_error, read_json
 from driven_browser import CHROMIUM, DRIVER, Browser
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from swept import HEAD, PULL, DirectExecutor
+from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import Adaptive, get_gain_values, load_controller_class
 from robocov_app.benchmark import ratings, suite

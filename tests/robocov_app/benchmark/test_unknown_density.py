@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swept import HEAD
+from small_studies import HEAD
 
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.base import Information

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from swept import HEAD, PULL
+from small_studies import HEAD, PULL
 
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.base import Information

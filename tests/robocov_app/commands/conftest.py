@@ -1,5 +1,5 @@
 import pytest
-from swept import DirectExecutor
+from small_studies import DirectExecutor
 
 from robocov_app.runs import artifacts
 from robocov_app.runs import cost as run_cost

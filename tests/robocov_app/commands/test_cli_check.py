@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from called import COMMAND
+from command_calls import COMMAND
 
 from robocov.mapfile import list_bundled_maps
 from robocov_app.cli import main

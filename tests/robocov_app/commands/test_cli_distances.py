@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, read_error
+from command_calls import SHORT, read_error
 from PIL import Image
 
 from robocov_app.cli import main

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, read_error, read_json
+from command_calls import COMMAND, read_error, read_json
 
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import dump_map, list_bundled_maps, load_map

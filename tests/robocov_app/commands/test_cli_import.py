@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import read_error, read_json
+from command_calls import read_error, read_json
 from raster_files import PLAN, build_pgm, draw_pixels, write_ros_map
 
 from robocov.mapfile import load_map

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import COMMAND, SHORT, read_error, read_json
+from command_calls import COMMAND, SHORT, read_error, read_json
 from PIL import Image
 
 from robocov.environment import DiscStart, Environment, WallObstacle

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import read_error, read_json
+from command_calls import read_error, read_json
 from PIL import Image
 from sample_sessions import HALL, LLOYD, RAPF, RPF, advance_session, start_session
 from session_records import build_records

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, read_error, read_json
+from command_calls import SHORT, read_error, read_json
 
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.record import Record

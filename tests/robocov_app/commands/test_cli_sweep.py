@@ -5,8 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
-from called import read_error, read_json
-from swept import ROOM, list_run_folders, read_tables, write_controller
+from command_calls import read_error, read_json
+from small_studies import ROOM, list_run_folders, read_tables, write_controller
 
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results

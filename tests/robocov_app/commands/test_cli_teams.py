@@ -3,7 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import SHORT, read_error, read_json
+from command_calls import SHORT, read_error, read_json
 
 from robocov.record import Record
 from robocov_app.cli import main

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from called import COMMAND, SHORT, read_error, read_json
+from command_calls import COMMAND, SHORT, read_error, read_json
 from sample_sessions import advance_session, start_session
 from session_records import build_records
 

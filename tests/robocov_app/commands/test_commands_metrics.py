@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import SHORT, read_error
+from command_calls import SHORT, read_error
 
 from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics
 from robocov.record import Record

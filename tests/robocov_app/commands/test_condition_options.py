@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import read_error, read_json
+from command_calls import read_error, read_json
 
 from robocov.conditions import Conditions
 from robocov.controllers import Rapf

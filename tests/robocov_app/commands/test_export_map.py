@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from called import read_error, read_json
+from command_calls import read_error, read_json
 
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from called import read_error
-from swept import ROOM, DirectExecutor, write_controller
+from command_calls import read_error
+from small_studies import ROOM, DirectExecutor, write_controller
 
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results

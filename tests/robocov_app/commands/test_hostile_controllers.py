@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from called import COMMAND
+from command_calls import COMMAND
 
 from robocov.text import escape_controls
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pygame
 import pytest
-from called import read_error
+from command_calls import read_error
 from drawn_sketches import renumber
 from driven_editor import EditorDriver, build_sheet, open_editor, rewrite_file
 from PIL import Image

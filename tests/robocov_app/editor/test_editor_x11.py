@@ -9,9 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from called import COMMAND
+from command_calls import COMMAND
+from driven_x11_window import (
+    MARKS,
+    MAX_WAIT_S,
+    X11Driver,
+    read_errors,
+    run_window,
+    start_display,
+    wait_for_end,
+)
 from PIL import Image
-from x11_hands import MARKS, MAX_WAIT_S, Hands, read_errors, run_window, start_display, wait_for_end
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
@@ -36,13 +44,13 @@ def display() -> Iterator[str]:
 
 
 @contextmanager
-def run_editor(display: str, folder: Path, *words: object) -> Iterator[Hands]:
+def run_editor(display: str, folder: Path, *words: object) -> Iterator[X11Driver]:
     size = f"{SIZE[0]}x{SIZE[1]}"
     command = [*COMMAND, "edit", *words, "--folder", folder, "--size", size, "--scale", "1"]
     variables = {FOLDER_VARIABLE: str(folder / "settings"), DRAFTS: str(folder / "drafts")}
-    with run_window(display, folder, command, **variables) as hands:
-        hands.take_screenshot()  # now it listens
-        yield hands
+    with run_window(display, folder, command, **variables) as driver:
+        driver.take_screenshot()  # now it listens
+        yield driver
 
 
 class Sheet:
@@ -60,55 +68,55 @@ class Sheet:
 
 
 def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> None:
-    with run_editor(display, tmp_path) as hands:
+    with run_editor(display, tmp_path) as driver:
         at = Sheet((0.0, 0.0, 10.0, 10.0))  # the boundary that is offered
-        hands.press("b")
-        hands.click(*at(0, 0))
-        hands.move(*at(5, 5))
-        hands.type("12 x 8")
-        hands.press("Return")
-        hands.press("f")
+        driver.press("b")
+        driver.click(*at(0, 0))
+        driver.move(*at(5, 5))
+        driver.type("12 x 8")
+        driver.press("Return")
+        driver.press("f")
         at = Sheet(PLAN)
 
-        hands.press("w")
+        driver.press("w")
         for point in ((4, 0), (4, 5)):
-            hands.click(*at(*point))
-        hands.press("Return")
+            driver.click(*at(*point))
+        driver.press("Return")
         time.sleep(0.4)  # or it would be a double click
-        hands.click(*at(8, 8))
-        hands.move(*at(8, 6))
-        hands.type("5")  # meters downwards
-        hands.press("Return", "Return")
-        hands.press("r")
-        hands.drag(at(9, 1), at(10, 1.5), at(11, 2))
-        hands.press("c")
-        hands.drag(at(2, 2), at(2.3, 2), at(2.5, 2))
-        hands.press("p")
+        driver.click(*at(8, 8))
+        driver.move(*at(8, 6))
+        driver.type("5")  # meters downwards
+        driver.press("Return", "Return")
+        driver.press("r")
+        driver.drag(at(9, 1), at(10, 1.5), at(11, 2))
+        driver.press("c")
+        driver.drag(at(2, 2), at(2.3, 2), at(2.5, 2))
+        driver.press("p")
         for point in ((1, 5), (3, 5), (3, 7)):
-            hands.click(*at(*point))
-        hands.press("Return")
-        hands.press("s")
-        hands.drag(at(6, 4), at(6.5, 4), at(7, 4))
-        drawn = hands.take_screenshot()
+            driver.click(*at(*point))
+        driver.press("Return")
+        driver.press("s")
+        driver.drag(at(6, 4), at(6.5, 4), at(7, 4))
+        drawn = driver.take_screenshot()
         assert np.abs(drawn - drawn[5, 500]).max() > 60
 
-        hands.press("ctrl+s")
-        hands.press("ctrl+BackSpace")
-        hands.type("plan")
-        hands.press("Return")
-        hands.wait_until((tmp_path / "plan.json").exists, "saved map")
+        driver.press("ctrl+s")
+        driver.press("ctrl+BackSpace")
+        driver.type("plan")
+        driver.press("Return")
+        driver.wait_until((tmp_path / "plan.json").exists, "saved map")
 
-        hands.press("F5")
-        tried = wait_for_change(hands, drawn, 0.3)  # cells are colored
-        wait_for_change(hands, tried, 0.0)  # robots move
-        hands.press("F5")
+        driver.press("F5")
+        tried = wait_for_change(driver, drawn, 0.3)  # cells are colored
+        wait_for_change(driver, tried, 0.0)  # robots move
+        driver.press("F5")
         time.sleep(0.5)
 
         # Earlier changes can still be undone and redone.
-        hands.press("ctrl+z", "ctrl+y", "ctrl+s")
-        hands.press("ctrl+q")
-        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
-        assert read_errors(hands.process) == ""
+        driver.press("ctrl+z", "ctrl+y", "ctrl+s")
+        driver.press("ctrl+q")
+        assert wait_for_end(driver.process) == 0, read_errors(driver.process)
+        assert read_errors(driver.process) == ""
 
     plan = load_map(tmp_path / "plan.json")
     assert sorted(plan.boundary) == [(0.0, 0.0), (0.0, 8.0), (12.0, 0.0), (12.0, 8.0)]
@@ -123,12 +131,12 @@ def test_a_floor_plan_is_drawn_saved_and_tried(display: str, tmp_path: Path) -> 
     assert not list((tmp_path / "drafts").rglob("*.json"))
 
 
-def wait_for_change(hands: Hands, from_picture: np.ndarray, part: float) -> np.ndarray:
+def wait_for_change(driver: X11Driver, from_picture: np.ndarray, part: float) -> np.ndarray:
     """Return the first picture whose arena is different in more than a part of its pixels."""
     arena = np.s_[: SIZE[1] - 210, : SIZE[0] - 320]
     started_at = time.monotonic()
     while True:
-        picture = hands.take_screenshot()
+        picture = driver.take_screenshot()
         if (np.abs(picture - from_picture)[arena].max(axis=2) > 30).mean() > part:
             return picture
         assert time.monotonic() - started_at < MAX_WAIT_S, "nothing happens"
@@ -136,24 +144,24 @@ def wait_for_change(hands: Hands, from_picture: np.ndarray, part: float) -> np.n
 
 
 def test_a_killed_editor_loses_nothing(display: str, tmp_path: Path) -> None:
-    with run_editor(display, tmp_path) as hands:
+    with run_editor(display, tmp_path) as driver:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
-        hands.press("r")
-        hands.drag(at(1, 1), at(2, 2), at(3, 3))
-        hands.drag(at(5, 5), at(6, 6), at(7, 7))
-        hands.wait_until(lambda: count_saved_obstacles(tmp_path) == 2, "draft with both rectangles")
-        hands.process.send_signal(signal.SIGKILL)
-        assert wait_for_end(hands.process) == -signal.SIGKILL
+        driver.press("r")
+        driver.drag(at(1, 1), at(2, 2), at(3, 3))
+        driver.drag(at(5, 5), at(6, 6), at(7, 7))
+        driver.wait_until(lambda: count_saved_obstacles(tmp_path) == 2, "draft with both rectangles")
+        driver.process.send_signal(signal.SIGKILL)
+        assert wait_for_end(driver.process) == -signal.SIGKILL
 
-    with run_editor(display, tmp_path) as hands:
-        hands.press("Return")  # Recover
+    with run_editor(display, tmp_path) as driver:
+        driver.press("Return")  # Recover
         time.sleep(0.3)
-        hands.press("ctrl+s", "ctrl+BackSpace")
-        hands.type("saved")
-        hands.press("Return")
-        hands.wait_until((tmp_path / "saved.json").exists, "saved map")
-        hands.press("ctrl+q")
-        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        driver.press("ctrl+s", "ctrl+BackSpace")
+        driver.type("saved")
+        driver.press("Return")
+        driver.wait_until((tmp_path / "saved.json").exists, "saved map")
+        driver.press("ctrl+q")
+        assert wait_for_end(driver.process) == 0, read_errors(driver.process)
     plan = load_map(tmp_path / "saved.json")
     assert [set(shape.vertices) for shape in plan.obstacles] == [
         {(1, 1), (3, 1), (3, 3), (1, 3)},
@@ -171,20 +179,20 @@ def count_saved_obstacles(folder: Path) -> int:
 
 
 def test_closing_unsaved_work_asks_first(display: str, tmp_path: Path) -> None:
-    with run_editor(display, tmp_path, tmp_path / "fresh.json") as hands:
+    with run_editor(display, tmp_path, tmp_path / "fresh.json") as driver:
         at = Sheet((0.0, 0.0, 10.0, 10.0))
-        hands.press("c")
-        empty = hands.take_screenshot()
-        hands.drag(at(5, 5), at(5.5, 5), at(6, 5))
-        drawn = wait_for_change(hands, empty, 0.002)
-        hands.press("ctrl+q")
-        wait_for_change(hands, drawn, 0.002)  # there is a question
-        assert hands.process.poll() is None
-        hands.press("Escape")  # cancel
-        hands.take_screenshot()
-        assert hands.process.poll() is None
-        hands.press("ctrl+q", "s")
-        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        driver.press("c")
+        empty = driver.take_screenshot()
+        driver.drag(at(5, 5), at(5.5, 5), at(6, 5))
+        drawn = wait_for_change(driver, empty, 0.002)
+        driver.press("ctrl+q")
+        wait_for_change(driver, drawn, 0.002)  # there is a question
+        assert driver.process.poll() is None
+        driver.press("Escape")  # cancel
+        driver.take_screenshot()
+        assert driver.process.poll() is None
+        driver.press("ctrl+q", "s")
+        assert wait_for_end(driver.process) == 0, read_errors(driver.process)
     assert not (tmp_path / "drafts").exists() or not list((tmp_path / "drafts").rglob("*.json"))
 
 
@@ -208,22 +216,22 @@ def test_a_picture_is_imported_with_the_room_that_was_clicked(display: str, tmp_
     walls = np.zeros((100, 200), dtype=np.uint8)
     walls[10:90, 10:110] = walls[10:90, 120:190] = 255
     Image.fromarray(walls).save(tmp_path / "plan.png")
-    with run_editor(display, tmp_path, tmp_path / "plan.png") as hands:
-        hands.type("0.1")
+    with run_editor(display, tmp_path, tmp_path / "plan.png") as driver:
+        driver.type("0.1")
 
         def find_red_area() -> tuple[float, float]:
             """Return the middle of the red area, px; (0, 0) if there is none."""
-            red, green, blue = np.moveaxis(hands.take_screenshot(), 2, 0)
+            red, green, blue = np.moveaxis(driver.take_screenshot(), 2, 0)
             found = np.argwhere((red > 180) & (green < 160) & (blue < 160))
             return (0.0, 0.0) if len(found) < 1000 else (np.median(found[:, 1]), np.median(found[:, 0]))
 
-        hands.wait_until(lambda: find_red_area()[0], "room that is left out")
+        driver.wait_until(lambda: find_red_area()[0], "room that is left out")
         x, y = find_red_area()
-        hands.click(x, y)
-        hands.wait_until(lambda: 0 < find_red_area()[0] < x - 50, "other room that is left out")
-        hands.press("Return", "ctrl+s")
-        hands.press("Return")
-        hands.wait_until((tmp_path / "plan.json").exists, "saved map")
-        hands.press("ctrl+q")
-        assert wait_for_end(hands.process) == 0, read_errors(hands.process)
+        driver.click(x, y)
+        driver.wait_until(lambda: 0 < find_red_area()[0] < x - 50, "other room that is left out")
+        driver.press("Return", "ctrl+s")
+        driver.press("Return")
+        driver.wait_until((tmp_path / "plan.json").exists, "saved map")
+        driver.press("ctrl+q")
+        assert wait_for_end(driver.process) == 0, read_errors(driver.process)
     assert load_map(tmp_path / "plan.json").free_area == pytest.approx(56.0)

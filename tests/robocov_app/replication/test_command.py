@@ -1,6 +1,6 @@
 """Bad input of `robocov paper`; `test_whole_study` tests the study itself."""
 
-from called import read_error
+from command_calls import read_error
 
 
 def test_a_folder_with_other_files_is_rejected_and_unchanged(tmp_path, capsys):

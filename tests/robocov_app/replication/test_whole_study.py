@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swept import DirectExecutor
+from small_studies import DirectExecutor
 from tiny_paper import TINY, build_options
 from tiny_paper_command import SAVED_FIGURES
 

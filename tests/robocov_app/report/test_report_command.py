@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from called import read_error, read_json
+from command_calls import read_error, read_json
 from drawn_run import SQUARE
 from reported_results import build_record, save_comparison, save_run
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib.text
 import numpy as np
 import pytest
-from called import read_error
+from command_calls import read_error
 from matplotlib.figure import Figure
 
 from robocov.environment import Environment

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from called import read_json
-from swept import build_small_study, read_tables, write_controller
+from command_calls import read_json
+from small_studies import build_small_study, read_tables, write_controller
 
 from robocov.errors import OutputError, RobocovError
 from robocov_app.cli import main

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from swept import build_small_study
+from small_studies import build_small_study
 
 from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError

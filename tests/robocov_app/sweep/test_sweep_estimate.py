@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from swept import HALL, ROOM, build_small_study
+from small_studies import HALL, ROOM, build_small_study
 
 from robocov_app.sweep import estimate as estimate_module
 from robocov_app.sweep.estimate import count_axes, estimate_sweep

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from swept import build_small_study, write_controller
+from small_studies import build_small_study, write_controller
 
 from robocov.errors import OutputError
 from robocov_app.sweep import local_pool as pool_module
@@ -194,7 +194,9 @@ def test_a_worker_ends_with_its_parent_while_compiled_code_runs(tmp_path: Path) 
         f"        __import__('ctypes').PyDLL(None).sleep(600)\n"  # No other thread can run.
     )
     script = (
-        "import sys\nfrom swept import build_small_study\nfrom robocov_app.sweep.sweeping import sweep\n"
+        "import sys\n"
+        "from small_studies import build_small_study\n"
+        "from robocov_app.sweep.sweeping import sweep\n"
         "sweep(build_small_study(controllers=(sys.argv[1],), seeds=(0,)), sys.argv[2], workers=1)\n"
     )
     command = [sys.executable, "-c", script, write_controller(tmp_path, code), str(tmp_path / "out")]

@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from swept import build_small_study, list_run_folders
+from small_studies import build_small_study, list_run_folders
 
 from robocov import __version__
 from robocov.errors import InputError, OutputError

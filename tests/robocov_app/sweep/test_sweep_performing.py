@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pymunk
 import pytest
-from swept import HEAD, ROOM, build_small_study, write_controller
+from small_studies import HEAD, ROOM, build_small_study, write_controller
 
 from robocov.cost import CoverageCost
 from robocov.metrics import compute_cost_history, summarize

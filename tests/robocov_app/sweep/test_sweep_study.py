@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from swept import HALL, ROOM, build_small_study, write_controller
+from small_studies import HALL, ROOM, build_small_study, write_controller
 
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.study.parameters import build_swept_team

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from swept import HALL, write_controller
+from small_studies import HALL, write_controller
 
 from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, save_map

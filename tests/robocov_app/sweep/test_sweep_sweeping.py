@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from swept import ROOM, build_small_study, list_run_folders, read_tables, write_controller
+from small_studies import ROOM, build_small_study, list_run_folders, read_tables, write_controller
 
 from robocov.errors import InputError, OutputError, ParameterError
 from robocov.mapfile import save_map

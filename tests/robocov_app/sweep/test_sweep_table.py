@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from swept import build_small_study, read_tables
+from small_studies import build_small_study, read_tables
 
 from robocov.controllers import Rapf, get_gains
 from robocov.errors import OutputError, RobocovError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from swept import HALL, ROOM, build_small_study, write_controller
+from small_studies import HALL, ROOM, build_small_study, write_controller
 
 from robocov.mapfile import load_map
 from robocov_app.sweep.study.study import StudyMap

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from called import COMMAND
+from command_calls import COMMAND
+from driven_x11_window import MARKS, X11Driver, run_window, start_display
 from served_window import serve_window
-from x11_hands import MARKS, Hands, run_window, start_display
 
 from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFTS_VARIABLE
 from robocov_app.storage.settings import FOLDER_VARIABLE as SETTINGS_VARIABLE
@@ -57,8 +57,8 @@ def read_drafts(folder: Path) -> list[dict]:
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_compiling_window_ends(display: str, tmp_path: Path, number: int) -> None:
     command = [*COMMAND, "demo", "square", "--robots", "3", "--folder", str(tmp_path)]
-    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=True)) as hands:
-        end_process(hands.process, number)
+    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=True)) as driver:
+        end_process(driver.process, number)
 
 
 def test_a_compiling_served_window_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,41 +68,41 @@ def test_a_compiling_served_window_ends(tmp_path: Path, monkeypatch: pytest.Monk
         end_process(link.process, signal.SIGTERM)
 
 
-def draw_circle(hands: Hands) -> None:
-    hands.take_screenshot()
-    hands.press("c")
-    hands.drag((300, 300), (330, 300), (350, 300))
-    hands.take_screenshot()
+def draw_circle(driver: X11Driver) -> None:
+    driver.take_screenshot()
+    driver.press("c")
+    driver.drag((300, 300), (330, 300), (350, 300))
+    driver.take_screenshot()
 
 
-def open_save_question(hands: Hands) -> None:
-    hands.press("ctrl+q")
+def open_save_question(driver: X11Driver) -> None:
+    driver.press("ctrl+q")
 
 
-def open_file_choice(hands: Hands) -> None:
-    hands.press("ctrl+o")
+def open_file_choice(driver: X11Driver) -> None:
+    driver.press("ctrl+o")
 
 
-def open_palette(hands: Hands) -> None:
-    hands.press("ctrl+k")
+def open_palette(driver: X11Driver) -> None:
+    driver.press("ctrl+k")
 
 
-def start_drag(hands: Hands) -> None:
-    hands.move(400, 400)
-    hands.run_xdotool("mousedown", 1)
-    hands.move(430, 430)
+def start_drag(driver: X11Driver) -> None:
+    driver.move(400, 400)
+    driver.run_xdotool("mousedown", 1)
+    driver.move(430, 430)
 
 
 @pytest.mark.parametrize("act", [open_save_question, open_file_choice, open_palette, start_drag])
 def test_an_editor_with_an_open_dialog_or_drag_ends_and_keeps_its_draft(
-    display: str, tmp_path: Path, act: Callable[[Hands], None]
+    display: str, tmp_path: Path, act: Callable[[X11Driver], None]
 ) -> None:
     command = [*COMMAND, "edit", str(tmp_path / "m.json"), "--folder", str(tmp_path), "--size", "1000x640"]
-    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=False)) as hands:
-        draw_circle(hands)
-        act(hands)
+    with run_window(display, tmp_path, command, **build_environment(tmp_path, is_cold=False)) as driver:
+        draw_circle(driver)
+        act(driver)
         time.sleep(0.3)
-        assert hands.process.poll() is None
-        end_process(hands.process, signal.SIGTERM)
+        assert driver.process.poll() is None
+        end_process(driver.process, signal.SIGTERM)
     (draft,) = read_drafts(tmp_path / "drafts")
     assert len(draft["sketch"]["obstacles"]) == 1

@@ -13,7 +13,7 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from called import COMMAND, read_error
+from command_calls import COMMAND, read_error
 from PIL import Image
 from sample_sessions import start_session
 

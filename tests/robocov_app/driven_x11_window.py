@@ -54,7 +54,7 @@ def start_display(size: str = "1200x800x24") -> Iterator[str]:
         wait_for_end(server)
 
 
-class Hands:
+class X11Driver:
     """Presses keys and moves the mouse in the window of a process.
 
     Parameters
@@ -72,7 +72,7 @@ class Hands:
         self.folder = folder
         self.screenshot_count = len(list(folder.glob("robocov-*.png")))
         self.environment = {**os.environ, "DISPLAY": display}
-        self.window = ""
+        self.window_id = ""
 
     def run_xdotool(self, *arguments: object) -> str:
         command = ["xdotool", *map(str, arguments)]
@@ -92,19 +92,19 @@ class Hands:
 
         def has_window() -> bool:
             windows = self.run_xdotool("search", "--onlyvisible", "--pid", self.process.pid)
-            self.window = windows.split("\n")[0]
-            return bool(self.window)
+            self.window_id = windows.split("\n")[0]
+            return bool(self.window_id)
 
         self.wait_until(has_window, "window")
         # There is no window manager that would give it the focus.
-        self.run_xdotool("windowfocus", "--sync", self.window)
+        self.run_xdotool("windowfocus", "--sync", self.window_id)
         time.sleep(0.3)
 
     def press(self, *keys: str) -> None:
         self.run_xdotool("key", "--delay", "60", *keys)
 
     def move(self, x: float, y: float) -> None:
-        self.run_xdotool("mousemove", "--window", self.window, round(x), round(y))
+        self.run_xdotool("mousemove", "--window", self.window_id, round(x), round(y))
         time.sleep(0.06)
 
     def drag(self, *path: tuple[float, float]) -> None:
@@ -149,8 +149,10 @@ class Hands:
 
 
 @contextmanager
-def run_window(display: str, folder: Path, command: Sequence[object], **variables: str) -> Iterator[Hands]:
-    """Run a command that shows a window; yield hands for the window.
+def run_window(
+    display: str, folder: Path, command: Sequence[object], **variables: str
+) -> Iterator[X11Driver]:
+    """Run a command that shows a window; yield a driver of the window.
 
     Parameters
     ----------
@@ -174,9 +176,9 @@ def run_window(display: str, folder: Path, command: Sequence[object], **variable
         text=True,
     )
     try:
-        hands = Hands(process, display, folder)
-        hands.find_window()
-        yield hands
+        driver = X11Driver(process, display, folder)
+        driver.find_window()
+        yield driver
     finally:
         if process.poll() is None:
             process.kill()
