@@ -202,6 +202,7 @@ def _build_mark_layers(trails: ColorScheme) -> list[Layer]:
             needs=("snapshot",),
             legend=marks.build_goals_legend,
             is_default=False,
+            needs_goals=True,
         ),
         Layer(
             "centroids",
@@ -209,6 +210,7 @@ def _build_mark_layers(trails: ColorScheme) -> list[Layer]:
             marks.draw_centroids,
             needs=("snapshot",),
             legend=marks.build_centroids_legend,
+            needs_goals=True,
         ),
     ]
 

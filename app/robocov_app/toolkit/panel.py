@@ -3,10 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
-from robocov_app.look.theme import Theme
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.widgets.ui import Ui
-from robocov_app.toolkit.window.layout import Layout
 from robocov_app.toolkit.window_part import CommandPart
 
 PanelPage: TypeAlias = Callable[[Ui], None]
@@ -43,15 +41,12 @@ class CommandPanel(CommandPart):
 
     tabs: tuple[str, ...] = ()
     tab_widths: tuple[float, ...] = ()
+    # Tips next to the panel do not cover other rows.
+    tip_side = "left"
 
     def __init__(self, commands: CommandTable, run_command: Callable[[str], object]) -> None:
         super().__init__(commands, run_command)
         self.tab = self.tabs[0]
-
-    def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt a layout and a theme; tips are next to the panel, so that they do not cover other rows."""
-        super().arrange(layout, theme)
-        self.ui.tip_side = "left"
 
     def list_pages(self) -> dict[str, PanelPage]:
         """Return the pages by the names of their tabs."""

@@ -44,6 +44,9 @@ class ToolRail(CommandPart):
         Runs the command with a given name.
     """
 
+    # Tips next to the rail do not cover other tools.
+    tip_side = "right"
+
     def __init__(
         self, toolbox: Toolbox[Any], commands: CommandTable, run_command: Callable[[str], object]
     ) -> None:
@@ -56,12 +59,8 @@ class ToolRail(CommandPart):
         return layout.rail
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt a layout and a theme; tips are next to the rail, so that they do not cover other tools.
-
-        A narrow rail has no space for names. There, tips appear at once.
-        """
+        """Adopt a layout and a theme; tips appear at once on a narrow rail, which has no space for names."""
         super().arrange(layout, theme)
-        self.ui.tip_side = "right"
         self._has_labels = layout.rail.width > round(RAIL_WIDTH_PX * layout.scale)
         self.ui.tool_tip.is_immediate = not self._has_labels
 

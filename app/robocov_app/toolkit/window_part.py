@@ -7,6 +7,7 @@ from pygame import Rect, Surface
 
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.widgets.tool_tip import TipSide
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.layout import Box, Layout
 
@@ -24,7 +25,11 @@ class WindowPart:
         Page with the widgets.
     drawn_state : object
         State of the content when it was last drawn, for parts that are redrawn only when it changes.
+    tip_side : TipSide
+        Side on which tooltips appear.
     """
+
+    tip_side: TipSide = "below"
 
     def __init__(self) -> None:
         self.is_covered = False
@@ -53,6 +58,7 @@ class WindowPart:
             self.ui.stop_typing()
         if theme is not self.ui.theme or layout.scale != self.ui.scale:
             self.ui = Ui(self.show_content, theme, layout.scale)
+        self.ui.tip_side = self.tip_side
         self.ui.box = Rect(box)
         self.ui.needs_redraw = True
 

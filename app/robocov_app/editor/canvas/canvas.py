@@ -79,6 +79,8 @@ class EditorCanvas:
     ----------
     editor : Editor
         The editor.
+    has_tools : bool
+        Whether tools are used on this canvas, so that their reach depends on its zoom.
 
     Attributes
     ----------
@@ -96,8 +98,9 @@ class EditorCanvas:
         The view, in pixels of the arena: its upper left corner is (0, 0).
     """
 
-    def __init__(self, editor: Editor) -> None:
+    def __init__(self, editor: Editor, *, has_tools: bool = True) -> None:
         self.editor = editor
+        self._has_tools = has_tools
         self.sheet = Sheet()
         self.entries: list[LegendEntry] = []
         self.team: Team | None = None
@@ -206,7 +209,8 @@ class EditorCanvas:
 
     def _set_camera(self, camera: Camera) -> None:
         self.camera = camera
-        self.editor.pixel = self.layout.scale / camera.zoom
+        if self._has_tools:
+            self.editor.pixel = self.layout.scale / camera.zoom
 
     def contains(self, pixel: Point) -> bool:
         """Return whether a pixel of the window is in the map view."""

@@ -252,14 +252,14 @@ class SelectedObjects:
         """Draw the dashed frame of a selection, and its handles."""
         canvas = scene.canvas
         editor = scene.editor
-        frame = compute_frame(scene.sketch, selection, editor.pixel)
+        frame = compute_frame(scene.sketch, selection, scene.pixel)
         if frame is not None:
             corners = overlay.to_pixels(canvas, shapely.box(*frame).exterior.coords).tolist()
             color = mix(canvas.theme.background, canvas.theme.accent, FRAME_SHARE)
             overlay.draw_dashes(canvas, corners, color, FRAME_DASH_PX)
         handles = editor.handles
-        if scene.sketch is not editor.sketch:
-            handles = list_handles(scene.sketch, selection, editor.pixel)
+        if scene.sketch is not editor.sketch or scene.pixel != editor.pixel:
+            handles = list_handles(scene.sketch, selection, scene.pixel)
         overlay.draw_handles(canvas, handles, selection.vertices, scene.state.hovered_handle)
 
 

@@ -62,6 +62,11 @@ class EditorScene:
     cursor: Point | None
 
     @property
+    def pixel(self) -> float:
+        """Side length of a pixel at scale 1, m."""
+        return self.canvas.scale / self.canvas.camera.zoom
+
+    @property
     def measurement(self) -> Measurement | None:
         """Measurement of the map; None if passages that are too narrow are not shown."""
         return self.editor.shown_measurement

@@ -23,21 +23,16 @@ class EditorMapPicture:
     def __init__(self, editor: Editor, window_canvas: EditorCanvas) -> None:
         self._editor = editor
         self._window_canvas = window_canvas
-        self._canvas = EditorCanvas(editor)
+        self._canvas = EditorCanvas(editor, has_tools=False)
 
     def draw(self, size: tuple[int, int], scale: float, *, is_controlling: bool) -> pygame.Surface:
         """Draw the map and the message. See `MapPicture`."""
         editor = self._editor
         layout = build_layout(size, scale, panel=False, plot=False, is_compact=True)
         surface = pygame.Surface(size, 0, 32)
-        # Handles have the size of a finger in the picture, but tools reach as far as in the window.
-        window_pixel = editor.pixel
-        try:
-            self._canvas.arrange(layout, get_theme(editor.theme))
-            self._canvas.follow(self._window_canvas)
-            self._canvas.draw(surface)
-        finally:
-            editor.pixel = window_pixel
+        self._canvas.arrange(layout, get_theme(editor.theme))
+        self._canvas.follow(self._window_canvas)
+        self._canvas.draw(surface)
         draw_message(
             surface,
             editor.message,
@@ -53,6 +48,5 @@ class EditorMapPicture:
 
         A point of the map that the window does not show becomes a pixel at the edge of its map.
         """
-        x, y = self._window_canvas.to_pixel(self._canvas.to_world(pixel))
-        left, top, width, height = self._window_canvas.layout.arena
-        return min(max(x, left), left + width - 1.0), min(max(y, top), top + height - 1.0)
+        window_pixel = self._window_canvas.to_pixel(self._canvas.to_world(pixel))
+        return self._window_canvas.layout.arena.clamp(window_pixel)

@@ -32,6 +32,8 @@ class Layer:
         Whether the layer depends only on the map, the camera and the theme.
     is_in_world : bool
         Whether the layer is drawn only within the view of the camera.
+    needs_goals : bool
+        Whether the layer is empty for controllers without goals, such as RPF.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Layer:
     is_default: bool = True
     is_static: bool = False
     is_in_world: bool = True
+    needs_goals: bool = False
 
     def can_draw(self, scene: Scene) -> bool:
         """Return whether a scene has all attributes that the layer needs."""

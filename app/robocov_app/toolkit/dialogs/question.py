@@ -26,10 +26,6 @@ _BUTTON_MARGIN_PX = 18
 _KEY_STEPS = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}
 
 
-def _do_nothing() -> None:
-    pass
-
-
 @dataclass
 class Answer:
     """An answer to a question, shown as a button.
@@ -44,7 +40,7 @@ class Answer:
     """
 
     text: str
-    call: Callable[[], object] = _do_nothing
+    call: Callable[[], object] = lambda: None
     key: str = ""
 
 
@@ -67,7 +63,7 @@ class Question(Dialog):
     title: str
     text: str
     answers: Sequence[Answer]
-    on_cancel: Callable[[], object] = _do_nothing
+    on_cancel: Callable[[], object] = lambda: None
     highlighted: int = 0
 
     closes_on_outside_click = True

@@ -179,7 +179,7 @@ class Page(RowLayout):
     def leave(self) -> None:
         """Record that the pointer has left the window, so that it is over no widget."""
         self.pointer = _OUTSIDE
-        self.tool_tip.note_hovered("")
+        self.tool_tip.set_hovered("")
         self.needs_redraw = True
 
     def stop_typing(self) -> None:

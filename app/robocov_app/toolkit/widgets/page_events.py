@@ -54,7 +54,7 @@ class PageEvents:
             widget = next(page.find_hovered_widgets(), None)
             if widget is not None:
                 hovered = f"{widget.kind}:{widget.key}"
-            if page.tool_tip.note_hovered(hovered):
+            if page.tool_tip.set_hovered(hovered):
                 page.needs_redraw = True
             return page.is_pointer_inside()
         self._run_for(event)

@@ -69,8 +69,8 @@ class ToolTip:
         """Show no tip until the mouse is over another widget, because this one was pressed."""
         self._is_dismissed = True
 
-    def note_hovered(self, widget: str) -> bool:
-        """Record the widget under the mouse, and return whether it has changed.
+    def set_hovered(self, widget: str) -> bool:
+        """Set the widget under the mouse, and return whether it is another one than before.
 
         Parameters
         ----------
@@ -159,10 +159,10 @@ def _place_box(
         box.midright = page.left - distance, widget.centery
         if box.left >= window.left:
             return box.clamp(window)
-    covered = widget if side == "below" else page
-    box.midtop = widget.centerx, covered.bottom + distance
+    anchor = widget if side == "below" else page
+    box.midtop = widget.centerx, anchor.bottom + distance
     if box.bottom > window.bottom:
-        box.bottom = covered.top - distance
+        box.bottom = anchor.top - distance
     return box.clamp(window)
 
 

@@ -62,6 +62,12 @@ class Box(NamedTuple):
         """Width and height, px."""
         return self.width, self.height
 
+    def clamp(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return the pixel of the box that is nearest to a pixel."""
+        x = min(max(pixel[0], self.left), self.left + self.width - 1.0)
+        y = min(max(pixel[1], self.top), self.top + self.height - 1.0)
+        return x, y
+
 
 class Layout(NamedTuple):
     """Boxes of a window.

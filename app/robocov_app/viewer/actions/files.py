@@ -21,11 +21,7 @@ from robocov_app.viewer.session.files.workspace import (
 from robocov_app.viewer.session.session import Session
 
 MAX_RECENT_FILES = 9
-_DRAFT_HINT = "Your unsaved session is kept: Ctrl+Shift+O opens it."
-
-
-def _do_nothing() -> None:
-    pass
+_KEPT_SESSION_HINT = "Your unsaved session is kept: Ctrl+Shift+O opens it."
 
 
 class FileActions:
@@ -72,7 +68,7 @@ class FileActions:
         self.draft_folder = draft_folder
         self.recent: list[str] = []
         self.workspace = SessionWorkspace(viewer.session, draft_folder, file)
-        self.before_opening: Callable[[], object] = _do_nothing
+        self.before_opening: Callable[[], object] = lambda: None
         self._viewer = viewer
         self._map_names = {viewer.session.displayed.environment.name: map_name}
 
@@ -222,7 +218,7 @@ class FileActions:
         if saved.lesson is not None:
             hints.append("F2 plays its lesson.")
         if keeps_draft:
-            hints.append(_DRAFT_HINT)
+            hints.append(_KEPT_SESSION_HINT)
         message = f"session opened: {path}"
         if hints:
             message += f". {' '.join(hints)}"
@@ -240,7 +236,7 @@ class FileActions:
         keeps_draft = self._replace_workspace(workspace, view)
         message = f"recovered: {describe_draft(draft)}"
         if keeps_draft:
-            message += f". {_DRAFT_HINT}"
+            message += f". {_KEPT_SESSION_HINT}"
         return message
 
     def _add_recent(self, path: Path) -> None:

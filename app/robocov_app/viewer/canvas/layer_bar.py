@@ -141,7 +141,7 @@ class LayerBar(BasicFocusGroup):
         """Record the position of the mouse; None if it has left the window."""
         chip = None if pixel is None else self._find_chip(pixel)
         self._hovered = "" if chip is None else _get_id(chip)
-        self._tool_tip.note_hovered(self._hovered)
+        self._tool_tip.set_hovered(self._hovered)
 
     def is_over(self, pixel: Pixel) -> bool:
         """Return whether a pixel is on a chip or on the open menu."""

@@ -34,8 +34,6 @@ _ICON_WIDTH_PX = 16.0
 
 _MARK_TEXTS = {CELL_CENTROID: "centroids", GOAL: "goals"}
 """Texts of the marks that the same layer draws, depending on the controller."""
-_GOAL_LAYERS = ("centroids", "goals")
-"""Layers that are empty for controllers without goals, such as RPF."""
 _DIMMED_ALPHA = 150
 """Opacity, up to 255, of the veil over the symbols of hidden layers."""
 
@@ -107,7 +105,7 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
 
 def _describe_exceptions(layer: Layer, scenes: Sequence[Scene]) -> str:
     """Return which controllers have no goals, such as " (not RPF)"; empty if all have some."""
-    if layer.name not in _GOAL_LAYERS:
+    if not layer.needs_goals:
         return ""
     labels = [scene.label for scene in scenes if not (layer.can_draw(scene) and layer.legend(scene))]
     if not labels:

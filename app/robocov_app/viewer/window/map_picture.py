@@ -104,9 +104,7 @@ class ViewerMapPicture:
             return self._find_time_pixel(pixel)
         panes = self._sources.canvas.layout.panes
         pane = min(self._canvas.find_pane(pixel) or 0, len(panes) - 1)
-        x, y = self._sources.canvas.to_pixel(self._canvas.to_world(pixel, pane), pane)
-        left, top, width, height = panes[pane]
-        return min(max(x, left), left + width - 1.0), min(max(y, top), top + height - 1.0)
+        return panes[pane].clamp(self._sources.canvas.to_pixel(self._canvas.to_world(pixel, pane), pane))
 
     def _find_lesson_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return the center of the window's button that a button of the lesson in the picture stands for."""
@@ -119,9 +117,9 @@ class ViewerMapPicture:
 
     def _find_time_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return the pixel on the time slider of the window with the time of a pixel of the picture."""
-        left, top, width, height = self._sources.chart.layout.time_slider
-        x = self._sources.chart.to_column(self._chart.to_time(pixel[0]))
-        return min(max(x, left), left + width - 1.0), top + 0.5 * height
+        slider = self._sources.chart.layout.time_slider
+        column = self._sources.chart.to_column(self._chart.to_time(pixel[0]))
+        return slider.clamp((column, slider.top + 0.5 * slider.height))
 
     def _arrange(self, size: tuple[int, int], scale: float) -> None:
         """Lay out the picture if something has changed on which its layout depends."""
