@@ -7,7 +7,7 @@ import numpy as np
 
 from robocov.environment import Environment
 from robocov.typing import FloatArray
-from robocov_app.viewer.costs.costs import Costs
+from robocov_app.viewer.costs.costs import Costs, KnownCost
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.states import PaneSetup
@@ -54,18 +54,15 @@ class CostCurves:
     Attributes
     ----------
     answer_count : int
-        Number of answers so far about the displayed map.
-    earlier_answer_count : int
-        Number of answers so far about earlier maps.
+        Number of answers so far, about the displayed map and about earlier maps.
     """
 
     def __init__(self, viewer: ViewerModel) -> None:
         self.answer_count = 0
-        self.earlier_answer_count = 0
         self._viewer = viewer
         self._past_version = -1  # of the timeline at the last request
-        # Panes whose next cost is that of the displayed step, while costs of the first seconds are missing.
-        self._panes_of_displayed_step: set[int] = set()
+        # Numbers of panes whose next request is for the displayed step instead of the first seconds.
+        self._panes_due_for_displayed_step: set[int] = set()
         self._earlier_costs: Costs | None = None
         self._earlier_map: Environment | None = None
 
@@ -123,11 +120,13 @@ class CostCurves:
         session = self._viewer.session
         if not session.timeline.is_live or self._viewer.costs.state:
             return
-        missing = [state for pane in session.timeline.panes if (state := self._find_missing_state(pane))]
+        found = [self._find_missing_state(pane) for pane in session.timeline.panes]
+        missing = [state for state in found if state is not None]
+        displayed_map = session.displayed.environment
         for state in missing:
-            if state.environment is session.displayed.environment:
+            if state.environment is displayed_map:
                 self._request_on_displayed_map(state)
-        earlier = [state for state in missing if state.environment is not session.displayed.environment]
+        earlier = [state for state in missing if state.environment is not displayed_map]
         if earlier:
             self._request_on_earlier_map(earlier)
         elif not missing:
@@ -153,12 +152,10 @@ class CostCurves:
 
         While the run plays, these requests alternate with those for the displayed step of the same pane.
         """
-        is_turn_of_displayed_step = state.pane in self._panes_of_displayed_step
-        if self._viewer.session.playback.is_playing and is_turn_of_displayed_step:
+        is_displayed_step_due = state.pane in self._panes_due_for_displayed_step
+        if self._viewer.session.playback.is_playing and is_displayed_step_due:
             return
-        self._viewer.costs.request(
-            state.pane, state.time, state.positions, speeds=state.setup.speed_limits, is_for_curve=True
-        )
+        _request_for_curve(self._viewer.costs, state)
 
     def _request_on_earlier_map(self, states: Sequence[_MissingState]) -> None:
         """Request the costs of states on the newest of their maps, unless another request is pending."""
@@ -174,13 +171,7 @@ class CostCurves:
             return
         for state in states:
             if state.environment is newest.environment:
-                costs.request(
-                    state.pane,
-                    state.time,
-                    state.positions,
-                    speeds=state.setup.speed_limits,
-                    is_for_curve=True,
-                )
+                _request_for_curve(costs, state)
 
     def close(self) -> None:
         """End the process that computes costs on earlier maps."""
@@ -190,19 +181,34 @@ class CostCurves:
         self._earlier_map = None
 
     def _add_answers(self) -> None:
+        """Add the costs that have arrived to the curves of the panes."""
         answers = self._viewer.costs.poll()
-        self.answer_count += len(answers)
         # Each pane has its own turns. With common ones, two panes would always have the same one.
         for number, _ in answers:
-            self._panes_of_displayed_step ^= {number}
+            self._panes_due_for_displayed_step ^= {number}
         if self._earlier_costs is not None:
-            earlier_answers = self._earlier_costs.poll()
-            self.earlier_answer_count += len(earlier_answers)
-            answers += earlier_answers
+            answers += self._earlier_costs.poll()
+        self.answer_count += len(answers)
+        panes = {pane.number: pane for pane in self._viewer.session.timeline.panes}
         for number, known_cost in answers:
-            for pane in self._viewer.session.timeline.panes:
-                if pane.number != number or known_cost.time > pane.time + TIME_TOLERANCE_S:
-                    continue
-                pane.distance_curve.add(known_cost.time, known_cost.result.mean_distance)
-                if known_cost.travel_time is not None:
-                    pane.curves["time"].add(known_cost.time, known_cost.travel_time)
+            pane = panes.get(number)
+            if pane is not None and known_cost.time <= pane.time + TIME_TOLERANCE_S:
+                _add_to_curves(pane, known_cost)
+
+
+def _request_for_curve(costs: Costs, state: _MissingState) -> None:
+    """Request the cost of an earlier state, which is only added to a curve."""
+    costs.request(
+        state.pane,
+        state.time,
+        state.positions,
+        speeds=state.setup.speed_limits,
+        is_for_curve=True,
+    )
+
+
+def _add_to_curves(pane: Pane, known_cost: KnownCost) -> None:
+    """Add a cost to the curves of a pane."""
+    pane.distance_curve.add(known_cost.time, known_cost.result.mean_distance)
+    if known_cost.travel_time is not None:
+        pane.curves["time"].add(known_cost.time, known_cost.travel_time)

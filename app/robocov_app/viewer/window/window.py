@@ -319,7 +319,6 @@ class ViewerWindow(CommandWindow):
             session.timeline.past_version,
             session.playback.is_playing,
             self._cost_curves.answer_count,
-            self._cost_curves.earlier_answer_count,
             self._status.seek_progress,
             viewer.costs.state,
             self._arrangement.key,
