@@ -1,10 +1,17 @@
-"""Checking that robots use nothing but their own observations, by repeating the decisions of single robots.
+"""A team whose robots are controlled by separate processes, each of which gets its own observations only.
 
-First a run is recorded: its transcript contains the observations and the decisions of all steps. Then, for
-each robot that is checked, the controller is called again in a new process with the observations of only this
-robot. The simulation depends on the controller only through its decisions. Therefore, if forces, goals and
-messages are the same in all steps, bit for bit, the run would have been the same if each of these robots had
-been controlled by a separate process.
+During a verification, the code of a controller is never in the process that simulates the run, records it and
+computes its figures. That process, the referee, calls an `IsolatedTeam`, which asks other processes for a
+decision in each step:
+
+- one process decides for the whole team. Its decisions are executed.
+- For each robot that is checked, another process receives only the observations of this robot. Its decision
+  must be the same as that for the team, bit for bit. The process of the team does not know which robots are
+  checked.
+
+No process receives the observations of a step before it has decided in the step before, so none can infer
+from later observations what the team did. If the decisions of a robot are the same in all steps, the run
+would have been the same if a separate process had controlled this robot.
 
 The input of a process depends on the information that the controller declares:
 
@@ -15,106 +22,42 @@ shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
-If the density is unknown, no process receives it: its sensor repeats the measurements that the robot has made
-in the run, and raises an error for all others.
+If the density is unknown, no process has it: the referee measures it for the robot of the process, within its
+sensing range.
 
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
-an empty scan. Only the oracle, whose robots decide together, receives the observations of all robots. Its
-check shows that the decisions follow from the observations and the map, but ignores the limits of
-communication.
+an empty scan. Only the oracle, whose robots decide together, has no processes for single robots. Its check
+shows that its decisions follow from the observations and the map, but ignores the limits of communication.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from robocov.controllers.base import Information
 from robocov.environment import Environment
-from robocov.observation import Message, Observations, RecordedDensitySensor, Scans, Snapshot
+from robocov.errors import RobocovError
+from robocov.observation import (
+    Decision,
+    DensitySensor,
+    Message,
+    Observations,
+    RecordedDensitySensor,
+    Scanning,
+    Scans,
+    Snapshot,
+)
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
-from robocov.typing import BoolArray, FloatArray
-from robocov_app.sweep.tasks import Task
+from robocov.team import Team
+from robocov.typing import BoolArray, FloatArray, IntArray
+from robocov_app.benchmark.controller_messages import ControllerCode, Setup
 
 _MAX_ATTEMPTS = 1000
 """Maximum number of attempts to draw random points in a region, which may be very thin."""
-
-
-@dataclass(eq=False)
-class Transcript:
-    """Observations and decisions of a run, for all of its steps.
-
-    Attributes
-    ----------
-    observations : list of Observations
-        Observations of all robots in each step.
-    working : list of (n,) bool array or None
-        Mask of the working robots in each step; None if all are working.
-    forces : list of (n, 2) array, N
-        Forces that the controller commanded in each step.
-    goals : list of (n, 2) array or None, m
-        Goals in each step; None if the controller has none.
-    messages : list of sequence of sequence of Message
-        Messages that each robot sent in each step.
-    """
-
-    observations: list[Observations] = field(default_factory=list)
-    working: list[BoolArray | None] = field(default_factory=list)
-    forces: list[FloatArray] = field(default_factory=list)
-    goals: list[FloatArray | None] = field(default_factory=list)
-    messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
-
-    def add(self, snapshot: Snapshot) -> None:
-        """Append the observations and decisions of a step."""
-        self.observations.append(snapshot.seen)
-        self.working.append(snapshot.working)
-        self.forces.append(snapshot.decision.forces)
-        self.goals.append(snapshot.decision.goals)
-        self.messages.append(snapshot.decision.messages)
-
-
-@dataclass(frozen=True, eq=False)
-class Replay:
-    """The observations for which a controller is called again, in a separate process.
-
-    Attributes
-    ----------
-    task : Task
-        The run, from which the controller and the team are taken.
-    robot : int or None
-        Row of the robot that is checked; None for the whole team.
-    observations : sequence of Observations
-        Observations of each step, without those that the process must not receive.
-    environment : Environment or None
-        The map, if the controller may know it.
-    """
-
-    task: Task
-    robot: int | None
-    observations: Sequence[Observations]
-    environment: Environment | None
-
-
-@dataclass(frozen=True, eq=False)
-class Decisions:
-    """Decisions in a replay.
-
-    Attributes
-    ----------
-    forces, goals, messages : list
-        As in `Transcript`, for the steps up to an error.
-    problem : str
-        Error of the controller that ended the replay; empty if there was none.
-    """
-
-    forces: list[FloatArray] = field(default_factory=list)
-    goals: list[FloatArray | None] = field(default_factory=list)
-    messages: list[Sequence[Sequence[Message]]] = field(default_factory=list)
-    problem: str = ""
 
 
 def hide_others(observations: Observations, robot: int, substitutes: FloatArray) -> Observations:
@@ -213,158 +156,165 @@ def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> Fl
     return np.repeat(region.centroid[None], count, axis=0)
 
 
-def build_replay(
-    task: Task, transcript: Transcript, information: Information, robot: int | None, rng: np.random.Generator
-) -> Replay:
-    """Build the replay that checks a robot of a run.
+class Decider(Protocol):
+    """Something that decides for a robot or for the team, such as a `ControllerProcess`."""
+
+    def begin(self, setup: Setup) -> None:
+        """Receive what is known before the first step."""
+
+    def finish_beginning(self) -> None:
+        """Wait until the controller is ready; raise RobocovError if it fails."""
+
+    def send_observations(self, observations: Observations) -> None:
+        """Receive the observations of a step."""
+
+    def receive_decision(self, measure: Any) -> Decision:
+        """Return the decision for these observations; raise RobocovError if there is none."""
+
+
+class IsolatedTeam:
+    """Controller of a simulation whose decisions are made elsewhere; see the description of this module.
 
     Parameters
     ----------
-    task : Task
-        The run.
-    transcript : Transcript
-        Observations and decisions of the run.
-    information : Information
-        The information that the controller declares. It determines the input of the process.
-    robot : int or None
-        Row of the robot; if None, the process receives the observations of all robots.
+    code : ControllerCode
+        The controller.
+    team : Decider
+        Decides for all robots.
+    robots : mapping of int to Decider
+        The processes of the robots that are checked, by row.
+    scanning : Scanning or None
+        Settings of the range scans that the controller needs.
+    environment : Environment or None
+        The map, if the controller may know it.
     rng : Generator
         Random numbers for the placeholders.
 
-    Returns
-    -------
-    Replay
+    Attributes
+    ----------
+    differences : list of str
+        The first difference of each robot.
     """
-    task = task.hide_unknown_density()
-    environment = None
-    if information == "whole map":
-        environment = task.build_environment().static
-    observations = transcript.observations
-    if robot is not None:
-        substitutes = draw_substitutes(observations[0].region, task.robots, rng)
-        observations = [hide_others(each, robot, substitutes) for each in observations]
-    return Replay(task, robot, observations, environment)
+
+    name = label = "isolated"
+    summary = "decides in separate processes"
+
+    def __init__(
+        self,
+        code: ControllerCode,
+        team: Decider,
+        robots: Mapping[int, Decider],
+        *,
+        scanning: Scanning | None,
+        environment: Environment | None,
+        rng: np.random.Generator,
+    ) -> None:
+        self.scanning = scanning
+        self.differences: list[str] = []
+        self._code = code
+        self._team = team
+        self._robots = dict(robots)
+        self._environment = environment
+        self._rng = rng
+        self._substitutes = np.zeros((0, 2))
+        self._team_decision: Decision | None = None
+        self._own_decisions: dict[int, Decision] = {}
+
+    def begin(self, region: Region, team: Team) -> None:
+        """Send all processes what they know before the first step, and wait until they are ready."""
+        self._substitutes = draw_substitutes(region, len(team), self._rng)
+        deciders: list[tuple[int | None, Decider]] = [(None, self._team), *self._robots.items()]
+        for robot, decider in deciders:
+            decider.begin(Setup(self._code, robot, self._environment, region, team))
+        self._team.finish_beginning()
+        for robot, decider in list(self._robots.items()):
+            try:
+                decider.finish_beginning()
+            except RobocovError as error:
+                self._stop_checking(robot, f"in a separate process: {error}")
+
+    def decide(self, seen: Observations, memory: object) -> Decision:
+        """Return the decision for the team, after all processes have decided."""
+        self._team.send_observations(seen)
+        for robot, decider in self._robots.items():
+            decider.send_observations(hide_others(seen, robot, self._substitutes))
+        sensor = seen.density_sensor
+        team_decision = self._team.receive_decision(None if sensor is None else sensor.measure)
+        self._team_decision = team_decision
+        self._own_decisions = {}
+        for robot, decider in list(self._robots.items()):
+            own_sensor = None if sensor is None else _OwnSensor(sensor, robot)
+            try:
+                self._own_decisions[robot] = decider.receive_decision(
+                    None if own_sensor is None else own_sensor.measure
+                )
+            except RobocovError as error:
+                self._stop_checking(robot, f"in a separate process: {error}")
+        return team_decision
+
+    def compare_decisions(self, snapshot: Snapshot) -> None:
+        """Compare the decisions of the latest step. Those of failed robots have no effect and are ignored."""
+        assert self._team_decision is not None
+        for robot, own_decision in self._own_decisions.items():
+            if snapshot.working is not None and not snapshot.working[robot]:
+                continue
+            if not _is_same_decision(self._team_decision, own_decision, robot):
+                self._stop_checking(
+                    robot,
+                    f"decides differently from {snapshot.time:.2f} s on "
+                    f"if its process receives only {self._describe_knowledge()}",
+                )
+
+    def _stop_checking(self, robot: int, difference: str) -> None:
+        """Note the first difference of a robot, whose process then receives nothing more."""
+        self.differences.append(f"robot {robot + 1} {difference}")
+        del self._robots[robot]
+
+    def _describe_knowledge(self) -> str:
+        if self._environment is None:
+            return "its own observations"
+        return "its own observations and the map"
 
 
-def find_difference(transcript: Transcript, replay: Replay, decisions: Decisions) -> str | None:
-    """Find the first difference between the decisions of a run and those of a replay.
+class _OwnSensor:
+    """Measures an unknown density for a single robot.
 
     Parameters
     ----------
-    transcript : Transcript
-        Observations and decisions of the run.
-    replay : Replay
-        The replay of the run.
-    decisions : Decisions
-        Decisions in the replay.
-
-    Returns
-    -------
-    str or None
-        Description of the difference; None if there is none. Decisions of failed robots are ignored.
+    sensor : DensitySensor
+        Sensor of the team in this step.
+    robot : int
+        Row of the robot. All other robots measure 1.
     """
-    checked = np.array([replay.robot])
-    if replay.robot is None:
-        checked = np.arange(len(transcript.forces[0]))
-    for step, observations in enumerate(transcript.observations):
-        working = transcript.working[step]
-        robots = checked if working is None else checked[working[checked]]
-        if step >= len(decisions.forces):
-            reason = decisions.problem or "the process ended"
-            return f"{_format_robot(replay.robot)} in a separate process: {reason}"
-        is_same = _have_same_rows(transcript.forces[step], decisions.forces[step], robots)
-        is_same &= _have_same_rows(transcript.goals[step], decisions.goals[step], robots)
-        is_same &= _have_same_messages(transcript.messages[step], decisions.messages[step], robots)
-        if not is_same.all():
-            robot = int(robots[~is_same][0])
-            return (
-                f"robot {robot + 1} decides differently from {observations.time:.2f} s on "
-                f"if its process receives only {_describe_knowledge(replay)}"
-            )
-    return None
+
+    def __init__(self, sensor: DensitySensor, robot: int) -> None:
+        self._sensor = sensor
+        self._robot = robot
+
+    def measure(self, robots: IntArray, points: FloatArray) -> FloatArray:
+        """Return the density at the points of the robot."""
+        values = np.ones(len(points))
+        is_own = robots == self._robot
+        values[is_own] = self._sensor.measure(robots[is_own], points[is_own])
+        return values
 
 
-def _have_same_rows(expected: FloatArray | None, actual: FloatArray | None, robots: Any) -> BoolArray:
-    """Return a mask of the k robots whose rows are the same in two arrays, bit for bit."""
-    if expected is None or actual is None:
-        return np.full(len(robots), expected is actual)
-    pairs = zip(expected[robots], actual[robots], strict=True)
-    return np.array([first.tobytes() == second.tobytes() for first, second in pairs], dtype=bool)
-
-
-def _have_same_messages(
-    expected: Sequence[Sequence[Message]], actual: Sequence[Sequence[Message]], robots: Any
-) -> BoolArray:
-    """Return a mask of the k robots whose sent messages are the same."""
-    if not expected and not actual:
-        return np.ones(len(robots), dtype=bool)
-    is_same = []
-    for robot in robots:
-        own_expected = expected[robot] if expected else ()
-        own_actual = actual[robot] if actual else ()
-        is_same.append(is_same_content(_list_contents(own_expected), _list_contents(own_actual)))
-    return np.array(is_same, dtype=bool)
-
-
-def _list_contents(messages: Sequence[Message]) -> list[tuple[int, Any]]:
-    return [(message.size, message.payload) for message in messages]
-
-
-def is_same_content(first: Any, second: Any) -> bool:
-    """Return whether two objects have the same content, bit for bit.
-
-    Arrays, containers and objects with attributes are compared by their content, floats by their bits.
-
-    Parameters
-    ----------
-    first, second : object
-
-    Returns
-    -------
-    bool
-
-    Examples
-    --------
-    >>> is_same_content([1.0, {"map": np.zeros(3)}], [1.0, {"map": np.zeros(3)}])
-    True
-    >>> is_same_content((0.0,), (-0.0,))
-    False
-    """
-    if type(first) is not type(second):
+def _is_same_decision(team_decision: Decision, own_decision: Decision, robot: int) -> bool:
+    """Return whether two decisions agree for a robot in force, goal and messages, bit for bit."""
+    if not _is_same_row(team_decision.forces, own_decision.forces, robot):
         return False
-    if isinstance(first, np.ndarray):
-        if first.dtype != second.dtype or first.shape != second.shape:
-            return False
-        if first.dtype.hasobject:
-            return is_same_content(first.tolist(), second.tolist())
-        return bool(first.tobytes() == second.tobytes())
-    if isinstance(first, float):
-        return bool(first.hex() == second.hex())
-    if isinstance(first, Mapping):
-        return is_same_content(list(first.items()), list(second.items()))
-    if isinstance(first, list | tuple):
-        pairs = zip(first, second, strict=False)
-        return len(first) == len(second) and all(is_same_content(*pair) for pair in pairs)
-    if isinstance(first, str | bytes | int | None | set | frozenset):
-        return bool(first == second)
-    return _get_attributes(first) == {} or is_same_content(_get_attributes(first), _get_attributes(second))
+    if not _is_same_row(team_decision.goals, own_decision.goals, robot):
+        return False
+    return _list_contents(team_decision, robot) == _list_contents(own_decision, robot)
 
 
-def _get_attributes(value: Any) -> dict[str, Any]:
-    """Return the attributes of an object, including those in slots, by name."""
-    names = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
-    attributes = {name: getattr(value, name) for name in names if hasattr(value, name)}
-    return {**attributes, **getattr(value, "__dict__", {})}
+def _is_same_row(first: FloatArray | None, second: FloatArray | None, robot: int) -> bool:
+    if first is None or second is None:
+        return first is second
+    return bool(first[robot].tobytes() == second[robot].tobytes())
 
 
-def _format_robot(robot: int | None) -> str:
-    return "the team" if robot is None else f"robot {robot + 1}"
-
-
-def _describe_knowledge(replay: Replay) -> str:
-    knowledge = "the observations of the team"
-    if replay.robot is not None:
-        knowledge = "its own observations"
-    if replay.environment is not None:
-        knowledge += " and the map"
-    return knowledge
+def _list_contents(decision: Decision, robot: int) -> list[tuple[int, Any]]:
+    """Return the size and the payload of each message of a robot."""
+    messages: Sequence[Message] = decision.messages[robot] if decision.messages else ()
+    return [(message.size, message.payload) for message in messages]

@@ -21,7 +21,7 @@ from robocov_app.benchmark.label_placement import (
     place_labels,
 )
 from robocov_app.benchmark.ratings import Rating, format_number
-from robocov_app.benchmark.results import shares_maps_by_messages
+from robocov_app.benchmark.results import describe_method, shares_maps_by_messages
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
@@ -52,7 +52,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         lambda rating: rating.compute_median("path_length_m"),
     ),
     "computing": Quantity(
-        "computing time",
+        "computing time, as reported",
         "µs per robot and second",
         lambda rating: 1e6 * rating.compute_rate("deciding_s"),
     ),
@@ -104,12 +104,14 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     """Build the page that compares results, with a section for each track.
 
     Complete entries are ranked by their scores. Each entry is rated over its own runs, so that the rating of
-    an entry does not depend on other entries.
+    an entry does not depend on other entries. Bundled results keep their labels and colors, and other entries
+    are compared with these, whatever controller another result claims to be from.
 
     Parameters
     ----------
     results : sequence of Mapping
-        As returned by `robocov_app.benchmark.results.read_result`.
+        As returned by `robocov_app.benchmark.results.read_result`, or by
+        `robocov_app.benchmark.results.load_bundled_results`.
     title : str
         Title of the page.
 
@@ -123,6 +125,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     ParameterError
         If the results contain no runs of the suite.
     """
+    results = sorted(results, key=lambda result: not result["is_bundled"])
     labels = ratings.label_results(results)
     styles = choose_curve_styles([result["entry"]["controller"] for result in results])
     information = [result["entry"]["information"] for result in results]
@@ -148,7 +151,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         anomalies=_build_anomaly_table(results, labels),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
-        method=_collect_method_sentences(results),
+        method=describe_method(),
         entries=_build_entries_table(results, labels),
     )
     return escape_controls(page)
@@ -158,10 +161,19 @@ def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]
     """Return the labels of the results of yardsticks with default gains."""
     yardsticks = []
     for result, label in zip(results, labels, strict=True):
-        entry = result["entry"]
-        if entry["controller"] in YARDSTICKS and not entry["set"]:
+        if _is_default_result(result, results) and result["entry"]["controller"] in YARDSTICKS:
             yardsticks.append(label)
     return yardsticks
+
+
+def _is_default_result(result: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether a result is that of a built-in controller with default gains.
+
+    If there are bundled results, only these count, because a file can contain any name of a controller.
+    """
+    if any(other["is_bundled"] for other in results) and not result["is_bundled"]:
+        return False
+    return not result["entry"]["set"] and not result["entry"]["source_sha256"]
 
 
 def _build_sort_key(rating: Rating) -> tuple[bool, float]:
@@ -440,19 +452,6 @@ def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     return front
 
 
-def _collect_method_sentences(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Collect the sentences that describe the method of the results, each once.
-
-    Of sentences that differ only in spaces, the last one is listed.
-    """
-    sentences_by_letters: dict[str, str] = {}
-    for result in results:
-        for sentence in result["method"]:
-            letters = "".join(sentence.split())
-            sentences_by_letters[letters] = sentence
-    return list(sentences_by_letters.values())
-
-
 def _describe_entries_without_messages(
     results: Sequence[Mapping[str, Any]], labels: Sequence[str]
 ) -> Iterator[str]:
@@ -477,10 +476,11 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
         source = "built in"
         if entry["source_sha256"]:
             source = f"source {entry['source_sha256'][:12]}"
+        origin = "robocov" if result["is_bundled"] else "a file, not verified here"
         versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
-        rows.append((label, entry["controller"], source, gains or ratings.NO_VALUE, versions))
-    head = ("Controller", "Name", "Code", "Gains", "Versions")
-    return PageTable("Entries", head, rows, text_columns=frozenset({1, 2, 3, 4}))
+        rows.append((label, entry["controller"], source, origin, gains or ratings.NO_VALUE, versions))
+    head = ("Controller", "Name", "Code", "Result from", "Gains", "Versions")
+    return PageTable("Entries", head, rows, text_columns=frozenset({1, 2, 3, 4, 5}))
 
 
 def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
@@ -499,9 +499,8 @@ def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
 
 
 def _find_default_rapf(results: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Return the last result of RAPF with default gains; without one, a result without rows."""
-    rapf: Mapping[str, Any] = {"rows": []}
+    """Return the result of RAPF with default gains; without one, a result without rows."""
     for result in results:
-        if result["entry"]["controller"] == "rapf" and not result["entry"]["set"]:
-            rapf = result
-    return rapf
+        if _is_default_result(result, results) and result["entry"]["controller"] == "rapf":
+            return result
+    return {"rows": []}

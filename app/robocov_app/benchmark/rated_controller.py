@@ -8,16 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from robocov.controllers import get_information, make_controller
+from robocov.controllers import CONTROLLERS, get_information, make_controller
 from robocov.controllers.gains import Value
+from robocov.controllers.user_modules import ControllerSource
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.benchmark import suite
+from robocov_app.benchmark.controller_messages import ControllerCode
 from robocov_app.benchmark.results import find_reference
+from robocov_app.sweep.study.controller_files import read_controller_source
 from robocov_app.sweep.study.study import Study, StudyMap
 
 ORACLE = "oracle"
 """Name of the controller that knows the reference placements; see `robocov_app.benchmark.oracle`."""
+STAND_IN = "rapf"
+"""Controller with which a study of the benchmark is built if the code of its own must not be executed."""
 _ORACLE_FILE = "oracle.py"
 _ORACLE_NAME = f"{_ORACLE_FILE}:Oracle"
 
@@ -107,6 +112,34 @@ class RatedController:
         gains = {name: dict(self.gains)} if self.gains else {}
         return suite.build_study(track, maps, name, gains=gains, seeds=seeds, folder=folder)
 
+    @property
+    def is_built_in(self) -> bool:
+        """Whether the controller is part of robocov."""
+        return self.controller in CONTROLLERS or self.controller == ORACLE
+
+    def replace_user_code(self) -> "RatedController":
+        """Return a controller that can stand for this one in studies without executing the code of a user."""
+        return self if self.is_built_in else RatedController(STAND_IN, {})
+
+    def read_code(self) -> ControllerCode:
+        """Read the code of the controller without executing it.
+
+        Returns
+        -------
+        ControllerCode
+
+        Raises
+        ------
+        ParameterError
+            If its file cannot be read.
+        """
+        name, folder = self._locate_controller()
+        try:
+            source = read_controller_source(name, folder)
+        except ParameterError as error:
+            raise ParameterError(f"--controller: {error}") from None
+        return ControllerCode(name, dict(self.gains), source)
+
     def _locate_controller(self) -> tuple[str, Path]:
         """Return the name of the controller, and the folder to which a relative path of its file refers."""
         if self.controller == ORACLE:
@@ -142,16 +175,32 @@ class RatedController:
         """
         name = study.controllers[0]
         controller_class = study.load_controller_class(name)
-        source = study.sources.get(name)
+        return {
+            **self.identify(study.sources.get(name)),
+            "label": getattr(controller_class, "label", controller_class.__name__),
+            "information": get_information(controller_class),
+            "gains": dict(study.get_gains(name).choices[0]),
+        }
+
+    def identify(self, source: ControllerSource | None) -> dict[str, Any]:
+        """Return the part of a description that does not depend on the code of the controller.
+
+        Parameters
+        ----------
+        source : ControllerSource or None
+            Source text of a controller in a file.
+
+        Returns
+        -------
+        dict
+            Name, the gains that were set, and the SHA-256 of the source code.
+        """
         source_hash = None
         if source is not None and self.controller != ORACLE:
             texts = [source.text, *(module.text for module in source.modules.values())]
             source_hash = hashlib.sha256("\0".join(texts).encode()).hexdigest()
         return {
             "controller": self.controller.rpartition("/")[2],
-            "label": getattr(controller_class, "label", controller_class.__name__),
-            "information": get_information(controller_class),
-            "gains": dict(study.get_gains(name).choices[0]),
             "set": dict(self.gains),
             "source_sha256": source_hash,
         }

@@ -76,8 +76,9 @@ NOTES = (
     "and the Kaplan-Meier median of the time at which this begins; runs that do not settle are censored.",
     "B/s: bytes that a robot sends per second, received or not: 20 for each position (number, position), "
     "and the sizes of the messages of its controller, in which robots share maps and reports about other "
-    "robots. µs/s: processor time of the controller per robot and second of simulation time; it depends on "
-    "the machine.",
+    "robots. The controller itself declares these sizes. µs/s: processor time of the controller per robot "
+    "and second of simulation time, as the entry reports it. It depends on the machine, cannot be verified, "
+    "and has no influence on scores and ranks.",
 )
 
 
@@ -265,12 +266,16 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
     labels: list[str] = []
     for result in results:
         entry = result["entry"]
-        label = str(entry["label"])
+        name = " ".join(str(entry["label"]).split())
         if entry["set"]:
-            gains = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
-            label = f"{label} ({gains})"
-        equal_count = sum(other == label or other.startswith(f"{label} #") for other in labels)
-        labels.append(f"{label} #{equal_count + 1}" if equal_count else label)
+            gains = ", ".join(f"{gain} {value}" for gain, value in entry["set"].items())
+            name = f"{name} ({gains})"
+        label = name
+        number = 1
+        while label in labels:
+            number += 1
+            label = f"{name} #{number}"
+        labels.append(label)
     return labels
 
 

@@ -5,8 +5,7 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Mapping, Sequence
-from operator import itemgetter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
@@ -26,6 +25,8 @@ ENTRIES = Path(__file__).parent / "entries"
 """Folder with the results of the built-in controllers, compressed with ``gzip -9 -n``."""
 RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
 """Entries of a result that identify its format."""
+MAX_LABEL_CHARS = 60
+"""Maximum length of the label of an entry."""
 FIGURES = (
     "mean_distance_m",
     "mean_distance_over_run_m",
@@ -194,7 +195,8 @@ def read_result(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        The result, whose keys and types have been checked.
+        The result, whose keys and types have been checked. Whatever the file contains, ``is_bundled`` is
+        False; see `load_bundled_results`.
 
     Raises
     ------
@@ -216,6 +218,7 @@ def read_result(path: Path) -> dict[str, Any]:
             f"{path}: suite: expected the suite of {suite.SUITE_FILE.name}, got {result.get('suite')}"
         )
     _check_all_except_rows(result, path)
+    result["is_bundled"] = False
     _update_gain_names(result["entry"])
     result["method"] = [_update_figure_names(str(sentence)) for sentence in result["method"]]
     runs = set()
@@ -274,6 +277,8 @@ _ROW_TYPES = {
     ),
 }
 _FIGURES_THAT_MAY_BE_NEGATIVE = ("min_clearance_m", "gap", "gap_to_bound")
+_MAX_FIGURE = 1e15
+"""Maximum of all figures, which no run reaches."""
 _BOUND_TOLERANCE = 1e-9
 """Fraction by which rounding errors may make a cost lower than the lower bound."""
 
@@ -283,6 +288,11 @@ def _check_all_except_rows(result: dict[str, Any], path: Path) -> None:
     _require_types(result, _HEAD_TYPES, path)
     _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
     _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
+    label = result["entry"]["label"]
+    if not 0 < len(label.strip()) <= MAX_LABEL_CHARS:
+        raise InputError(
+            f"{path}: entry: label: expected 1 to {MAX_LABEL_CHARS} characters, got {quote(label)}"
+        )
     information = result["entry"]["information"]
     if information not in get_args(Information):
         expected = ", ".join(get_args(Information))
@@ -318,8 +328,10 @@ def _check_row(row: Any, location: str) -> None:
     if has_failed:
         return
     for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_FIGURES_THAT_MAY_BE_NEGATIVE}):
-        if row[name] is not None and row[name] < 0.0:
-            raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
+        if row[name] is not None and not 0.0 <= row[name] <= _MAX_FIGURE:
+            raise InputError(
+                f"{location}: {name}: expected a number from 0 to {_MAX_FIGURE:g}, got {quote(row[name])}"
+            )
     if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
         raise InputError(
             f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "
@@ -351,19 +363,9 @@ def _require_types(values: Any, types: Mapping[str, Any], location: object) -> N
             raise InputError(f"{location}: {name}: expected {type_name}, got {quote(values[name])}")
 
 
-def load_bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
-    """Return the results of the built-in controllers, except for those that are replaced by other results.
-
-    Parameters
-    ----------
-    others : sequence of Mapping
-        Results that replace built-in results with the same controller, gains and source.
-
-    Returns
-    -------
-    list of dict
-    """
-    identify = itemgetter("controller", "set", "source_sha256")
-    replaced = [identify(result["entry"]) for result in others]
-    bundled = [read_result(path) for path in sorted(ENTRIES.glob("*.json.gz"))]
-    return [result for result in bundled if identify(result["entry"]) not in replaced]
+def load_bundled_results() -> list[dict[str, Any]]:
+    """Return the results of the built-in controllers, which are part of robocov."""
+    results = [read_result(path) for path in sorted(ENTRIES.glob("*.json.gz"))]
+    for result in results:
+        result["is_bundled"] = True
+    return results

@@ -1,5 +1,18 @@
 """Verifying a result of the benchmark: runs are repeated, robots are isolated, and new maps are tried.
 
+The process of the verification never imports the code of a user. It reads the file of the controller in order
+to compute its hash, and lets other processes execute it:
+
+=================  ==========================================  =====================================
+process            executes                                    sends
+=================  ==========================================  =====================================
+verification       nothing of the user                         runs to referees
+referee            nothing of the user: simulation, record,    observations to controllers; figures,
+(one for a run)    figures, comparison of decisions            differences to the verification
+controller (for    the code of the user, under a guard         forces, goals, messages to the
+team or robot)                                                 referee, as plain numbers and bytes
+=================  ==========================================  =====================================
+
 All choices follow from a seed that the verifier draws, so that they cannot be anticipated.
 """
 
@@ -9,18 +22,21 @@ import math
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from robocov.controllers.base import Information
 from robocov.errors import InputError, format_count
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.guarded_runs import GuardedProcesses, ObservedRun, ReplayAnswer
-from robocov_app.benchmark.isolation import Decisions, build_replay, find_difference
+from robocov_app.benchmark.controller_messages import ControllerCode, Description, describe
+from robocov_app.benchmark.controller_process import (
+    ControllerFaultError,
+    describe_controller,
+    read_description,
+)
 from robocov_app.benchmark.new_maps import (
     MIN_P_VALUE,
     TRACK,
@@ -30,6 +46,7 @@ from robocov_app.benchmark.new_maps import (
     draw_new_maps,
 )
 from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.referee import Referees, RepeatedRun, RunCheck
 from robocov_app.benchmark.references import RESTARTS
 from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
 from robocov_app.evaluation.reference_search import ReferenceQuery, answer_queries
@@ -50,7 +67,7 @@ CHANGED_FRACTION = 0.05
 """Fraction of changed rows for which the probability of missing all of them is reported."""
 _MACHINE_DEPENDENT = ("deciding_s",)
 """Figures that differ from run to run and are not compared."""
-_DESCRIBED = ("label", "information", "gains")
+_DESCRIBED = ("controller", "label", "information", "gains")
 """Parts of an entry that describe its controller and are compared."""
 _POLL_INTERVAL_S = 0.2
 """Time between two checks for an interruption."""
@@ -87,25 +104,6 @@ class VerificationOptions:
     workers: int = 1
 
 
-@dataclass(frozen=True)
-class RunCheck:
-    """The check of a run: the run is repeated, and so are the decisions of some robots in isolation.
-
-    Attributes
-    ----------
-    outcome : Outcome or None
-        Outcome of the repeated run; None if its process ended.
-    robots : int
-        Number of isolated robots, or of teams in separate processes.
-    differences : list of str
-        Everything that is not as expected, apart from the figures of the run.
-    """
-
-    outcome: Outcome | None
-    robots: int
-    differences: list[str]
-
-
 @dataclass
 class Verification:
     """The findings of a verification.
@@ -128,6 +126,8 @@ class Verification:
         Comparison of gaps on new maps with those on the suite.
     differences : list of str
         Everything that is not as expected.
+    read_files : list of str
+        Files that the controller has read, which are not part of its source code.
     """
 
     seed: int
@@ -138,6 +138,7 @@ class Verification:
     new_maps: int = 0
     comparison: NewMapComparison | None = None
     differences: list[str] = field(default_factory=list)
+    read_files: list[str] = field(default_factory=list)
 
     def count(self, check: RunCheck, *, is_new: bool, is_joint: bool) -> None:
         """Count a checked run and its robots.
@@ -149,16 +150,16 @@ class Verification:
         is_new : bool
             Whether the run was on a new map.
         is_joint : bool
-            Whether a single process received the observations of the whole team.
+            Whether the robots decide together, so that none was isolated.
         """
         if is_new:
             self.new_maps += 1
         else:
             self.runs += 1
         if is_joint:
-            self.teams += check.robots
-        else:
-            self.robots += check.robots
+            self.teams += 1
+        self.robots += check.robots
+        self.read_files += [file for file in check.read_files if file not in self.read_files]
 
     def compute_miss_probability(self, changed_count: int) -> float:
         """Compute the probability that none of the changed rows was among the repeated runs.
@@ -187,6 +188,11 @@ class Verification:
             lines.append(self._describe_new_maps(self.comparison))
         elif not self.new_maps:
             lines.append(f"No new maps tried. They require runs on generated maps of the track {TRACK}.")
+        if self.read_files:
+            lines.append(
+                f"The controller has read files that are not part of its source code, such as "
+                f"{self.read_files[0]}. Their content was not compared with anything."
+            )
         lines.append(f"Random choices: --seed {self.seed} repeats them.")
         return lines
 
@@ -233,14 +239,15 @@ def verify_result(
     """Verify a result of the benchmark.
 
     1. The gaps of all rows are recomputed, and missing rows are found.
-    2. A sample of the runs is repeated, and must give the same figures, bit for bit.
+    2. A sample of the runs is repeated, and must give the same figures, bit for bit
+       (`robocov_app.benchmark.referee`).
     3. In these runs, the decisions of some robots are repeated in separate processes that each receive only
        the observations of one robot (`robocov_app.benchmark.isolation`).
     4. The controller runs on new maps, where it must not be clearly worse than on the maps of the suite
        (`robocov_app.benchmark.new_maps`).
 
-    The verification executes no code to which a result refers: a controller in a file must be given by the
-    caller, and the hash of its source code must be that in the result.
+    No code to which a result refers is executed: a controller in a file must be given by the caller, and the
+    hash of its source code must be that in the result.
 
     Parameters
     ----------
@@ -270,21 +277,28 @@ def verify_result(
     seed = secrets.randbelow(MAX_SEED) if options.seed is None else options.seed
     result = read_result(path)
     rated = _find_controller(result, path, controller)
-    studies = dict(rated.build_studies(_get_selection(result)))
-    description = _describe_controller(rated, studies, result, path)
+    code = rated.read_code()
+    identity = rated.identify(code.source)
+    _check_source(rated, identity, result, path)
+    description, violations = _describe_controller(rated, code)
+    # The studies determine everything but the controller, whose code must not be executed here.
+    stand_in = rated.replace_user_code()
+    studies = dict(stand_in.build_studies(_get_selection(result)))
     tasks = _index_tasks(studies)
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     verification = Verification(seed, rows=len(rows))
-    verification.differences += _compare_descriptions(result["entry"], description)
+    verification.differences += [f"its controller tried {violation}" for violation in violations]
+    verification.differences += _compare_descriptions(result["entry"], {**identity, **asdict(description)})
     verification.differences += _compare_without_running(result, rows, tasks)
 
     sampled = _sample_runs(
         rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
     )
     new_maps = _draw_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
-    new_tasks = _index_new_tasks(rated, new_maps)
+    new_tasks = _index_new_tasks(stand_in, new_maps)
     checker = _RunChecker(
-        information=description["information"],
+        code,
+        description,
         is_joint=rated.controller == ORACLE,
         robots=options.robots,
         seed=seed,
@@ -312,7 +326,8 @@ def _find_controller(result: Mapping[str, Any], path: Path, controller: str | No
     """Return the controller of a result; raise InputError if it is in a file that was not given."""
     entry = result["entry"]
     name = controller or entry["controller"]
-    if entry["source_sha256"] and controller is None:
+    is_file = name.rpartition(":")[0].endswith(".py")
+    if controller is None and (entry["source_sha256"] or is_file):
         raise InputError(f"{path}: its controller {name} is a file; pass --controller FILE.py:CLASS")
     return RatedController(name, entry["set"])
 
@@ -322,17 +337,25 @@ def _get_selection(result: Mapping[str, Any]) -> Selection:
     return Selection(selected["quick"], tuple(selected["tracks"]), tuple(selected["maps"]))
 
 
-def _describe_controller(
-    rated: RatedController, studies: Mapping[str, Study], result: Mapping[str, Any], path: Path
-) -> dict[str, Any]:
-    """Return the description of a controller; raise InputError if its source is not the rated one."""
-    description = rated.describe(next(iter(studies.values())))
-    if description["source_sha256"] != result["entry"]["source_sha256"]:
+def _check_source(
+    rated: RatedController, identity: Mapping[str, Any], result: Mapping[str, Any], path: Path
+) -> None:
+    """Raise InputError if the source code of a controller is not that of the rated one."""
+    if identity["source_sha256"] != result["entry"]["source_sha256"]:
         raise InputError(
             f"{path}: --controller: {rated.controller} is not the file that was rated "
             "(or a module it imports has changed)"
         )
-    return description
+
+
+def _describe_controller(rated: RatedController, code: ControllerCode) -> tuple[Description, list[str]]:
+    """Return what a controller declares about itself, and the forbidden actions that it attempted."""
+    if rated.is_built_in:
+        return read_description(describe(code)), []
+    try:
+        return describe_controller(code)
+    except ControllerFaultError as error:
+        raise InputError(f"--controller: {error}") from None
 
 
 def _compare_descriptions(entry: Mapping[str, Any], description: Mapping[str, Any]) -> list[str]:
@@ -377,59 +400,34 @@ class _RunChecker:
 
     Parameters
     ----------
-    information : Information
-        The information that the controller declares.
+    code : ControllerCode
+        The controller.
+    description : Description
+        What it declares about itself.
     is_joint : bool
-        Whether a process receives the observations of the whole team, instead of one robot.
+        Whether its robots decide together, so that none can be isolated.
     robots : int
         Number of robots that are isolated in each run.
     seed : int
         Seed of the choice of robots.
     """
 
-    def __init__(self, information: Information, *, is_joint: bool, robots: int, seed: int) -> None:
+    def __init__(
+        self, code: ControllerCode, description: Description, *, is_joint: bool, robots: int, seed: int
+    ) -> None:
         self.is_joint = is_joint
-        self.processes = GuardedProcesses()
-        self._information = information
-        self._robots = robots
+        self.referees = Referees()
+        self._code = code
+        self._description = description
+        self._robots = 0 if is_joint else robots
         self._seed = seed
 
     def check(self, key: RunKey, task: Task) -> tuple[RunKey, RunCheck]:
         """Repeat a run and isolate some robots; return the key and the check. Called in several threads."""
-        run = self.processes.ask(task)
-        if not isinstance(run, ObservedRun):
-            return key, RunCheck(None, 0, ["its process ended"])
-        differences = [f"its controller tried {violation}" for violation in run.violations]
-        if run.outcome.error is not None:
-            return key, RunCheck(run.outcome, 0, differences)
-        robots = self._choose_robots(task)
-        for robot in robots:
-            differences += self._isolate(task, run, robot)
-        return key, RunCheck(run.outcome, len(robots), differences)
-
-    def _choose_robots(self, task: Task) -> list[int | None]:
-        """Return the rows of the robots to isolate; None stands for the whole team."""
-        if not self._robots:
-            return []
-        if self.is_joint:
-            return [None]
-        rng = self._create_generator(task)
-        return sorted(rng.permutation(task.robots)[: self._robots].tolist())
-
-    def _create_generator(self, task: Task) -> np.random.Generator:
-        return _create_generator(self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16))
-
-    def _isolate(self, task: Task, run: ObservedRun, robot: int | None) -> list[str]:
-        """Repeat the decisions of a robot in a new process, and list the differences."""
-        replay = build_replay(task, run.transcript, self._information, robot, self._create_generator(task))
-        answer = self.processes.ask(replay)
-        if not isinstance(answer, ReplayAnswer):
-            answer = ReplayAnswer(Decisions(), [])
-        differences = [f"its controller tried {violation}" for violation in answer.violations]
-        difference = find_difference(run.transcript, replay, answer.decisions)
-        if difference is not None:
-            differences.append(difference)
-        return differences
+        seed = [self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16)]
+        robots = np.random.default_rng(seed).permutation(task.robots)[: self._robots].tolist()
+        run = RepeatedRun(task, self._code, self._description, sorted(robots), seed)
+        return key, self.referees.repeat(run)
 
 
 def _check_runs(
@@ -459,7 +457,7 @@ def _check_in_threads(
                 yield future.result()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        checker.processes.kill()
+        checker.referees.kill()
         pool.shutdown()
 
 

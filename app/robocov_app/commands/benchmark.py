@@ -42,8 +42,8 @@ class Arguments(JsonOption):
                   interruption, the same command resumes
       page        compare the results in DIR ... with those of the built-in controllers, which the package
                   contains; without DIR, show these alone
-      verify      repeat a sample of the runs in DIR, bit for bit, call the controller for single robots in
-                  separate processes, and run it on new maps
+      verify      repeat a sample of the runs in DIR, bit for bit, with the controller in separate processes
+                  for the team and for single robots, and run it on new maps
       suite       list the tracks and maps
       references  compute missing best placements of the suite
 
@@ -247,6 +247,7 @@ def _verify(options: Arguments) -> int:
         "teams": verification.teams,
         "new_maps": verification.new_maps,
         "new_maps_p_value": None if comparison is None else comparison.p_value,
+        "read_files": verification.read_files,
         "differences": differences,
     }
     print_answer(options, answer, *differences, *verification.describe(), verdict)
@@ -266,7 +267,7 @@ def _write_page(options: Arguments) -> int:
     for path, result in zip(options.paths, results, strict=True):
         check_gaps(result, path)
     if not options.alone:
-        results += load_bundled_results(results)
+        results += load_bundled_results()
     content = build_page(results, options.title).encode("utf-8", "replace")
     with replace_file(target) as temporary:
         temporary.write_bytes(content)

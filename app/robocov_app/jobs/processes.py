@@ -34,12 +34,33 @@ def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subproces
     OSError
         If the process cannot be started.
     """
-    # The process must be able to import the same modules as this one.
+    return start_python(f"from robocov_app.jobs.serving import serve; serve({service!r})", stderr=stderr)
+
+
+def start_python(program: str, *, stderr: IO[bytes] | int | None = None) -> subprocess.Popen[bytes]:
+    """Start a process of Python that can import the same modules as this one.
+
+    Parameters
+    ----------
+    program : str
+        Code that the process executes.
+    stderr : binary file, int or None
+        File for the standard error of the process, or `subprocess.DEVNULL`; by default, that of this process.
+
+    Returns
+    -------
+    subprocess.Popen
+        The process, with pipes as standard input and output.
+
+    Raises
+    ------
+    OSError
+        If the process cannot be started.
+    """
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     # Linear algebra uses one thread in each process, unless the user has chosen another number.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(name, "1")
-    program = f"from robocov_app.jobs.serving import serve; serve({service!r})"
     process = subprocess.Popen(
         [sys.executable, "-P", "-c", program],  # -P: modules in the working folder are not imported
         stdin=subprocess.PIPE,

@@ -77,8 +77,8 @@ def serve(service: str) -> None:
     service : str
         Class of the service as ``package.module:Class``.
     """
-    _prepare_process()
-    source, target = _take_standard_streams()
+    prepare_process()
+    source, target = take_standard_streams()
     channel = _PipeChannel(source, target)
     threading.Thread(target=channel.listen, daemon=True).start()
     module, _, name = service.partition(":")
@@ -89,8 +89,11 @@ def serve(service: str) -> None:
         channel.send(answer_questions(answering_service, questions, channel))
 
 
-def _prepare_process() -> None:
-    """Report crashes, end when the parent program ends, and ignore Ctrl+C, which the parent handles."""
+def prepare_process() -> None:
+    """Report crashes, end when the parent program ends, and ignore Ctrl+C, which the parent handles.
+
+    The process of a service calls this function first.
+    """
     if sys.version_info >= (3, 14):
         # The C stack of the physics engine would hide the Python stack of a user's code.
         faulthandler.enable(c_stack=False)
@@ -101,7 +104,7 @@ def _prepare_process() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
+def take_standard_streams() -> tuple[BinaryIO, BinaryIO]:
     """Return the input and output pipes, and detach the standard streams from them.
 
     Code that prints then writes to standard error instead of into the messages, and code that reads standard

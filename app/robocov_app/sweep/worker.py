@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from robocov.conditions.communication import POSITION_BYTES
+from robocov.controllers.base import Controller
 from robocov.controllers.user_modules import provide_modules
 from robocov.cost import CoverageCost
 from robocov.errors import RobocovError
@@ -88,7 +89,7 @@ class Outcome:
     versions: Mapping[str, str] = field(default_factory=list_result_versions)
 
 
-def perform(task: Task, watch: Watch | None = None) -> Outcome:
+def perform(task: Task, watch: Watch | None = None, controller: Controller | None = None) -> Outcome:
     """Execute a task. Errors of the run are not raised, but are part of the outcome.
 
     Parameters
@@ -97,6 +98,8 @@ def perform(task: Task, watch: Watch | None = None) -> Outcome:
         The run to execute.
     watch : callable or None
         Called with the snapshot of each step.
+    controller : Controller or None
+        Controller that replaces that of the task.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def perform(task: Task, watch: Watch | None = None) -> Outcome:
         was_enabled = gc.isenabled()
         gc.disable()
         try:
-            return _perform(task, watch)
+            return _perform(task, watch, controller)
         except BaseException as error:  # A controller of the user may raise anything.
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return build_failure(message, traceback.format_exc())
@@ -119,10 +122,10 @@ def perform(task: Task, watch: Watch | None = None) -> Outcome:
                 gc.enable()
 
 
-def _perform(task: Task, watch: Watch | None) -> Outcome:
+def _perform(task: Task, watch: Watch | None, controller: Controller | None) -> Outcome:
     """Simulate and evaluate a run, and build its files; errors are raised."""
     cost = prepare_cost(task)
-    record, effort = _simulate_and_measure(task, watch)
+    record, effort = _simulate_and_measure(task, watch, controller)
     history = compute_cost_history(record, cost, task.cost_hz)
     # Figures are computed from all steps; the saved record contains only some of them.
     summary = replace_non_finite(summarize(record, history))
@@ -202,11 +205,13 @@ def simulate(task: Task) -> Record:
     return record
 
 
-def _simulate_and_measure(task: Task, watch: Watch | None = None) -> tuple[Record, dict[str, float | None]]:
+def _simulate_and_measure(
+    task: Task, watch: Watch | None = None, controller: Controller | None = None
+) -> tuple[Record, dict[str, float | None]]:
     """Simulate a run; return its record and the content of ``effort.json``."""
     scenario = task.build_scenario()
     with provide_modules({} if task.source is None else task.source.modules):
-        simulation = scenario.build_simulation()
+        simulation = scenario.build_simulation(controller)
         meter = CommunicationMeter(simulation)
 
         def measure_step(step: int) -> bool:

@@ -53,7 +53,8 @@ CONTROLLERS: dict[str, type[Any]] = {
 RECOMMENDED_CONTROLLERS: dict[Information, str] = {"own": "atlas", "shared map": "atlas-shared"}
 """The best controller on the benchmark of those that use only this information."""
 
-_ENTRY_POINT_GROUP = "robocov.controllers"
+ENTRY_POINT_GROUP = "robocov.controllers"
+"""Group of entry points in which installed packages offer controllers."""
 _MEMORYLESS: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited)
 """Controllers whose memory only saves time at the next decision."""
 
@@ -115,7 +116,7 @@ def list_controller_classes() -> dict[str, type[Any]]:
     True
     """
     classes: dict[str, type[Any]] = {}
-    for entry in entry_points(group=_ENTRY_POINT_GROUP):
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
         try:
             classes[entry.name] = _load_entry(entry)
         except KeyboardInterrupt:
@@ -177,7 +178,7 @@ def load_controller_class(name: str, *, source: ControllerSource | None = None) 
     if name in CONTROLLERS:
         return CONTROLLERS[name]
     # Only the package that offers the name is loaded. If several do, the last one counts.
-    entries = [entry for entry in entry_points(group=_ENTRY_POINT_GROUP) if entry.name == name]
+    entries = [entry for entry in entry_points(group=ENTRY_POINT_GROUP) if entry.name == name]
     if not entries:
         raise ParameterError(_describe_unknown_controller(name))
     entry = entries[-1]

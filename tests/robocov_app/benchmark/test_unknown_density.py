@@ -8,18 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from local_deciders import run_isolated
 from small_studies import HEAD
 
-from robocov.controllers import CONTROLLERS
-from robocov.controllers.base import Information
+from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.guarded_runs import _decide_again
-from robocov_app.benchmark.isolation import Transcript, build_replay, find_difference
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import Outcome, perform
+from robocov_app.sweep.worker import perform
 from robocov_app.terminal.interruption import Interruption
 
 TRACK = "unknown-density"
@@ -83,21 +81,18 @@ def build_task(controller: str) -> Task:
     return next(iter(generate_tasks(studies[TRACK])))
 
 
-def record(controller: str) -> tuple[Outcome, Transcript]:
-    """Run a controller; return the outcome, and the transcript as the verification receives it."""
-    transcript = Transcript()
-    outcome = perform(build_task(controller), transcript.add)
-    return outcome, pickle.loads(pickle.dumps(transcript))
-
-
-def isolate(controller: str, information: Information) -> str | None:
+def isolate(controller: str) -> list[str]:
     """Return how the decisions of a robot differ if it gets only its own measurements."""
-    outcome, transcript = record(controller)
+    outcome, differences, _ = run_isolated(build_task(controller), [2])
     assert outcome.error is None
-    task = build_task(controller)
-    replay = build_replay(task, transcript, information, 2, np.random.default_rng(0))
-    replay = pickle.loads(pickle.dumps(replay))
-    return find_difference(transcript, replay, _decide_again(replay))
+    return differences
+
+
+def record_forces(task: Task) -> list[FloatArray]:
+    """Run a task, and return the forces in each step."""
+    forces: list[FloatArray] = []
+    perform(task, lambda snapshot: forces.append(snapshot.decision.forces))
+    return forces
 
 
 def write_controller(folder: Path, code: str) -> str:
@@ -128,44 +123,42 @@ def test_the_track_is_in_no_ranking_and_hides_the_density() -> None:
 
 @pytest.mark.parametrize("controller", ["lloyd", "local-search", "adaptive", "exploring-lloyd", "gp-ucb"])
 def test_robots_decide_by_their_own_measurements(controller: str) -> None:
-    assert isolate(controller, CONTROLLERS[controller].information) is None
+    assert isolate(controller) == []
 
 
 @pytest.mark.parametrize("controller", ["lloyd", "rapf", "atlas-shared", "local-search"])
 def test_controllers_that_do_not_measure_decide_as_without_a_density(controller: str) -> None:
-    _, transcript = record(controller)
-    plain_task = build_task(controller).hide_unknown_density()
-    plain = Transcript()
-    perform(plain_task, plain.add)
-    for forces, plain_forces in zip(transcript.forces, plain.forces, strict=True):
-        np.testing.assert_array_equal(forces, plain_forces)
+    task = build_task(controller)
+    np.testing.assert_array_equal(record_forces(task), record_forces(task.hide_unknown_density()))
 
 
-def test_recorded_observations_do_not_contain_the_density(tmp_path: Path) -> None:
-    _, transcript = record(write_controller(tmp_path, HONEST))
-    data = pickle.dumps(transcript)
-    assert b"Gaussians" not in data
-    assert b"RecordedDensitySensor" in data
+def test_no_process_receives_the_density(tmp_path: Path) -> None:
+    task = build_task(write_controller(tmp_path, HONEST))
+    _, _, deciders = run_isolated(task, [0])
+    for observations in deciders[0].received:
+        assert b"Gaussians" not in pickle.dumps(observations)
 
 
 def test_robots_cannot_measure_beyond_their_sensing_range(tmp_path: Path) -> None:
-    outcome, _ = record(write_controller(tmp_path, FAR))
+    outcome, _, _ = run_isolated(build_task(write_controller(tmp_path, FAR)), [])
     assert outcome.error is not None
     assert "expected a point within its sensing range of 3 m, got a point at 30.000 m" in outcome.error
 
 
-@pytest.mark.parametrize("code", [CLOSURE, OTHERS], ids=["closure", "others"])
-def test_a_hidden_density_changes_the_decisions_of_an_isolated_robot(code: str, tmp_path: Path) -> None:
-    difference = isolate(write_controller(tmp_path, code), "own")
-    assert difference is not None
+def test_measurements_of_others_change_the_decisions_of_an_isolated_robot(tmp_path: Path) -> None:
+    (difference,) = isolate(write_controller(tmp_path, OTHERS))
     assert "robot 3 decides differently from" in difference
 
 
-@pytest.mark.parametrize(("code", "is_honest"), [(HONEST, True), (MEMORY, False)], ids=["honest", "memory"])
+@pytest.mark.parametrize(
+    ("code", "is_honest"),
+    [(HONEST, True), (MEMORY, False), (CLOSURE, False)],
+    ids=["honest", "memory", "closure"],
+)
 def test_only_controllers_that_measure_are_verified(code: str, is_honest: bool, tmp_path: Path) -> None:
     verification = verify(tmp_path, code)
     assert verification.runs == 1
     if is_honest:
         assert verification.differences == []
     else:
-        assert any("decides differently" in difference for difference in verification.differences)
+        assert any("path_length_m: expected" in difference for difference in verification.differences)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -11,29 +12,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_studies import HEAD, PULL
+from local_deciders import run_isolated
+from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import CONTROLLERS
-from robocov.controllers.base import Information
 from robocov.generator import GENERATORS
-from robocov_app.benchmark import suite
-from robocov_app.benchmark.guarded_runs import _decide_again
-from robocov_app.benchmark.isolation import (
-    Replay,
-    Transcript,
-    build_replay,
-    find_difference,
-    is_same_content,
-)
+from robocov.observation import Snapshot
+from robocov_app.benchmark import suite, verification
+from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
 from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
 from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
-from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference
+from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import (
     Verification,
     VerificationOptions,
     verify_result,
 )
+from robocov_app.sweep import worker
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform
 from robocov_app.terminal.interruption import Interruption
@@ -41,6 +37,7 @@ from robocov_app.terminal.interruption import Interruption
 MAP = "blocks-a"
 TRACKS = ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
 SMALL = VerificationOptions(sample=1, robots=1, new_maps=0)
+ONLY_FIGURES = replace(SMALL, robots=0)
 
 GLOBAL = """
 POSITIONS = {}
@@ -75,22 +72,6 @@ class Mine:
         references = suite.SUITE_FILE.read_text()
         return own.centroid - own.position
 """
-
-FRAMES = """
-import sys
-
-@dataclass(frozen=True)
-class Mine:
-    def force(self, own):
-        frame = sys._getframe()
-        while frame is not None:
-            for value in frame.f_locals.values():
-                if type(value).__name__ == "Simulation":
-                    return value.positions.mean(axis=0) - own.position
-            frame = frame.f_back
-        return own.centroid - own.position
-"""
-"""Robots look for the simulation on the stack."""
 
 JOINT = """
 import numpy as np
@@ -140,6 +121,7 @@ def shorten_runs(monkeypatch: pytest.MonkeyPatch) -> None:
             # On a small map, all robots would be in communication range at the start.
             changed = replace(changed, changes={"communication_range": 0.5})
         monkeypatch.setitem(suite.TRACKS, name, changed)  # type: ignore[arg-type]
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
 
 
 def build_task(controller: str, track: str) -> Task:
@@ -147,31 +129,16 @@ def build_task(controller: str, track: str) -> Task:
     return next(iter(generate_tasks(studies[track])))
 
 
-def record(controller: str, track: str) -> Transcript:
-    """Run a controller, and return its observations and decisions."""
-    transcript = Transcript()
-    outcome = perform(build_task(controller, track), transcript.add)
-    assert outcome.error is None
-    return transcript
+def isolate(controller: str, track: str, robots: Sequence[int]) -> list[str]:
+    """Return how decisions of robots differ if they get only their own observations, without processes.
 
-
-def isolate(
-    controller: str, track: str, robot: int | None, transcript: Transcript | None = None
-) -> str | None:
-    """Return how the decisions of a robot differ in a process of its own, without starting one.
-
-    The decisions are those in the transcript of a run; by default, of a new one.
+    The run must have the same figures as without isolation.
     """
     task = build_task(controller, track)
-    if transcript is None:
-        transcript = record(controller, track)
-    information: Information = "own"
-    if controller in CONTROLLERS:
-        information = CONTROLLERS[controller].information
-    elif controller == ORACLE:
-        information = "whole map"
-    replay = build_replay(task, transcript, information, robot, np.random.default_rng(0))
-    return find_difference(transcript, replay, _decide_again(replay))
+    outcome, differences, _ = run_isolated(task, robots)
+    assert outcome.error is None
+    assert outcome.figures == perform(task).figures
+    return differences
 
 
 SLOW = ("atlas", "adaptive", "boosting", "visibility", "geodesic-lloyd", "diffeomorphism", "barrier")
@@ -185,7 +152,7 @@ ISOLATED = [
 
 @pytest.mark.parametrize(("controller", "track"), ISOLATED)
 def test_robots_of_built_in_controllers_decide_by_their_own_observations(controller: str, track: str) -> None:
-    assert isolate(controller, track, robot=2) is None
+    assert isolate(controller, track, [2]) == []
 
 
 SHARING = [name for name, kind in CONTROLLERS.items() if kind.information == "shared map"]
@@ -200,25 +167,26 @@ def test_robots_that_share_maps_decide_by_their_own_observations(
     """Within 4 s, robots receive scans and make at least two plans with them."""
     longer = replace(suite.TRACKS[track], duration=4.0)
     monkeypatch.setitem(suite.TRACKS, track, longer)  # type: ignore[arg-type]
-    transcript = record(controller, track)
+    snapshots: list[Snapshot] = []
+    outcome, differences, _ = run_isolated(build_task(controller, track), [2, 3], snapshots)
+    assert outcome.error is None
     # Robots of gp-ucb have nothing to send if they know that the density is the same everywhere.
-    has_messages = any(any(observations.messages) for observations in transcript.observations)
-    assert has_messages == (controller != "gp-ucb")
-    for robot in (2, 3):
-        assert isolate(controller, track, robot, transcript) is None
+    assert any(any(snapshot.seen.messages) for snapshot in snapshots) == (controller != "gp-ucb")
+    assert differences == []
+    assert outcome.figures == perform(build_task(controller, track)).figures
 
 
 @pytest.mark.slow
 def test_robots_of_the_oracle_decide_by_the_observations_of_the_team() -> None:
-    assert isolate(ORACLE, "short-range", robot=None) is None
+    assert isolate(ORACLE, "short-range", []) == []
 
 
 def test_observations_of_others_are_hidden_from_an_isolated_robot() -> None:
-    task = build_task("atlas", "short-range")
-    transcript = Transcript()
-    perform(task, transcript.add)
-    replay = build_replay(task, transcript, "own", 2, np.random.default_rng(0))
-    for seen, hidden in zip(transcript.observations, replay.observations, strict=True):
+    snapshots: list[Snapshot] = []
+    _, differences, deciders = run_isolated(build_task("atlas", "short-range"), [2], snapshots)
+    assert differences == []
+    for snapshot, hidden in zip(snapshots, deciders[2].received, strict=True):
+        seen = snapshot.seen
         neighbors = seen.neighbors.list_neighbors(2)
         strangers = np.setdiff1d(np.arange(6), [2, *neighbors])
         assert (hidden.positions[neighbors] == seen.positions[neighbors]).all()
@@ -233,11 +201,10 @@ def test_observations_of_others_are_hidden_from_an_isolated_robot() -> None:
         assert not any(len(hidden.neighbors.list_neighbors(stranger)) for stranger in strangers)
 
 
-@pytest.mark.parametrize("code", [GLOBAL, FRAMES, JOINT], ids=["module variable", "stack", "all rows"])
+@pytest.mark.parametrize("code", [GLOBAL, JOINT], ids=["module variable", "all rows"])
 def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + code)
-    difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
-    assert difference is not None
+    (difference,) = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", [2])
     assert "robot 3 decides differently from" in difference
     assert difference.endswith("if its process receives only its own observations")
 
@@ -245,29 +212,24 @@ def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, 
 @pytest.mark.parametrize("track", ["ideal", "short-range", "lossy"])
 def test_robots_may_send_messages(track: str, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + WITH_MESSAGES)
-    assert isolate(f"{tmp_path / 'mine.py'}:Mine", track, robot=2) is None
+    assert isolate(f"{tmp_path / 'mine.py'}:Mine", track, [2]) == []
 
 
 def test_messages_with_hidden_knowledge_are_detected(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
-    difference = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", robot=2)
-    assert difference is not None
+    (difference,) = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", [2])
     assert "decides differently" in difference
 
 
-def test_contents_are_compared_bit_for_bit() -> None:
-    class Note:
-        __slots__ = ("text",)
-
-        def __init__(self, text: str) -> None:
-            self.text = text
-
-    assert is_same_content({"a": [np.zeros(2), Note("x")]}, {"a": [np.zeros(2), Note("x")]})
-    assert not is_same_content({"a": [np.zeros(2), Note("x")]}, {"a": [np.zeros(2), Note("y")]})
-    assert not is_same_content([1], [1, 2])
-    assert not is_same_content(1, 1.0)
-    assert not is_same_content(np.zeros(2), np.zeros((2, 1)))
-    assert not is_same_content(np.array([0.0]), np.array([-0.0]))
+def test_equal_payloads_have_equal_bytes() -> None:
+    shared = np.arange(3.0)
+    read_only = np.arange(3.0)
+    read_only.setflags(write=False)
+    payload = {"a": [shared, shared], "b": "x"}
+    assert encode_payload(payload) == encode_payload({"a": [np.arange(3.0), read_only], "b": "x"})
+    assert encode_payload([0.0]) != encode_payload([-0.0])
+    assert encode_payload([1]) != encode_payload([1.0])
+    np.testing.assert_equal(decode_payload(encode_payload(payload)), payload)
 
 
 def rate(folder: Path, code: str, track: str) -> tuple[Path, str]:
@@ -306,6 +268,173 @@ def test_only_honest_controllers_are_verified(
         assert verification.robots == 1
     else:
         assert any(expected in difference for difference in verification.differences)
+
+
+STACK = """
+import sys
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        frame = sys._getframe()
+        while frame is not None:
+            for value in frame.f_locals.values():
+                if type(value).__name__ == "Simulation":
+                    return value.positions.mean(axis=0) - own.position
+            frame = frame.f_back
+        return own.centroid - own.position
+"""
+"""Robots look for the simulation on the stack."""
+
+OBJECTS = """
+import gc
+
+def find_secrets():
+    for value in gc.get_objects():
+        kind = type(value).__name__
+        if kind in ("Simulation", "Task"):
+            return True
+        # Examples with which robocov compiles functions have fewer obstacles.
+        if kind == "Environment" and len(getattr(value, "obstacles", ())) > 2:
+            return True
+        if kind == "Observations" and value.time > 0.0:
+            return True
+    return False
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        if own.time == 0.0 and find_secrets():
+            return [5.0, 0.0]
+        return own.centroid - own.position
+"""
+"""Robots look for the simulation, the map, and observations of later steps among all objects."""
+
+EXECUTED_AS_COMPILER = """
+from robocov.compiled import import_numba
+numba = import_numba()
+CODE = "def write(path):\\n    open(path, 'w').close()"
+
+def write_as(name, file):
+    namespace = {"__name__": name}
+    exec(compile(CODE, file, "exec"), namespace)
+    try:
+        namespace["write"](FILE)
+    except PermissionError:
+        pass
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        write_as("numba.x", "numba/x.py")
+        write_as("numba", numba.__file__)
+        return own.centroid - own.position
+"""
+"""Writes with code that pretends to belong to a compiler, by the names of its module and file."""
+
+
+@pytest.mark.parametrize("code", [STACK, OBJECTS], ids=["stack", "objects"])
+def test_a_controller_finds_nothing_in_its_process(code: str, tmp_path: Path) -> None:
+    folder, name = rate(tmp_path, code, "ideal")
+    verification = verify(folder, name, ONLY_FIGURES)
+    assert any("path_length_m: expected" in difference for difference in verification.differences)
+
+
+def test_code_is_recognized_by_its_file_and_not_by_its_name(tmp_path: Path) -> None:
+    target = tmp_path / "written"
+    folder, name = rate(tmp_path, f"FILE = {str(target)!r}" + EXECUTED_AS_COMPILER, "ideal")
+    target.unlink()
+    verification = verify(folder, name, ONLY_FIGURES)
+    assert f"ideal, {MAP}, seed 0: its controller tried writing {target}" in verification.differences
+    assert not target.exists()
+
+
+COMPILED = """
+from robocov.compiled import import_numba
+
+@import_numba().njit(cache=True)
+def subtract(first, second):
+    return first - second
+
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        return subtract(own.centroid, own.position)
+"""
+
+
+@pytest.mark.slow
+def test_compilers_may_write_files(tmp_path: Path) -> None:
+    folder, name = rate(tmp_path, COMPILED, "ideal")
+    verification = verify(folder, name, ONLY_FIGURES)
+    assert verification.differences == []
+
+
+@pytest.mark.parametrize(
+    "attack",
+    [
+        """
+import robocov_app.sweep.worker as worker
+select_figures = worker._select_figures
+worker._select_figures = lambda summary: {**select_figures(summary), "contacts": 0, "mean_distance_m": COST}
+""",
+        """
+from robocov_app.benchmark import verification
+verification._list_differences = lambda *_: []
+""",
+        """
+import robocov_app.benchmark.controller_program as program
+COMMAND = "import robocov_app.sweep.worker as worker; worker._select_figures = lambda _: {}"
+
+class Command:
+    def __reduce__(self):
+        return exec, (COMMAND,)
+
+program.encode_decision = lambda _: Command()
+""",
+    ],
+    ids=["figures", "verifier", "pickle"],
+)
+def test_code_of_a_controller_changes_nothing_outside_its_process(attack: str, tmp_path: Path) -> None:
+    """The result has a better cost than the controller, which tries to hide this in several ways."""
+    honest_code = HEAD.removeprefix(IMPORTS) + PULL
+    folder, name = rate(tmp_path, honest_code, "ideal")
+    result = read_result(folder)
+    row = result["rows"][0]
+    row["mean_distance_m"] *= 0.99
+    row |= compute_gaps(row["track"], row["map"], row)
+    attack = attack.replace("COST", str(row["mean_distance_m"]))
+    (tmp_path / "mine.py").write_text(IMPORTS + honest_code + attack)
+    rated = RatedController(name, {})
+    result["entry"]["source_sha256"] = rated.identify(rated.read_code().source)["source_sha256"]
+    (folder / RESULT_FILE).write_text(json.dumps(result))
+    honest_functions = worker._select_figures, verification._list_differences
+    differences = verify(folder, name, ONLY_FIGURES).differences
+    assert (worker._select_figures, verification._list_differences) == honest_functions
+    expected = "mean_distance_m: expected"
+    if "Command" in attack:
+        expected = "its process sent an invalid message: builtins.exec: expected plain values"
+    assert any(expected in difference for difference in differences)
+
+
+READS_FILE = """
+@dataclass(frozen=True)
+class Mine:
+    def force(self, own):
+        pull = float(Path(FILE).read_text())
+        return pull * (own.centroid - own.position)
+"""
+
+
+@pytest.mark.slow
+def test_files_that_a_controller_reads_are_reported(tmp_path: Path) -> None:
+    weights = tmp_path / "weights.txt"
+    weights.write_text("0.5")
+    folder, name = rate(tmp_path, f"FILE = {str(weights)!r}" + READS_FILE, "ideal")
+    verification = verify(folder, name)
+    assert verification.differences == []
+    assert verification.read_files == [str(weights)]
+    assert any(f"such as {weights}" in line for line in verification.describe())
 
 
 ON_UNKNOWN_MAPS = """
@@ -431,13 +560,3 @@ def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
         assert new_map.name not in suite.FAMILY_OF
         assert suite.compute_map_hash(new_map.environment) not in hashes
         assert len(new_map.environment.start().sample(6, seed=new_map.start_seed)) == 6
-
-
-def test_a_process_that_ends_early_is_a_difference() -> None:
-    task = build_task("rapf", "ideal")
-    transcript = Transcript()
-    perform(task, transcript.add)
-    replay = Replay(task, 1, transcript.observations, None)
-    decisions = _decide_again(replace(replay, observations=replay.observations[:5]))
-    difference = find_difference(transcript, replay, decisions)
-    assert difference == "robot 2 in a separate process: the process ended"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,38 @@ def load_study_controller(name: str, folder: Path) -> tuple[type[Any], Controlle
         # The modules can be found only now, because loading the class may add their folders to sys.path.
         source = source._replace(modules=find_own_modules(source.text))
     return controller_class, source
+
+
+def read_controller_source(name: str, folder: Path) -> ControllerSource | None:
+    """Read the source text of a controller, and of the modules in its folder, without executing any of it.
+
+    Parameters
+    ----------
+    name, folder : str, Path
+        As for `load_study_controller`.
+
+    Returns
+    -------
+    ControllerSource or None
+        As from `load_study_controller`, unless the code of the controller changes ``sys.path``.
+
+    Raises
+    ------
+    ParameterError
+        If the file cannot be read, or is not Python code.
+    """
+    source = _read_source(name, folder)
+    if source is None:
+        return None
+    # As when Python executes the file, its folder is searched last. Afterwards, no module may come from it.
+    search_path = list(sys.path)
+    sys.path.append(str(Path(source.path).parent))
+    try:
+        return source._replace(modules=find_own_modules(source.text))
+    except (SyntaxError, ValueError) as error:
+        raise ParameterError(f"{quote(name)}: {source.path}: not Python code: {error}") from None
+    finally:
+        sys.path[:] = search_path
 
 
 def _read_source(name: str, folder: Path) -> ControllerSource | None:

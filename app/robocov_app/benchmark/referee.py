@@ -1,0 +1,170 @@
+"""Repeated runs: the referee simulates a run and computes its figures, and its controller decides elsewhere.
+
+A referee is the process of one run. It never imports the code of a user: its simulation gets the forces,
+goals and messages of the robots from other processes, see `robocov_app.benchmark.isolation`. Forces must be
+finite numbers of the right shape, and are limited like those of any controller.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import threading
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robocov.errors import OutputError
+from robocov_app.benchmark.controller_messages import ControllerCode, Description
+from robocov_app.benchmark.controller_process import ControllerProcess
+from robocov_app.benchmark.isolation import IsolatedTeam
+from robocov_app.jobs.messages import READY, Channel, receive
+from robocov_app.jobs.processes import ask_process, end_process, start_process
+from robocov_app.sweep.tasks import Task
+from robocov_app.sweep.worker import EFFORT_FILE, Outcome, perform
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedRun:
+    """A run to repeat.
+
+    Attributes
+    ----------
+    task : Task
+        The run. Its own controller is ignored.
+    code : ControllerCode
+        The controller, which only other processes build.
+    description : Description
+        What the controller declares about itself.
+    robots : sequence of int
+        Rows of the robots whose decisions are repeated in processes of their own.
+    seed : sequence of int
+        Seed of the placeholders.
+    """
+
+    task: Task
+    code: ControllerCode
+    description: Description
+    robots: Sequence[int]
+    seed: Sequence[int]
+
+
+@dataclass(frozen=True)
+class RunCheck:
+    """The check of a run: the run is repeated, and so are the decisions of some robots.
+
+    Attributes
+    ----------
+    outcome : Outcome or None
+        Outcome of the repeated run; None if its process ended.
+    robots : int
+        Number of robots in processes of their own.
+    differences : list of str
+        Everything that is not as expected, apart from the figures of the run.
+    read_files : list of str
+        Files that the controller has read, apart from those of Python and installed packages.
+    """
+
+    outcome: Outcome | None
+    robots: int
+    differences: list[str]
+    read_files: list[str] = field(default_factory=list)
+
+
+class RefereeService:
+    """Worker service that repeats one run."""
+
+    failure_message = "the verification failed"
+
+    def __call__(self, questions: list[RepeatedRun], channel: Channel) -> RunCheck:
+        """Repeat a run while other processes execute its controller."""
+        run = questions[-1]
+        with ExitStack() as stack:
+            team = _start_process(stack)
+            robots = {robot: _start_process(stack) for robot in run.robots}
+            environment = None
+            if run.description.information == "whole map":
+                environment = run.task.hide_unknown_density().build_environment().static
+            isolated_team = IsolatedTeam(
+                run.code,
+                team,
+                robots,
+                scanning=run.description.scanning,
+                environment=environment,
+                rng=np.random.default_rng(run.seed),
+            )
+            outcome = perform(run.task, isolated_team.compare_decisions, isolated_team)
+        processes = (team, *robots.values())
+        violations = [action for process in processes for action in process.violations]
+        read_files = [file for process in processes for file in process.read_files]
+        differences = [f"its controller tried {action}" for action in dict.fromkeys(violations)]
+        differences += isolated_team.differences
+        # Most files of the run are not needed for its row, and are not sent back.
+        files = {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
+        return RunCheck(
+            replace(outcome, files=files), len(robots), differences, list(dict.fromkeys(read_files))
+        )
+
+
+def _start_process(stack: ExitStack) -> ControllerProcess:
+    """Start a process for a controller, which ends with the context of the stack."""
+    process = ControllerProcess()
+    stack.callback(process.end)
+    return process
+
+
+class Referees:
+    """Starts referees that each repeat a single run."""
+
+    def __init__(self) -> None:
+        self._processes: set[subprocess.Popen[bytes]] = set()
+        self._is_stopped = False
+        self._lock = threading.Lock()
+
+    def repeat(self, run: RepeatedRun) -> RunCheck:
+        """Let a new process repeat a run, and wait for it. Several threads may call this at once.
+
+        Parameters
+        ----------
+        run : RepeatedRun
+            The run.
+
+        Returns
+        -------
+        RunCheck
+
+        Raises
+        ------
+        OutputError
+            If the process failed for a reason other than the controller.
+        """
+        with tempfile.TemporaryFile() as errors:
+            with self._lock:
+                if self._is_stopped:
+                    return RunCheck(None, 0, [])
+                process = start_process(f"{__name__}:RefereeService", stderr=errors)
+                self._processes.add(process)
+            try:
+                assert process.stdout is not None
+                reply = None
+                if receive(process.stdout) == READY:
+                    reply = ask_process(process, run)
+            finally:
+                end_process(process)
+                with self._lock:
+                    self._processes.discard(process)
+        if reply is None:
+            return RunCheck(None, 0, ["its process ended"])
+        if reply.answer is None:
+            raise OutputError(f"the run cannot be repeated: {reply.problem}")
+        check: RunCheck = reply.answer
+        return check
+
+    def kill(self) -> None:
+        """Kill all processes, and prevent the start of others."""
+        with self._lock:
+            self._is_stopped = True
+            for process in self._processes:
+                process.kill()

@@ -1,0 +1,79 @@
+"""Processes of controllers without processes: the same program, called in the process of the test."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from robocov.controllers import get_information, make_controller
+from robocov.observation import Decision, DensitySensor, Observations, Scanning, Snapshot
+from robocov.typing import FloatArray, IntArray
+from robocov_app.benchmark.controller_messages import (
+    ControllerCode,
+    Setup,
+    StepEncoder,
+    decode_decision,
+    encode_decision,
+)
+from robocov_app.benchmark.controller_program import ControllerProgram
+from robocov_app.benchmark.isolation import IsolatedTeam
+from robocov_app.sweep.tasks import Task
+from robocov_app.sweep.worker import Outcome, perform
+
+
+class LocalDecider:
+    """Decides like a `ControllerProcess`, with the same copies of everything that is sent."""
+
+    def __init__(self) -> None:
+        self.received: list[Observations] = []
+        self._step_encoder = StepEncoder()
+
+    def begin(self, setup: Setup) -> None:
+        self._robot_count = len(setup.team)
+        self._program = ControllerProgram(pickle.loads(pickle.dumps(setup)), DensitySensor(self._measure))
+
+    def finish_beginning(self) -> None:
+        pass
+
+    def send_observations(self, observations: Observations) -> None:
+        self._step = pickle.loads(pickle.dumps(self._step_encoder.encode(observations)))
+        self.received.append(self._step.observations)
+
+    def receive_decision(self, measure: Any) -> Decision:
+        self._measure_density = measure
+        decision = self._program.decide(self._step)
+        return decode_decision(encode_decision(decision), self._robot_count)
+
+    def _measure(self, robots: IntArray, points: FloatArray) -> FloatArray:
+        return np.asarray(self._measure_density(robots, points))
+
+
+def run_isolated(
+    task: Task, robots: Sequence[int], snapshots: list[Snapshot] | None = None
+) -> tuple[Outcome, list[str], dict[int, LocalDecider]]:
+    """Run a task as a referee does; return the outcome, the differences and the deciders of the robots."""
+    controller = make_controller(task.controller, task.gains, source=task.source)
+    scanning: Scanning | None = getattr(controller, "scanning", None)
+    environment = None
+    if get_information(controller) == "whole map":
+        environment = task.hide_unknown_density().build_environment().static
+    deciders = {robot: LocalDecider() for robot in robots}
+    team = IsolatedTeam(
+        ControllerCode(task.controller, task.gains, task.source),
+        LocalDecider(),
+        deciders,
+        scanning=scanning,
+        environment=environment,
+        rng=np.random.default_rng(0),
+    )
+
+    def watch(snapshot: Snapshot) -> None:
+        team.compare_decisions(snapshot)
+        if snapshots is not None:
+            snapshots.append(snapshot)
+
+    outcome = perform(task, watch, team)
+    return outcome, team.differences, deciders
