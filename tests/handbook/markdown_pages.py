@@ -51,6 +51,21 @@ def find_code(text: str, language: str, part: str) -> str:
     )
 
 
+def find_file_name(block: CodeBlock) -> str | None:
+    """Return the name of the file that a block shows; None if it shows none.
+
+    The first line may be a comment with the name. A JSON or TOML file has the name that the text mentioned
+    last.
+    """
+    comment = re.match(r"# ([\w.-]+)\n", block.code)
+    if comment is not None:
+        return comment[1]
+    if block.language not in ("json", "toml"):
+        return None
+    mentioned_names = re.findall(r"`([\w-]+\.(?:json|toml|robocov))`", block.preceding_text)
+    return mentioned_names[-1] if mentioned_names else "map.json"
+
+
 def list_commands(code: str) -> Iterator[str]:
     """Yield the `robocov` commands in a block of shell code, each on one line and without comments."""
     for line in code.replace("\\\n", " ").splitlines():

@@ -15,9 +15,9 @@ from fuzz_seeds import IMDF, build_imdf_zip
 from markdown_pages import (
     INDEX_DESCRIPTION,
     README,
-    CodeBlock,
     find_code,
     find_code_blocks,
+    find_file_name,
     list_commands,
     list_handbook_pages,
     read_handbook_page,
@@ -86,21 +86,6 @@ def make_files_of_other_pages(page: Path) -> None:
         Path("maps").mkdir()
     elif page.stem == "maps":
         Path("museum.zip").write_bytes(build_imdf_zip(IMDF))
-
-
-def find_file_name(block: CodeBlock) -> str | None:
-    """Return the name of the file that a block shows; None if it shows none.
-
-    The first line may be a comment with the name. A JSON or TOML file has the name that the text mentioned
-    last.
-    """
-    comment = re.match(r"# ([\w.-]+)\n", block.code)
-    if comment is not None:
-        return comment[1]
-    if block.language not in ("json", "toml"):
-        return None
-    mentioned_names = re.findall(r"`([\w-]+\.(?:json|toml|robocov))`", block.preceding_text)
-    return mentioned_names[-1] if mentioned_names else "map.json"
 
 
 def run_commands(code: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from markdown_pages import find_code_blocks, list_handbook_pages
+from markdown_pages import find_code_blocks, find_file_name, list_handbook_pages
 
 from robocov_app.cli import main
 
@@ -30,13 +30,11 @@ CASES = list(list_commands_with_tables())
 
 
 def save_files_of_page(page: Path) -> None:
-    """Save the files that a page shows: Python code that begins with a file name, and JSON as robots.json."""
+    """Save the files that a page shows."""
     for block in find_code_blocks(page.read_text(encoding="utf-8")):
-        comment = re.match(r"# (\w+\.py)\n", block.code)
-        if comment is not None:
-            Path(comment[1]).write_text(block.code)
-        elif block.language == "json":
-            Path("robots.json").write_text(block.code)
+        file_name = find_file_name(block)
+        if file_name is not None:
+            Path(file_name).write_text(block.code)
 
 
 @pytest.mark.slow
