@@ -50,10 +50,10 @@ MIN_REPORT_LINES = 7
 KEEP_PART = "part"
 SET_COLOR = "color"
 HINTS = {
-    KEEP_PART: "click into the map: keep that part · Tab option · Enter imports · Esc leaves",
-    SET_COLOR: "click into the left map, or Space on a color: free, solid, ignored · Enter imports",
+    KEEP_PART: "Click a part of the map to keep it · Tab: next option · Enter: import · Esc: cancel",
+    SET_COLOR: "Click a color in the left map, or choose one above: free, solid or ignored · Enter: import",
 }
-_ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignore"}
+_ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignored"}
 
 
 @contextmanager
@@ -201,9 +201,9 @@ class ImportDialog(Dialog):
         if self.imported is None:
             ui.space(MAPS_GAP_PX)
             if ui.surface is not None:
-                text = "reading…"
+                text = "Reading the file…"
                 if self.problem:
-                    text = "nothing to show"
+                    text = "Nothing to show"
                 image = render_text(text, ui.px(STATUS_TEXT_PX), ui.theme.faint)
                 ui.surface.blit(image, image.get_rect(center=box.center))
             return
@@ -251,11 +251,11 @@ class ImportDialog(Dialog):
             height=SMALL_BUTTON_HEIGHT_PX,
             below=6,
         )
-        ui.label("A click", style="unit")
-        part_tip = "A click into a map keeps that part of the free space"
-        color_tip = "A click into the left map makes its color free, solid or ignored"
-        self._draw_click_action(ui, KEEP_PART, "keeps a part", part_tip)
-        self._draw_click_action(ui, SET_COLOR, "sets a color", color_tip)
+        ui.label("Click to", style="unit")
+        part_tip = "Click a map to keep that part of the free space"
+        color_tip = "Click the left map to make its color free, solid or ignored"
+        self._draw_click_action(ui, KEEP_PART, "Keep a part", part_tip)
+        self._draw_click_action(ui, SET_COLOR, "Set a color", color_tip)
         ui.end_row()
         if self._shown_sheet is not None:
             self._draw_color_buttons(ui, self._shown_sheet)
@@ -280,7 +280,7 @@ class ImportDialog(Dialog):
         name = name_color(color)
         key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
-        tip = f"{name}: a click changes it"
+        tip = f"{name}: click to change it"
         if ui.button(text, key=key, selected=role is not None, small=True, tip=tip):
             self.form.cycle_color(color)
         button = ui.find("button", key)
@@ -338,6 +338,6 @@ class ImportDialog(Dialog):
         if self._shown_sheet is not None:
             hint = HINTS[SET_COLOR]
         if self.is_busy and self.imported is not None:
-            hint = "importing…"
+            hint = "Importing…"
         ui.label(hint, style="unit")
         ui.end_row()

@@ -117,7 +117,7 @@ class ImportForm:
         name = option.name
         present = self.texts.get(name, option.default)
         style = "bold" if name in self.texts else ""
-        ui.label(name.replace("_", " "), tip=option.help, style=style)
+        ui.label(name.replace("_", " ").capitalize(), tip=option.help, style=style)
         if option.choices:
             choices = option.choices
             if not option.default:

@@ -153,18 +153,17 @@ class ImportPreview:
 def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) -> list[_Caption]:
     """Return the captions of the map as read and as imported."""
     comparison = imported.comparison
-    report = imported.report
     lost = _describe_difference(comparison.lost, "left out")
     opened = _describe_difference(comparison.opened, "opened")
-    facts_before = f"{report.vertices_read} vertices, {format_area(comparison.before.area)} free"
-    facts_after = f"{report.vertices_kept} vertices, {format_area(comparison.after.area)} free"
+    facts_before = f"{format_area(comparison.before.area)} free"
+    facts_after = f"{format_area(comparison.after.area)} free"
     if comparison.gap is not None:
-        facts_after += f", narrowest passage {comparison.gap.width:.3g} m"
+        facts_after += f", narrowest gap {comparison.gap.width:.3g} m"
     if has_own_colors:
-        before = _Caption("in its colors", facts_before, "", theme.error)
+        before = _Caption("In its colors", facts_before, "", theme.error)
     else:
-        before = _Caption("as read", facts_before, lost, theme.error)
-    return [before, _Caption("as imported", facts_after, opened, theme.start)]
+        before = _Caption("As read", facts_before, lost, theme.error)
+    return [before, _Caption("As imported", facts_after, opened, theme.start)]
 
 
 def _describe_difference(area: shapely.Geometry, verb: str) -> str:
