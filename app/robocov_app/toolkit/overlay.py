@@ -35,6 +35,8 @@ _MESSAGE_SIDE_PX = 10
 """Minimum distance of a message from the left and right edges of the arena."""
 _MESSAGE_BOTTOM_PX = 34
 """Distance of a message from the bottom of the arena, which leaves the strip with the scale bar visible."""
+_MESSAGE_TOP_PX = 40
+"""Distance of a message from the top of the arena, which leaves the chips of layers visible."""
 _TAG_MARGIN_PX = 6
 _TAG_HEIGHT_PX = 20
 _TAG_RADIUS_PX = 4
@@ -205,7 +207,14 @@ def draw_status(
 
 
 def draw_message(
-    screen: Surface, text: str, arena: Box, theme: Theme, scale: float, *, is_error: bool
+    screen: Surface,
+    text: str,
+    arena: Box,
+    theme: Theme,
+    scale: float,
+    *,
+    is_error: bool,
+    is_at_top: bool = False,
 ) -> None:
     """Draw a message above the strip at the bottom of the arena; nothing if the text is empty.
 
@@ -222,6 +231,8 @@ def draw_message(
         Size of the text.
     is_error : bool
         Whether it is drawn in the color of errors.
+    is_at_top : bool
+        Whether it is at the top of the arena instead, below the chips of layers.
     """
     if not text:
         return
@@ -236,7 +247,11 @@ def draw_message(
     box_width = max(measure_text(line, size) for line in lines) + 2 * _MESSAGE_MARGIN_PX * scale
     box_height = (len(lines) * _MESSAGE_LINE_PX + _MESSAGE_HEIGHT_PX) * scale
     box = Rect(0, 0, round(box_width), round(box_height))
-    box.midbottom = round(left + width / 2), round(top + height - _MESSAGE_BOTTOM_PX * scale)
+    middle = round(left + width / 2)
+    if is_at_top:
+        box.midtop = middle, round(top + _MESSAGE_TOP_PX * scale)
+    else:
+        box.midbottom = middle, round(top + height - _MESSAGE_BOTTOM_PX * scale)
     box.clamp_ip(screen.get_rect())
     fill = theme.panel
     edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)

@@ -65,6 +65,21 @@ def test_a_message_leaves_the_scale_bar_and_the_status_of_the_map_visible(
         assert np.array_equal(copy_pixels(driver.window.screen.subsurface(strip)), before)
 
 
+def test_a_message_leaves_the_text_of_a_lesson_without_a_panel_visible(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.press_key("h")
+        driver.press_key("f2")
+        driver.session.playback.is_playing = False
+        driver.viewer.clear_message()
+        driver.run_frames(1, seconds=0.0)
+        left, top, width, height = driver.window.layout.arena
+        lower_half = pygame.Rect(left, top + height // 2, width, height - height // 2)
+        before = copy_pixels(driver.window.screen.subsurface(lower_half)).copy()
+        driver.viewer.show_message("a message")
+        driver.run_frames(1, seconds=0.0)
+        assert np.array_equal(copy_pixels(driver.window.screen.subsurface(lower_half)), before)
+
+
 def test_a_long_report_is_scrolled_to_its_end_by_the_wheel(tmp_path: Path) -> None:
     with open_viewer(tmp_path, RAPF, RAPF, RAPF, RAPF) as driver:
         window = driver.window

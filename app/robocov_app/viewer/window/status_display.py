@@ -64,4 +64,14 @@ class StatusDisplay:
             message = f"Recomputing the session: {100 * progress:.0f}%"
         if not message and self.can_suggest and self._lesson.shown is None:
             message = suggest_actions(viewer)
-        draw_message(screen, message, layout.arena, theme, layout.scale, is_error=is_error)
+        # Without a panel, the text of a lesson is at the bottom of the map.
+        is_at_top = self._lesson.shown is not None and not layout.has_panel
+        draw_message(
+            screen,
+            message,
+            layout.arena,
+            theme,
+            layout.scale,
+            is_error=is_error,
+            is_at_top=is_at_top,
+        )
