@@ -11,7 +11,15 @@ import tyro
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, describe_error, is_number, quote, require_number
+from robocov.errors import (
+    InputError,
+    ParameterError,
+    describe_error,
+    format_count,
+    is_number,
+    quote,
+    require_number,
+)
 from robocov.files.writing import replace_file, resolve_target
 from robocov.mapfile import load_map
 from robocov.typing import FloatArray
@@ -131,7 +139,7 @@ def _describe_result(
         f"coverage cost   {result.value:.3f} m³",
         f"uncovered area  {result.uncovered_area:.3f} m²",
         *list_density_lines(environment),
-        f"on {len(cost.points)} sites, {len(result.positions)} robots",
+        f"on {len(cost.points)} sites, {format_count(len(result.positions), 'robot')}",
     ]
     return lines
 

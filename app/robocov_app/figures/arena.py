@@ -55,6 +55,8 @@ _MAX_NUMBERED_STARTS = 30
 _START_NUMBER_HALO_PT = 1.6
 """Width of the light edge that separates the number of a start from what is below it."""
 _GOAL_PT = 8.0
+_GOAL_HALO_PT = 2.6
+"""Width of the lines of a cross with its light edge."""
 _GOAL_DIAMETERS = 0.6
 """Size of the mark of a goal, in diameters of a large robot."""
 _MAX_TRAJECTORY_FACTOR = 1.6
@@ -297,7 +299,7 @@ def _draw_starts(axes: Axes, record: Record, theme: Theme) -> None:
     present = np.flatnonzero(record.present[-1])
     first_rows = np.argmax(record.present, axis=0)[present]
     starts = record.positions[first_rows, present]
-    max_size = max(_START_PT, _START_DIAMETERS * _compute_median_diameter(axes, record))
+    max_size = _choose_max_mark_size(axes, record, _START_PT, _START_DIAMETERS)
     size = fit_mark_size(_to_points(axes, starts), _MIN_MARK_PT, max_size)
     axes.plot(*starts.T, zorder=_STARTS_ORDER, **_build_start_style(theme, size))
     if len(present) <= _MAX_NUMBERED_STARTS and _START_NUMBER_SIZE * size >= _MIN_START_NUMBER_PT:
@@ -392,12 +394,15 @@ def _draw_goals(
         goals = centroids
     goal_points = _to_points(axes, goals)
     distances = np.hypot(*(goal_points - _to_points(axes, record.positions[-1][working])).T)
-    max_size = max(_GOAL_PT, _GOAL_DIAMETERS * _compute_median_diameter(axes, record))
+    max_size = _choose_max_mark_size(axes, record, _GOAL_PT, _GOAL_DIAMETERS)
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, max_size)
     # The disc of a robot at its goal would hide the cross, except for its ends.
     is_away = distances > np.array([radii[robot] for robot in working.tolist()])
     if is_away.any():
-        axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, **_build_goal_style(is_centroid, theme, size))
+        # A light edge separates the crosses from obstacles and trajectories.
+        halo = [withStroke(linewidth=_GOAL_HALO_PT, foreground=to_plot_color(theme.background))]
+        style = _build_goal_style(is_centroid, theme, size)
+        axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, path_effects=halo, **style)
 
 
 def draw_robots(
@@ -464,6 +469,24 @@ def _compute_points_per_meter(axes: Axes) -> float:
     """Return the number of points of the page in a meter of the map."""
     ends = _to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     return abs(float(ends[1, 0] - ends[0, 0]))
+
+
+def _choose_max_mark_size(axes: Axes, record: Record, size: float, diameters: float) -> float:
+    """Return the maximum size of the mark of a start or goal, points.
+
+    It is smaller in a large team, and grows with large robots.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    record : Record
+    size : float, points
+        Size in a small team of small robots.
+    diameters : float
+        Size in diameters of a large robot.
+    """
+    reduced_size = max(size * choose_width_factor(len(record.team)), _MIN_MARK_PT)
+    return max(reduced_size, diameters * _compute_median_diameter(axes, record))
 
 
 def _compute_median_diameter(axes: Axes, record: Record) -> float:

@@ -259,6 +259,11 @@ class TestTrajectories:
         large = plot_trajectories(replace(record, team=large_team)).axes[0]
         assert find_marks(large, "o").get_markersize() > 2.0 * find_marks(small, "o").get_markersize()
 
+    def test_starts_are_smaller_in_a_large_team(self):
+        small_team = plot_trajectories(record_walk(CORRIDOR, 3)).axes[0]
+        large_team = plot_trajectories(record_walk(CORRIDOR, 40)).axes[0]
+        assert find_marks(large_team, "o").get_markersize() < find_marks(small_team, "o").get_markersize()
+
     def test_titles_contain_changed_gains(self):
         record = record_walk(ROOMS, 3)
         changed = replace(record, gains={**record.gains, "k_rep": 2.0})
