@@ -73,32 +73,53 @@ def wait_for_unchanged_picture(browser):
     return pictures[-1]
 
 
-def test_the_window_follows_input_the_page_size_and_the_color_scheme(browser, tmp_path):
+@pytest.fixture
+def rooms(browser, tmp_path):
+    """Yield the link of a window of the map Rooms, which a page of 1280 x 720 px shows."""
     browser.resize(1280, 720)
-    browser.set_preferences(color_scheme="light")
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        assert "token" not in browser.driver.current_url
-        first = wait_for_unchanged_picture(browser)
-        browser.drag((60, 240), (160, 240))
-        browser.wait_until(lambda: read_picture(browser) != first)
-        panned = wait_for_unchanged_picture(browser)
-        browser.press_keys("f")
-        browser.wait_until(lambda: read_picture(browser) != panned)
-        browser.press_keys("/")  # Open the palette.
-        browser.press_keys("seed 7")
-        typed = wait_for_unchanged_picture(browser)
-        browser.press_keys(ENTER)
-        browser.wait_until(lambda: read_picture(browser) != typed)
-        browser.resize(390, 844, 3.0)
-        browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
-        light = wait_for_unchanged_picture(browser)
-        browser.set_preferences(color_scheme="dark")
-        browser.wait_until(lambda: read_picture(browser) != light)
-        browser.driver.refresh()  # The page is opened by its cookie.
-        browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
-        assert not browser.read_console()
+        wait_for_unchanged_picture(browser)
+        yield link
+
+
+def test_a_drag_moves_the_map_and_f_shows_all_of_it(browser, rooms):
+    first = read_picture(browser)
+    browser.drag((60, 240), (160, 240))
+    browser.wait_until(lambda: read_picture(browser) != first)
+    panned = wait_for_unchanged_picture(browser)
+    browser.press_keys("f")
+    browser.wait_until(lambda: read_picture(browser) != panned)
+    assert not browser.read_console()
+
+
+def test_a_command_is_typed_in_the_palette(browser, rooms):
+    browser.press_keys("/")
+    browser.press_keys("seed 7")
+    typed = wait_for_unchanged_picture(browser)
+    browser.press_keys(ENTER)
+    browser.wait_until(lambda: read_picture(browser) != typed)
+
+
+def test_the_window_has_the_size_of_the_page(browser, rooms):
+    browser.resize(390, 844, 3.0)
+    browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
+
+
+def test_the_window_follows_the_color_scheme(browser, rooms):
+    browser.set_preferences(color_scheme="light")
+    light = wait_for_unchanged_picture(browser)
+    browser.set_preferences(color_scheme="dark")
+    browser.wait_until(lambda: read_picture(browser) != light)
+    browser.set_preferences(color_scheme="light")
+
+
+def test_a_page_is_reloaded_by_its_cookie(browser, rooms):
+    assert "token" not in browser.driver.current_url
+    browser.driver.refresh()
+    browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
+    assert browser.run_script("return controls")
 
 
 def press_with_control(browser, key, command=""):
@@ -108,54 +129,77 @@ def press_with_control(browser, key, command=""):
         browser.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, **event})
 
 
-def test_a_class_watches_the_teacher_who_uploads_and_downloads_files(browser, tmp_path):
+def read_status(browser):
+    """Return the message of the window."""
+    return browser.find("#status").get_property("textContent")
+
+
+def read_summary(browser):
+    """Return the heading of the list of people."""
+    return browser.find("summary").get_property("textContent")
+
+
+def test_a_dropped_file_is_opened_and_not_offered_as_a_saved_one(browser, rooms):
+    first = read_picture(browser)
+    drop_file = (
+        "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
+        "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
+    )
+    browser.run_script(drop_file, (MAPS / "trap.json").read_text())
+    browser.wait_until(lambda: read_picture(browser) != first)
+    assert not browser.find_all("#downloads a")
+
+
+def test_a_saved_session_is_downloaded(browser, rooms, tmp_path):
+    downloads = tmp_path / "downloads"
+    downloads.mkdir()
+    behavior = {"behavior": "allow", "downloadPath": str(downloads)}
+    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", behavior)
+    press_with_control(browser, "s")
+    browser.wait_until(lambda: browser.find_all("#downloads a"))
+    assert "saved" in read_status(browser)
+    assert str(tmp_path) not in read_status(browser)
+    browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720 - DOWNLOADS_HEIGHT])
+    browser.find("#downloads a").click()
+    browser.wait_until(lambda: list(downloads.glob("*.robocov")))
+
+
+@pytest.fixture
+def second_page(browser, rooms):
+    """Open a second page of the teacher, which watches, and yield the handle of the first one."""
+    teacher = browser.driver.current_window_handle
+    browser.driver.switch_to.new_window("tab")
     browser.resize(1280, 720)
-    (tmp_path / "down").mkdir()
-    download = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
-    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", download)
-    (tmp_path / "files").mkdir()
-    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
-        browser.driver.get(link)
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        first = wait_for_unchanged_picture(browser)
-        drop_file = (
-            "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
-            "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
-        )
-        browser.run_script(drop_file, (MAPS / "trap.json").read_text())
-        browser.wait_until(lambda: read_picture(browser) != first)
-        assert not browser.find_all("#downloads a"), "a dropped file is not a saved one"
-        wait_for_unchanged_picture(browser)
-        press_with_control(browser, "s")
-        browser.wait_until(lambda: browser.find_all("#downloads a"))
-        message = browser.find("#status").get_property("textContent")
-        assert "saved" in message
-        assert str(tmp_path) not in message
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720 - DOWNLOADS_HEIGHT])
-        browser.find("#downloads a").click()
-        browser.wait_until(lambda: list((tmp_path / "down").glob("*.robocov")))
-        teacher = browser.driver.current_window_handle
-        browser.driver.switch_to.new_window("tab")
-        browser.resize(1024, 900)
-        browser.driver.get(link)
-        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "saved", "watching"})
-        browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900 - DOWNLOADS_HEIGHT])
-        browser.resize(1280, 720)
-        browser.wait_until(
-            lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
-        )
-        browser.wait_until(lambda: get_classes(browser) == {"saved", "watching"})
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720 - DOWNLOADS_HEIGHT])
-        browser.find("summary").click()
-        browser.run_script("prompt = () => 'Ada'")
-        browser.find_all("#here button")[1].click()
-        browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
-        browser.find("#here button").click()  # The second page of the teacher takes control.
-        browser.wait_until(lambda: get_classes(browser) == {"saved"})
+    browser.driver.get(rooms)
+    browser.wait_until(lambda: "Teacher 1 controls" in read_summary(browser))
+    browser.wait_until(lambda: get_classes(browser) == {"watching"})
+    yield teacher
+    if len(browser.driver.window_handles) > 1:
         browser.driver.close()
         browser.driver.switch_to.window(teacher)
-        browser.wait_until(lambda: get_classes(browser) == {"saved"})
-        assert not browser.read_console()
+
+
+def test_a_page_of_another_shape_shows_the_map_of_the_window(browser, second_page):
+    browser.resize(1024, 900)
+    browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
+    browser.wait_until(lambda: get_canvas_size(browser) == [1024, 900])
+
+
+def test_a_person_enters_a_name(browser, second_page):
+    browser.find("summary").click()
+    browser.run_script("prompt = () => 'Ada'")
+    push_button(browser, "#here button", "Rename")
+    browser.wait_until(lambda: "Ada (you)" in browser.find("#here ul").text)
+
+
+def test_a_teacher_takes_control_in_a_second_page_until_it_is_closed(browser, second_page):
+    browser.find("summary").click()
+    push_button(browser, "#here button", "Take control")
+    browser.wait_until(lambda: get_classes(browser) == set())
+    browser.driver.close()
+    browser.driver.switch_to.window(second_page)
+    browser.wait_until(lambda: get_classes(browser) == set())
+    assert not browser.read_console()
 
 
 def test_the_invitation_shows_a_link_and_a_qr_code(browser, tmp_path):
@@ -430,37 +474,59 @@ def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser
             assert browser.read_console() == []
 
 
-def test_the_bar_of_a_phone_plays_undoes_chooses_tools_and_opens_the_lesson(browser, tmp_path):
+@pytest.fixture
+def phone(browser, tmp_path):
+    """Show a window of the map Rooms on a phone held upright."""
     with browser.emulate_touch():
         browser.resize(390, 844, 2.0)
         with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
             browser.driver.get(link)
             browser.wait_until(lambda: get_classes(browser) == {"phone"})
             wait_for_unchanged_picture(browser)
-            shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
-            assert [button.text for button in shown] == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
-            assert all(min(button.size.values()) >= 48 for button in shown)
-            assert not browser.find("#undo").is_enabled()
-            browser.find("#play").click()
-            browser.wait_until(lambda: browser.find("#play").text == "Pause")
-            browser.find("#play").click()
-            browser.wait_until(lambda: browser.find("#play").text == "Play")
-            browser.find("#to-tools").click()
-            browser.find("[data-command='tool:failure']").click()
-            browser.wait_until(lambda: browser.find("#to-tools").text == "Fail robot")
-            browser.find("#to-more").click()
-            targets = [button for button in browser.find_all("#more button") if button.is_displayed()]
-            assert all(min(button.size.values()) >= 48 for button in targets)
-            browser.find("[data-command='pane:add']").click()
-            wait_for_unchanged_picture(browser)
-            browser.press_keys(ENTER)
-            browser.wait_until(lambda: browser.find("#undo").is_enabled())
-            browser.find("#undo").click()
-            browser.wait_until(lambda: not browser.find("#undo").is_enabled())
-            browser.find("#lesson").click()
-            browser.wait_until(lambda: browser.find("#lesson").get_attribute("aria-pressed") == "true")
-            assert not browser.find("#panel").is_enabled()
+            yield browser
             assert browser.read_console() == []
+
+
+def are_large(buttons):
+    """Return whether all visible buttons can be touched easily."""
+    return all(min(button.size.values()) >= 48 for button in buttons if button.is_displayed())
+
+
+def test_the_buttons_of_a_phone_are_large(phone):
+    assert list_bar_buttons(phone) == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
+    assert are_large(phone.find_all("#touch button"))
+    phone.find("#to-more").click()
+    assert are_large(phone.find_all("#more button"))
+
+
+def test_the_bar_of_a_phone_plays_and_pauses(phone):
+    phone.find("#play").click()
+    phone.wait_until(lambda: phone.find("#play").text == "Pause")
+    phone.find("#play").click()
+    phone.wait_until(lambda: phone.find("#play").text == "Play")
+
+
+def test_the_bar_of_a_phone_shows_the_chosen_tool(phone):
+    phone.find("#to-tools").click()
+    phone.find("[data-command='tool:failure']").click()
+    phone.wait_until(lambda: phone.find("#to-tools").text == "Fail robot")
+
+
+def test_the_bar_of_a_phone_undoes_an_edit(phone):
+    assert not phone.find("#undo").is_enabled()
+    phone.find("#to-more").click()
+    phone.find("[data-command='pane:add']").click()
+    wait_for_unchanged_picture(phone)
+    phone.press_keys(ENTER)
+    phone.wait_until(lambda: phone.find("#undo").is_enabled())
+    phone.find("#undo").click()
+    phone.wait_until(lambda: not phone.find("#undo").is_enabled())
+
+
+def test_the_bar_of_a_phone_opens_the_lesson_in_place_of_the_panel(phone):
+    phone.find("#lesson").click()
+    phone.wait_until(lambda: phone.find("#lesson").get_attribute("aria-pressed") == "true")
+    assert not phone.find("#panel").is_enabled()
 
 
 def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
