@@ -1,6 +1,7 @@
 """The page that compares results of the benchmark: tables and Pareto plots for each track."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from robocov_app.benchmark.label_placement import (
     compute_nearest_points,
     place_labels,
 )
-from robocov_app.benchmark.ratings import Rating, format_number
+from robocov_app.benchmark.ratings import Rating, format_number, shorten
 from robocov_app.benchmark.results import describe_method, shares_maps_by_messages
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
@@ -76,6 +77,14 @@ _MIN_RATIO = 1.01
 """Minimum ratio of the largest value to the smallest for plotting a quantity."""
 _MIN_LOG_RATIO = 8.0
 """Minimum ratio of the largest value to the smallest for a logarithmic axis."""
+_MAX_RATIO_TO_MEDIAN = 1e4
+"""Maximum ratio of a plotted value to the median of all entries."""
+MAX_INCOMPLETE_TABLES = 10
+"""Maximum number of incomplete entries on each track that are compared with the yardsticks."""
+MAX_PLOTTED_ENTRIES = 40
+"""Maximum number of entries in a plot, apart from the bundled ones; those with the highest scores."""
+_MAX_PLOT_LABEL_CHARS = 28
+"""Maximum length of a label in a plot."""
 
 
 class ParetoPoint(NamedTuple):
@@ -96,6 +105,8 @@ class _Entries(NamedTuple):
 
     styles: Mapping[str, CurveStyle]
     information: Mapping[str, str]
+    bundled: Collection[str]
+    """Labels of the bundled results."""
     yardsticks: Sequence[str]
     """Labels of the entries of `YARDSTICKS`."""
 
@@ -132,6 +143,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     entries = _Entries(
         styles=dict(zip(labels, styles, strict=True)),
         information=dict(zip(labels, information, strict=True)),
+        bundled={label for result, label in zip(results, labels, strict=True) if result["is_bundled"]},
         yardsticks=_find_yardsticks(results, labels),
     )
     tracks = {
@@ -250,6 +262,7 @@ def _build_overview_cells(
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
     """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
+    plotted = _select_plotted(ranked, entries)
     family_head, family_rows = ratings.build_family_rows(ranked)
     return {
         "name": name,
@@ -258,7 +271,8 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
         "table": _build_rating_table("Ratings", ranked, entries),
         "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
         "incomplete": _build_incomplete_tables(track_ratings, entries),
-        "plots": _build_plots(name, ranked, entries),
+        "plots": _build_plots(name, plotted, entries),
+        "omitted_from_plots": len(ranked) - len(plotted),
     }
 
 
@@ -277,16 +291,18 @@ def _build_incomplete_tables(track_ratings: Sequence[Rating], entries: _Entries)
     For comparison, it also contains the ratings of the yardsticks over the runs of the entry.
     """
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
+    incomplete = [rating for rating in track_ratings if not rating.is_complete]
     tables = []
-    for rating in track_ratings:
-        if rating.is_complete:
-            continue
+    for rating in incomplete[:MAX_INCOMPLETE_TABLES]:
         keys = [ratings.get_run_key(row) for row in rating.rows]
         compared = [yardstick.select_runs(keys) for yardstick in yardsticks]
         caption = f"{rating.label}, incomplete and not ranked"
         if compared:
             caption += ", and others over the same runs"
         tables.append(_build_rating_table(caption, [rating, *compared], entries))
+    omitted_count = len(incomplete) - len(tables)
+    if omitted_count:
+        tables[-1] = replace(tables[-1], notes=(f"Incomplete entries without a table: {omitted_count}.",))
     return tables
 
 
@@ -299,6 +315,13 @@ def _build_rating_table(caption: str, track_ratings: Sequence[Rating], entries: 
     return PageTable(caption, ratings.HEAD, rows, text_columns=frozenset({1}))
 
 
+def _select_plotted(track_ratings: Sequence[Rating], entries: _Entries) -> list[Rating]:
+    """Return the ratings of bundled results, and the best of the others, in the order of their scores."""
+    others = [rating for rating in track_ratings if rating.label not in entries.bundled]
+    omitted = {rating.label for rating in others[MAX_PLOTTED_ENTRIES:]}
+    return [rating for rating in track_ratings if rating.label not in omitted]
+
+
 def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
     """Build the plots of a track: the gap against each quantity in which controllers differ."""
     plots = []
@@ -307,13 +330,14 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         for rating in track_ratings:
             point = ParetoPoint(
                 style=entries.styles[rating.label],
-                label=rating.label,
+                label=shorten(rating.label, _MAX_PLOT_LABEL_CHARS),
                 x=quantity.compute(rating),
                 gap=100.0 * rating.gap.estimate,
                 is_rival=entries.information[rating.label] != _WHOLE_MAP,
             )
             if np.isfinite((point.x, point.gap)).all():
                 points.append(point)
+        points = _select_points(points)
         values = [point.x for point in points]
         if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
             continue
@@ -323,6 +347,20 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         svg = inline_svg(figure, f"{name}-{key}", description)
         plots.append(PagePlot(f"Gap and {quantity.title}", svg))
     return plots
+
+
+def _select_points(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
+    """Return the points without extreme values, which would hide the differences between the others.
+
+    Points at 0 are left out as well if the others need a logarithmic axis.
+    """
+    median = np.median([point.x for point in points]) if points else 0.0
+    selected = [point for point in points if point.x <= _MAX_RATIO_TO_MEDIAN * median]
+    positive = [point for point in selected if point.x > 0.0]
+    values = [point.x for point in positive]
+    if values and max(values) > _MIN_LOG_RATIO * min(values):
+        return positive
+    return selected
 
 
 @plain_style()

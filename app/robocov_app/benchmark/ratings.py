@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from robocov.text import escape_controls
 from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time
@@ -20,6 +21,8 @@ NO_VALUE = "–"
 MIN_INTERVAL_MAPS = 12
 """Minimum number of maps for an interval. A 95% bootstrap interval contains the true value in 82% of all
 cases with 5 maps, and in 92% with 12."""
+_MAX_LABEL_CHARS = 100
+"""Maximum length of the label of an entry with its gains."""
 CONTACT_FACTOR = 0.5
 """Factor for the score of a run in which a robot touched a wall or another robot."""
 MOTION_FACTOR = 0.5
@@ -270,6 +273,7 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
         if entry["set"]:
             gains = ", ".join(f"{gain} {value}" for gain, value in entry["set"].items())
             name = f"{name} ({gains})"
+        name = shorten(escape_controls(name, single_line=True), _MAX_LABEL_CHARS)
         label = name
         number = 1
         while label in labels:
@@ -277,6 +281,11 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
             label = f"{name} #{number}"
         labels.append(label)
     return labels
+
+
+def shorten(text: str, max_chars: int) -> str:
+    """Shorten a text to a number of characters, the last of which is then an ellipsis."""
+    return text if len(text) <= max_chars else f"{text[: max_chars - 1]}…"
 
 
 def format_number(value: float | None, format_spec: str = ".3g") -> str:

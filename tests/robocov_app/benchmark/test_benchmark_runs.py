@@ -25,10 +25,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import Adaptive, get_gain_values, load_controller_class
+from robocov.errors import InputError
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import place_labels
-from robocov_app.benchmark.page import ParetoPoint, build_page, draw_pareto_figure, find_pareto_front
+from robocov_app.benchmark.page import (
+    MAX_INCOMPLETE_TABLES,
+    ParetoPoint,
+    build_page,
+    draw_pareto_figure,
+    find_pareto_front,
+)
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import (
     ENTRIES,
@@ -464,6 +471,115 @@ def test_a_killed_benchmark_is_resumed(tmp_path: Path) -> None:
     for name in ("killed", "whole"):
         rows[name] = [{**row, "deciding_s": None} for row in read_result(tmp_path / name)["rows"]]
     assert rows["killed"] == rows["whole"] and len(rows["whole"]) == len(maps)
+
+
+def build_result(label: str, gap: float, *, is_bundled: bool = False, **entry: Any) -> dict[str, Any]:
+    """Build a result with the two runs of `short_ideal_track`."""
+    rows = [
+        {
+            **dict.fromkeys(("stuck_robots", "contacts"), 0),
+            "track": "ideal",
+            "map": map_name,
+            "seed": 0,
+            "gap": gap,
+            "gap_to_bound": None,
+            "mean_distance_m": 2.0,
+            "mean_distance_over_run_m": 3.0,
+            "near_final_s": 9.0,
+            "settled_at_s": 8.0,
+            "path_length_m": 8.0 + gap,
+            "work_J": 50.0,
+            "sent_bytes": 4e5,
+            "deciding_s": 0.1,
+        }
+        for map_name in MAPS
+    ]
+    default_entry = {
+        "controller": "mine.py:Mine",
+        "label": label,
+        "information": "own",
+        "gains": {},
+        "set": {},
+        "source_sha256": "1" * 64,
+    }
+    return {
+        "entry": default_entry | entry,
+        "rows": rows,
+        "is_bundled": is_bundled,
+        "versions": {"numpy": "2"},
+    }
+
+
+@pytest.fixture
+def short_ideal_track(monkeypatch: pytest.MonkeyPatch) -> None:
+    track = replace(suite.TRACKS["ideal"], seeds=(0,), maps=MAPS)
+    monkeypatch.setitem(suite.TRACKS, "ideal", track)  # type: ignore[arg-type]
+
+
+def build_bundled_rapf() -> dict[str, Any]:
+    return build_result("RAPF", 0.3, is_bundled=True, controller="rapf", source_sha256=None)
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_other_entries_do_not_replace_a_bundled_one() -> None:
+    by_label = build_result("RAPF", 0.1)
+    by_name = build_result("RAPF", 0.2, controller="rapf", source_sha256=None)
+    incomplete = build_result("Few", 0.4)
+    incomplete["rows"].pop()
+    tables = build_tables([by_label, by_name, incomplete, build_bundled_rapf()])
+    gaps = {row[0]: row[4] for row in tables.ideal}
+    assert gaps == {"RAPF": "30.0", "RAPF #2": "10.0", "RAPF #3": "20.0"}
+    # Only the bundled entry is a yardstick.
+    assert [row[0] for row in tables.incomplete] == ["Few", "RAPF"]
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_the_page_shows_entries_with_any_content() -> None:
+    labels = ["<script>alert(1)</script>", "A\x00B", "\u202eevil", "$x^{$ \\frac", "{{ 7 * 7 }}", "W" * 60]
+    results = [build_result(label, 0.1 * k) for k, label in enumerate(labels)]
+    results.append(build_result("Gains", 0.1, set={"<b>" * 30: "</table>" * 50}))
+    results[0]["rows"][0] = {"track": "ideal", "map": MAPS[0], "seed": 0, "error": "<b>x</b>"}
+    results[1]["rows"][0] |= {"deciding_s": 1e15}
+    for k in range(100):
+        results.append(build_result(f"Entry {k}", 0.5))
+        if k % 2:
+            results[-1]["rows"].pop()
+    page = build_page([*results, build_bundled_rapf()], "Test")
+    assert not set(page) & {"\x00", "\u202e"}
+    assert "<script" not in page and "<b>" not in page
+    assert "A\\x00B" in page and "{{ 7 * 7 }}" in page
+    tables = [html.unescape(part) for part in re.findall(r"<caption><span>(.*?)</span>", page)]
+    assert sum("incomplete" in caption for caption in tables) == MAX_INCOMPLETE_TABLES
+    assert "Incomplete entries without a table: 40." in page
+    assert "Entries with lower scores that are not drawn: 17." in page
+
+
+@pytest.mark.usefixtures("short_runs")
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda result: result["entry"].update(label="W" * 61), "label: expected 1 to 60 characters"),
+        (lambda result: result["entry"].update(label=" "), "label: expected 1 to 60 characters"),
+        (
+            lambda result: result["rows"][0].update(work_J=1e30),
+            "work_J: expected a number from 0 to 1e+15",
+        ),
+    ],
+    ids=["long label", "empty label", "huge figure"],
+)
+def test_entries_that_no_page_can_show_are_rejected(change: Any, message: str, tmp_path: Path) -> None:
+    run_short_benchmark(tmp_path / "out")
+    change_result(tmp_path / "out", change)
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_result(tmp_path / "out")
+
+
+@pytest.mark.usefixtures("short_runs")
+def test_no_file_contains_a_bundled_result(tmp_path: Path) -> None:
+    run_short_benchmark(tmp_path / "out")
+    change_result(tmp_path / "out", lambda result: result.update(is_bundled=True))
+    assert read_result(tmp_path / "out")["is_bundled"] is False
+    assert all(result["is_bundled"] for result in load_bundled_results())
 
 
 @pytest.fixture(scope="module")
