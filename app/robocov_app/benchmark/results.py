@@ -328,10 +328,10 @@ def _check_row(row: Any, location: str) -> None:
     if has_failed:
         return
     for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_FIGURES_THAT_MAY_BE_NEGATIVE}):
-        if row[name] is not None and not 0.0 <= row[name] <= _MAX_FIGURE:
-            raise InputError(
-                f"{location}: {name}: expected a number from 0 to {_MAX_FIGURE:g}, got {quote(row[name])}"
-            )
+        if row[name] is not None and row[name] < 0.0:
+            raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
+        if row[name] is not None and row[name] > _MAX_FIGURE:
+            raise InputError(f"{location}: {name}: expected at most {_MAX_FIGURE:g}, got {row[name]}")
     if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
         raise InputError(
             f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "
