@@ -418,60 +418,23 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         wait_for_unchanged_picture(browser)
 
 
-def test_drags_with_shift_select_and_with_alt_copy(browser, tmp_path):
-    browser.resize(1280, 720)
-    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-        browser.driver.get(link)
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        wait_for_unchanged_picture(browser)
-
-        def wait_for_message(text):
-            browser.wait_until(lambda: text in browser.find("#status").get_property("textContent"))
-
-        alt = 1
-        shift = 8
-        browser.drag((738, 160), (729, 190), (719, 215), modifiers=alt)  # Copy the round table.
-        wait_for_message("copied")
-        # Select from the floor of its room.
-        browser.drag((639, 90), (739, 200), (824, 248), modifiers=shift)
-        wait_for_message("2 obstacles selected")
-        assert browser.read_console() == []
+def wait_for_message(browser, text):
+    """Wait until the message of the window contains a text."""
+    browser.wait_until(lambda: text in read_status(browser))
 
 
-def test_a_phone_held_upright_has_large_buttons_and_understands_gestures(browser, tmp_path):
-    with browser.emulate_touch():
-        browser.resize(390, 844, 3.0)
-        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-            browser.driver.get(link)
-            browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2376])
-            narrow = wait_for_unchanged_picture(browser)
-            assert browser.measure("canvas") == (0, 0, 390, 792)
-            assert browser.measure("#touch")[1] == 792
-            browser.find("#panel").click()
-            browser.wait_until(lambda: read_picture(browser) != narrow)
-            browser.wait_until(lambda: browser.run_script("return scrollBox"))
-            take_messages = record_messages(browser)
+def test_a_drag_with_alt_copies_an_obstacle(browser, rooms):
+    alt = 1
+    browser.drag((738, 160), (729, 190), (719, 215), modifiers=alt)  # the round table
+    wait_for_message(browser, "copied")
+    assert browser.read_console() == []
 
-            def touch(*steps):
-                """Move fingers through steps with their positions; return the sent messages."""
-                browser.touch(*steps)
-                messages = [message for message in take_messages() if message["kind"] in ("button", "wheel")]
-                return [
-                    (message["kind"], message.get("button"), round(message["x"] / 3)) for message in messages
-                ]
 
-            dragged = touch(*([(40 + 10 * k, 300)] for k in range(5)))
-            assert dragged == [("button", 1, 40), ("button", 1, 80)]
-            unsteady = touch(*([(60 + k % 2, 300)] for k in range(15)))
-            assert unsteady == [("button", 3, 60)] * 2
-            pinch = touch(*([(50 - 4 * k, 300), (70 + 4 * k, 300)] for k in range(8)))
-            assert pinch[0] == pinch[-1] == ("button", 3, 60)
-            assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
-            scrolled = touch(*([(60, 700 - 20 * k)] for k in range(6)))
-            assert {kind for kind, *_ in scrolled} == {"wheel"}, "up and down, a finger scrolls the panel"
-            moved_slider = touch(*([(60 + 10 * k, 700)] for k in range(6)))
-            assert {kind for kind, *_ in moved_slider} == {"button"}, "to the side, it moves a slider"
-            assert browser.read_console() == []
+def test_a_drag_with_shift_selects_obstacles(browser, rooms):
+    shift = 8
+    browser.drag((639, 90), (739, 200), (824, 248), modifiers=shift)  # from the floor of a room
+    wait_for_message(browser, "selected")
+    assert browser.read_console() == []
 
 
 @pytest.fixture
@@ -490,6 +453,56 @@ def phone(browser, tmp_path):
 def are_large(buttons):
     """Return whether all visible buttons can be touched easily."""
     return all(min(button.size.values()) >= 48 for button in buttons if button.is_displayed())
+
+
+def test_a_phone_held_upright_has_the_bar_below_the_window(phone):
+    assert phone.measure("canvas") == (0, 0, 390, 792)
+    assert phone.measure("#touch")[1] == 792
+
+
+@pytest.fixture
+def touch(phone):
+    """Return a function that moves fingers through steps, and returns the messages that the page sends.
+
+    Each message is reduced to its kind, the number of its button, and its horizontal position in the page.
+    The panel of the window is open.
+    """
+    phone.find("#panel").click()
+    phone.wait_until(lambda: phone.run_script("return scrollBox"))
+    take_messages = record_messages(phone)
+
+    def move_fingers(*steps):
+        phone.touch(*steps)
+        messages = [message for message in take_messages() if message["kind"] in ("button", "wheel")]
+        return [(message["kind"], message.get("button"), round(message["x"] / 2)) for message in messages]
+
+    return move_fingers
+
+
+def test_a_finger_drags_with_the_left_button(touch):
+    dragged = touch(*([(40 + 10 * k, 300)] for k in range(5)))
+    assert dragged == [("button", 1, 40), ("button", 1, 80)]
+
+
+def test_an_unsteady_long_press_is_a_right_click(touch):
+    pressed = touch(*([(60 + k % 2, 300)] for k in range(15)))
+    assert pressed == [("button", 3, 60)] * 2
+
+
+def test_two_fingers_pan_and_zoom(touch):
+    pinch = touch(*([(50 - 4 * k, 300), (70 + 4 * k, 300)] for k in range(8)))
+    assert pinch[0] == pinch[-1] == ("button", 3, 60)
+    assert {"wheel"} == {kind for kind, *_ in pinch[1:-1]}
+
+
+def test_a_finger_that_moves_up_scrolls_the_panel(touch):
+    scrolled = touch(*([(60, 700 - 20 * k)] for k in range(6)))
+    assert {kind for kind, *_ in scrolled} == {"wheel"}
+
+
+def test_a_finger_that_moves_to_the_side_moves_a_slider_of_the_panel(touch):
+    moved = touch(*([(60 + 10 * k, 700)] for k in range(6)))
+    assert {kind for kind, *_ in moved} == {"button"}
 
 
 def test_the_buttons_of_a_phone_are_large(phone):
