@@ -385,7 +385,9 @@ def test_the_page_works_behind_a_proxy_that_fails_or_is_slow(browser, tmp_path):
         browser.wait_until(lambda: read_picture(browser) != paused)
 
 
-def test_text_is_pasted_once_and_copied(browser, tmp_path):
+@pytest.fixture
+def name_field(browser, tmp_path):
+    """Show an editor, whose field of the map's name has the focus; the page may use the clipboard."""
     browser.resize(1280, 720)
     with serve_window("edit", "--folder", str(tmp_path)) as link:
         allowed = {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]}
@@ -394,28 +396,38 @@ def test_text_is_pasted_once_and_copied(browser, tmp_path):
         browser.driver.get(link)
         browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
         wait_for_unchanged_picture(browser)
+        browser.drag((1150, 99))
+        press_with_control(browser, "a")
+        yield browser
 
-        write_clipboard = "navigator.clipboard.writeText('Große Halle').then(arguments[0])"
-        browser.driver.execute_async_script(write_clipboard)
-        browser.drag((1150, 99))  # Click the field of the map's name.
-        press_with_control(browser, "a")
-        press_with_control(browser, "v", "paste")
-        wait_for_unchanged_picture(browser)
-        browser.press_keys("!")
-        press_with_control(browser, "a")
-        press_with_control(browser, "c", "copy")
-        read_clipboard = "navigator.clipboard.readText().then(arguments[0])"
-        browser.wait_until(lambda: browser.driver.execute_async_script(read_clipboard) == "Große Halle!")
-        browser.press_keys(ENTER)
-        wait_for_unchanged_picture(browser)
-        press_with_control(browser, "s")
-        wait_for_unchanged_picture(browser)
-        browser.press_keys(ENTER)
-        wait_for_unchanged_picture(browser)
-        browser.wait_until(lambda: list(tmp_path.glob("*.json")))
-        assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle!"
-        press_with_control(browser, "z")  # what is not saved does not keep a process that is to stop
-        wait_for_unchanged_picture(browser)
+
+def paste_text(browser, text):
+    """Put a text on the clipboard, and paste it."""
+    browser.driver.execute_async_script(
+        "navigator.clipboard.writeText(arguments[0]).then(arguments[1])", text
+    )
+    press_with_control(browser, "v", "paste")
+    wait_for_unchanged_picture(browser)
+
+
+def test_text_is_pasted_once(name_field, tmp_path):
+    paste_text(name_field, "Große Halle")
+    name_field.press_keys(ENTER)
+    wait_for_unchanged_picture(name_field)
+    press_with_control(name_field, "s")
+    wait_for_unchanged_picture(name_field)
+    name_field.press_keys(ENTER)
+    name_field.wait_until(lambda: list(tmp_path.glob("*.json")))
+    assert json.loads(next(tmp_path.glob("*.json")).read_text())["name"] == "Große Halle"
+
+
+def test_text_is_copied(name_field):
+    paste_text(name_field, "Große Halle")
+    name_field.press_keys("!")
+    press_with_control(name_field, "a")
+    press_with_control(name_field, "c", "copy")
+    read_clipboard = "navigator.clipboard.readText().then(arguments[0])"
+    name_field.wait_until(lambda: name_field.driver.execute_async_script(read_clipboard) == "Große Halle!")
 
 
 def wait_for_message(browser, text):
