@@ -58,7 +58,7 @@ def test_each_command_prints_its_table(
 
 def test_tables_of_all_these_pages_are_found() -> None:
     pages = {page.stem for page, _, _ in CASES}
-    assert pages == {"cost", "first-run", "own-controller", "where-controllers-fail"}
+    assert pages == {"cost", "exercises", "first-run", "own-controller", "where-controllers-fail"}
     own_controller_page = (list_handbook_pages()[0].parent / "own-controller.md").read_text(encoding="utf-8")
     table_count = sum(page.stem == "own-controller" for page, _, _ in CASES)
     assert table_count == own_controller_page.count("mean distance  above best")
