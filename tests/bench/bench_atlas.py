@@ -1,11 +1,12 @@
 """Measure the goals of the controller `atlas` that the benchmark's tracks do not cover.
 
-    python tests/bench/bench_atlas.py doors large-maps sizes ranges rest pace --controller atlas-shared
+    python tests/bench/bench_atlas.py doors large-maps sizes ranges stakes rest pace --controller atlas-shared
 
 - ``doors``: whether robots find narrow doors in walls of random direction
 - ``large-maps``: the same in upright walls on larger maps, where nodes of planners are farther apart
 - ``sizes``: whether a larger team is ever worse than a smaller one
 - ``ranges``: gaps, rest and path lengths with limited ranges, beside `rapf`
+- ``stakes``: costs and path lengths for different values of the gain `stake`, on maps outside the benchmark
 - ``rest``: whether a team that has rested for ten minutes responds to a failure and to an open door
 - ``pace``: computing time, beside `rapf`
 """
@@ -72,6 +73,11 @@ LIMITED_RANGES: tuple[dict[str, float], ...] = (
     {"sensing_range": 6.0},
 )
 LARGE_GAP = 0.05
+
+STAKES = (0.004, 0.016, 0.03, 0.06, 1.0)
+"""Values of the gain `stake`. With the last one, robots do not look for viewpoints."""
+STAKE_MAP_SEEDS = (331, 332, 333)
+"""Seeds of the maps of each kind. The benchmark has other ones."""
 
 REST_TIME_S = 600.0
 RESPONSE_TIME_S = 60.0
@@ -274,6 +280,40 @@ def measure_ranges(controller: str, count: int, pool: ProcessPoolExecutor) -> It
         )
 
 
+def run_with_stake(controller: str, stake: float, map_case: tuple[str, int]) -> FinalState:
+    """Run six robots for 60 s on a new map of a kind, given with its seed."""
+    kind, seed = map_case
+    if kind in suite.GENERATORS:
+        environment = generate_map(seed, kind=kind)
+    else:
+        environment = suite.build_floor_plan(kind, seed)
+    starts = environment.start(None).sample(suite.TEAM_SIZE, seed=0, radius=suite.ROBOT_RADIUS_M)
+    simulation = Simulation(environment, make_controller(controller, {"stake": stake}), starts)
+    record = simulation.run(60.0)
+    cost = CoverageCost(environment, lattice=96)(record.positions[-1])
+    path_lengths = compute_path_lengths(record.positions)
+    return FinalState(mean_distance=cost.mean_distance, mean_path_length=float(path_lengths.mean()))
+
+
+def measure_stakes(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
+    """Yield costs relative to those with the smallest stake, and path lengths."""
+    kinds = [*suite.GENERATORS, *suite.FLOOR_PLANS]
+    map_cases = [(kind, seed) for kind in kinds for seed in STAKE_MAP_SEEDS]
+    first_distances: FloatArray | None = None
+    for stake in STAKES:
+        states = list(pool.map(partial(run_with_stake, controller, stake), map_cases))
+        mean_distances = np.array([state.mean_distance for state in states])
+        path_length = np.mean([state.mean_path_length for state in states])
+        if first_distances is None:
+            first_distances = mean_distances
+        changes = mean_distances / first_distances - 1.0
+        yield (
+            f"stake {stake:g} on {len(map_cases)} maps: cost {changes.mean():+.1%} (mean), "
+            f"{np.median(changes):+.1%} (median), {changes.max():+.1%} (worst); "
+            f"path length {path_length:.1f} m"
+        )
+
+
 def measure_response(controller: str, event: Event) -> float:
     """Return how far a team that has rested for ten minutes moves after an event, as a mean, m."""
     environment = load_map("rooms")
@@ -336,6 +376,7 @@ MEASURES: Mapping[str, Measure] = {
     "large-maps": measure_large_maps,
     "sizes": measure_sizes,
     "ranges": measure_ranges,
+    "stakes": measure_stakes,
     "rest": measure_rest,
     "pace": measure_pace,
 }

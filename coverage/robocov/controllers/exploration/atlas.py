@@ -175,7 +175,7 @@ class Atlas(BaseController):
     )
     rest: float = gain(0.002, "1", "fraction of its own cell's cost that a new goal must save", high=1.0)
     stake: float = gain(
-        0.004, "1", "fraction of the cost that unknown space seen from a viewpoint must contribute", high=1.0
+        0.016, "1", "fraction of the cost that unknown space seen from a viewpoint must contribute", high=1.0
     )
     patience: float = gain(
         0.12,
