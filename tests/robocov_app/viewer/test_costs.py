@@ -105,6 +105,18 @@ def ready(stubbed):
 # in this process
 
 
+def test_the_process_of_the_window_builds_no_service_and_so_compiles_no_kernels(monkeypatch) -> None:
+    def build_service() -> CostService:
+        raise AssertionError("the service is built in the process of the window")
+
+    monkeypatch.setattr(module, "CostService", build_service)
+    costs = Costs(32)
+    try:
+        costs.set_environment(HALL)
+    finally:
+        costs.close()
+
+
 def test_answers_equal_the_coverage_cost():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)

@@ -126,10 +126,7 @@ class Costs:
         self.state = ""
         self.lattice = lattice
         self._is_direct = direct
-        self._worker: Worker[KnownCost | _SharedSites] = DirectWorker(CostService(), _CostCodec())
-        if not direct:
-            service = "robocov_app.viewer.costs.costs:CostService"
-            self._worker = LatestWorker(service, "computes the cost", _CostCodec)
+        self._worker = _create_worker(direct=direct)
         self._map_request: CostRequest | None = None
         self._pending: CostRequest | None = None
         self._map_number = 0
@@ -315,6 +312,17 @@ class _CostCodec(Codec):
             weights=self._shared.weights,
         )
         return KnownCost(answer.time, result, answer.path, self._get_lattice, answer.travel_time)
+
+
+def _create_worker(*, direct: bool) -> Worker[KnownCost | _SharedSites]:
+    """Return a worker that computes costs: in this process if `direct`, otherwise in another one.
+
+    Only the process that computes costs builds the service, which compiles kernels first.
+    """
+    if direct:
+        return DirectWorker(CostService(), _CostCodec())
+    service = "robocov_app.viewer.costs.costs:CostService"
+    return LatestWorker(service, "computes the cost", _CostCodec)
 
 
 class CostService:
