@@ -128,7 +128,7 @@ def test_check_reports_invalid_maps_as_json(invalid_map: Path, capsys: pytest.Ca
 def test_check_prints_valid_maps_and_errors(invalid_map: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "square", str(invalid_map)]) == 2
     output = capsys.readouterr()
-    assert "narrowest gap" in output.out
+    assert "narrowest passage" in output.out
     assert f"robocov: error: {invalid_map}:1:66: boundary" in output.err
 
 

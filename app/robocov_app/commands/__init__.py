@@ -45,7 +45,7 @@ COMMANDS = {
         "paper", "reproduce the paper's figures, and test its claims on many maps", uses_kernels=True
     ),
     "edit": Subcommand("edit", "draw, check and try maps in the editor"),
-    "check": Subcommand("maps.check", "validate maps: free area, components, unreachable area, gaps"),
+    "check": Subcommand("maps.check", "validate maps: free area, components, unreachable area, passages"),
     "maps": Subcommand("maps.bundled", "list the bundled maps"),
     "generate": Subcommand("maps.generate", "generate random maps: obstacles, towns, rooms, mazes, caves"),
     "controllers": Subcommand("controllers", "list the controllers and their gains"),
@@ -57,9 +57,9 @@ COMMANDS = {
         "benchmark", "rate a controller on frozen maps and tracks; verify and compare", uses_kernels=True
     ),
     "bench": Subcommand("bench", "measure speed, as ratios to baselines in the same run"),
-    "import": Subcommand("maps.import_map", "convert a foreign map file to a map of robocov"),
+    "import": Subcommand("maps.import_map", "import a map from another program"),
     "export": Subcommand("maps.export_map", "export a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
-    "lesson": Subcommand("lesson", "check a lesson for the window: its format, and that chapters end"),
+    "lesson": Subcommand("lesson", "check a lesson file: its format, and that every chapter can be finished"),
     "schema": Subcommand("maps.schema", "print the JSON Schema of map files"),
     "completion": Subcommand("completion", "print a script for completion in the shell"),
     "handbook": Subcommand("handbook", "open tutorials, guides and the reference in a browser"),

@@ -127,4 +127,8 @@ def report_compilation() -> Iterator[None]:
 
 
 def _print_compilation_notice() -> None:
-    echo("compiling (once for each kind of controller)", to_stderr=True)
+    echo(
+        "compiling the numerical loops, once per version: half a minute or more (other controllers may need "
+        "further loops)",
+        to_stderr=True,
+    )

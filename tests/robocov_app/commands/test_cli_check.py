@@ -110,11 +110,11 @@ def test_changes_since_the_last_valid_map_are_marked(
     blocks = output.out.split(": valid")
     assert len(blocks) == 5
     assert "was" not in blocks[1] and "  area " in blocks[2]
-    assert "narrowest gap  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
-    assert "warning        the gap between" in blocks[3] and "cannot pass (new)" in blocks[3]
+    assert "narrowest passage  0.100 m, between" in blocks[3] and ", was 1.500 m, between" in blocks[3]
+    assert "warning            the gap between" in blocks[3] and "cannot pass (new)" in blocks[3]
     assert f"{map_file}: invalid\n{map_file}:6:52: obstacles[0].radius: expected a number" in blocks[3]
-    assert ", was 0.100 m, between" in blocks[4] and "no longer      the gap between" in blocks[4]
-    assert "free area      55.3" in blocks[4]
+    assert ", was 0.100 m, between" in blocks[4] and "no longer          the gap between" in blocks[4]
+    assert "free area          55.3" in blocks[4]
 
 
 def test_watching_prints_one_json_object_per_check(
@@ -161,7 +161,7 @@ def test_a_replaced_file_is_checked_until_ctrl_c(map_file: Path, terminal: bool)
     )
     os.close(writer)
     try:
-        first = read_until(reader, b"Ctrl+C ends" if terminal else b"narrowest gap")
+        first = read_until(reader, b"Ctrl+C ends" if terminal else b"narrowest passage")
         assert (b"\x1b[2J" in first) == terminal
         start = time.monotonic()
         replacement = map_file.with_suffix(".new")
@@ -186,7 +186,7 @@ def test_watching_takes_little_processor_time(map_file: Path) -> None:
         [*COMMAND, "check", "--watch", str(map_file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
         assert process.stdout is not None
-        read_until(process.stdout.fileno(), b"narrowest gap")
+        read_until(process.stdout.fileno(), b"narrowest passage")
         before = _read_processor_seconds(process.pid)
         time.sleep(2.0)
         used = _read_processor_seconds(process.pid) - before

@@ -29,7 +29,7 @@ def test_a_report_contains_every_measure(hall: Environment) -> None:
         "obstacles": "0 separate obstacles, walls are part of the boundary; 4 vertices (boundary included)",
         "components": "1 (100 m²)",
         "unreachable": "none, for robots of radius 0.1 m",
-        "narrowest gap": "none",
+        "narrowest passage": "none",
         "start corner": "disc, space for about 23 robots",
     }
 
@@ -42,7 +42,7 @@ def test_changed_values_are_printed_with_previous_values(hall: Environment) -> N
     wall = WallObstacle(((4.0, 0.0), (4.0, 9.9)), 0.5)
     after = read_report(replace(hall, obstacles=(wall,), starts={"all": DiscStart((1.0, 1.0), 0.5)}), hall)
     assert after["free area"] == "95.05 m² (95.1%), was 100 m² (100.0%)"
-    assert after["narrowest gap"].startswith("0.100 m, between [") and after["narrowest gap"].endswith(
+    assert after["narrowest passage"].startswith("0.100 m, between [") and after["narrowest passage"].endswith(
         ", was none"
     )
     assert after["start all"] == "disc, space for about 23 robots, was none"

@@ -31,7 +31,7 @@ _INVALID = 2
 
 @dataclass
 class Arguments(JsonOption):
-    """Validate maps, and print area, free area, components, unreachable area and narrowest gap of each.
+    """Validate maps, and print area, free area, components, unreachable area and narrowest passage of each.
 
     The exit status is 2 if one of them is not a valid map. Errors are reported with line and column, as in
     mine.json:14:9. Warnings, such as a gap narrower than a robot, do not make a map invalid.
@@ -248,7 +248,7 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         "obstacles": _format_obstacles(report),
         "components": f"{len(report.components)} ({', '.join(areas)})",
         "unreachable": _format_unreachable_area(report),
-        "narrowest gap": _format_narrowest_gap(report),
+        "narrowest passage": _format_narrowest_gap(report),
     }
     if report.density is not None and report.density_range is not None:
         low, high = report.density_range
@@ -282,7 +282,7 @@ def _format_area(area: float) -> str:
 
 
 def _format_narrowest_gap(report: MapReport) -> str:
-    """Return the width of the narrowest gap, and the points at its ends, as text."""
+    """Return the width of the narrowest passage, and the points at its ends, as text."""
     if report.narrowest_gap is None:
         return "none"
     (x1, y1), (x2, y2) = report.narrowest_gap.between

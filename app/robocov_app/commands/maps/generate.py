@@ -183,7 +183,7 @@ def _describe_map(report: MapReport) -> str:
     """Return the most important properties of a map as a line of text."""
     passages = "no passage"
     if report.narrowest_gap is not None:
-        passages = f"narrowest gap {report.narrowest_gap.width:.3f} m"
+        passages = f"narrowest passage {report.narrowest_gap.width:.3f} m"
     obstacles = format_count(report.obstacle_count, "obstacle")
     free_area = f"{report.free_area:.4g} of {report.area:.4g} m² free"
     return f"{free_area}, {passages}, {obstacles}, {report.vertex_count} vertices"

@@ -99,13 +99,13 @@ _METRICS = (
     ),
     _Metric(
         title="Clearance",
-        label="smallest gap to a wall (m)",
+        label="smallest distance to a wall (m)",
         unit="m",
         get_values=lambda metrics: _round_to_millimeters(metrics.wall_clearance),
     ),
     _Metric(
         title="Separation",
-        label="smallest gap between robots (m)",
+        label="smallest distance between robots (m)",
         unit="m",
         get_values=lambda metrics: _round_to_millimeters(metrics.robot_clearance),
     ),

@@ -96,7 +96,7 @@ def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
 
 
 def _format_clearance(runs: Sequence[ReportedRun]) -> str:
-    """Format the smallest gap to a wall in any of the runs."""
+    """Format the smallest distance to a wall in any of the runs."""
     gaps = list_figures(runs, "min_clearance_m")
     if not gaps:
         return NO_VALUE
