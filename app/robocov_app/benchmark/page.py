@@ -235,7 +235,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         cells = _build_overview_cells(by_label[label], tracks)
         rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
-    head = ("Controller", "Rank", "Score, %", "Runs", "Contacts", "Settled", *headings)
+    head = ("Controller", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
     return PageTable("Scores, and median gaps on each track, %", head, rows)
 
 

@@ -331,7 +331,7 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
         "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
         "Work, J": format_number(rating.compute_median("work_J"), ".0f"),
-        "Contacts": f"{contacts} of {len(rating.rows)}",
+        "Contacts": f"{contacts} of {len(rating.rows)} runs",
         "Settled": rest_text,
         "Settled, s": format_number(rest_time, ".0f"),
         "B/s": format_number(rating.compute_rate("sent_bytes"), ".0f"),

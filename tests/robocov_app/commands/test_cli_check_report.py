@@ -42,9 +42,8 @@ def test_changed_values_are_printed_with_previous_values(hall: Environment) -> N
     wall = WallObstacle(((4.0, 0.0), (4.0, 9.9)), 0.5)
     after = read_report(replace(hall, obstacles=(wall,), starts={"all": DiscStart((1.0, 1.0), 0.5)}), hall)
     assert after["free area"] == "95.05 m² (95.1%), was 100 m² (100.0%)"
-    assert after["narrowest passage"].startswith("0.100 m, between [") and after["narrowest passage"].endswith(
-        ", was none"
-    )
+    assert after["narrowest passage"].startswith("0.100 m, between [")
+    assert after["narrowest passage"].endswith(", was none")
     assert after["start all"] == "disc, space for about 23 robots, was none"
     assert after["start corner"] == "none, was disc, space for about 23 robots"
     assert after["warning"].endswith("cannot pass (new)")

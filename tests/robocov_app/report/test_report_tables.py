@@ -50,7 +50,7 @@ def test_several_runs_have_their_median_and_quartiles() -> None:
     assert get_column(table, "Runs") == ["5"]
     assert get_column(table, "Settled") == ["4 of 5"]
     assert get_column(table, "Settled at, s (settled runs)") == ["12.5 (11.8–13.2)"]
-    assert get_column(table, "Contacts") == ["2 of 5"]
+    assert get_column(table, "Contacts") == ["2 of 5 runs"]
     assert get_column(table, "Clearance, m") == ["−0.004"]
     assert get_column(table, "Path, m") == [NO_VALUE]
     assert get_column(table, "Stuck robots") == [NO_VALUE]

@@ -82,7 +82,7 @@ def _format_contacts(runs: Sequence[ReportedRun]) -> str:
         return NO_VALUE
     if len(runs) == 1:
         return f"{counts[0]:.0f}"
-    return f"{sum(count > 0 for count in counts)} of {len(counts)}"
+    return f"{sum(count > 0 for count in counts)} of {len(counts)} runs"
 
 
 def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:

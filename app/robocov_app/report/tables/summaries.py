@@ -32,9 +32,9 @@ _SCALED_HEADING = "Mean distance / median"
 _SCALED_NOTE = f"{_SCALED_HEADING}: divided by the median over all runs on the same map with the same team."
 _SEVERAL_RUNS_NOTE = (
     "Numbers with brackets are medians over runs, with the quartiles in brackets. Over the run: the mean "
-    "distance, averaged over time. Runs with contacts: runs in which a robot touched a wall or another robot. "
-    "Clearance: the smallest distance to a wall in any run. Stuck robots: the mean number of robots that have "
-    "stopped away from their goals; a dash if they have no goals."
+    "distance, averaged over time. Contacts: the runs in which a robot touched a wall or another robot. "
+    "Clearance: the smallest distance to a wall in any run. Stuck robots: the mean number of robots that "
+    "have stopped away from their goals; a dash if they have no goals."
 )
 _REFERENCE_NOTE = (
     f"Gap: J/J_ref − 1, where J is the final mean distance and J_ref that of the reference, the best of "
