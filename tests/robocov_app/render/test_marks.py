@@ -268,6 +268,14 @@ def test_unicycles_have_a_nose_in_their_heading(theme, heading):
     assert 9.0 < distance < 18.0
     assert nose @ direction > 0.97 * distance
 
+    def test_a_disc_that_is_too_small_for_its_number_has_it_next_to_the_ring(self):
+        positions = np.array([(3.0, 3.0), (3.1, 3.0), (1.0, 1.0)])
+        crowded_scene = replace(build_scene(positions), selected=1)
+        frame, painter = render_layers(crowded_scene, "selection", "robots")
+        assert len(find_numbers(frame, painter, 2)) == 1
+        frame, painter = render_layers(replace(crowded_scene, selected=2), "selection", "robots")
+        assert len(find_numbers(frame, painter, 3)) == 0
+
 
 class TestContacts:
     def test_a_star_is_drawn_next_to_a_robot_that_touches_a_wall(self):

@@ -95,7 +95,7 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
         # The first column of the steering is the heading, rad.
         headings = scene.now.steering[:, 0]
         _draw_noses(canvas, centers, radii, headings, np.flatnonzero(scene.team.is_unicycle))
-    ring_widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(_MAX_RING_WIDTH_FRACTION * radii))
+    ring_widths = _choose_ring_widths(canvas, radii)
     numbers = _choose_numbers(canvas, scene, radii - ring_widths)
     # Robots that look the same share a sprite, which saves time in a crowd.
     indices_by_look: dict[tuple[float, float, int, int], int] = {}
@@ -106,6 +106,12 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
         text = str(number) if number else ""
         discs.append(_build_disc(canvas, radius, ring_width, hue, text))
     canvas.draw_sprites(discs, centers, np.array(indices, dtype=int))
+
+
+def _choose_ring_widths(canvas: Canvas, radii: FloatArray) -> FloatArray:
+    """Return the widths of the rings of robots, px, which are narrow on small robots."""
+    widths = np.minimum(_RING_WIDTH_PX * canvas.scale, round_to_half(_MAX_RING_WIDTH_FRACTION * radii))
+    return np.asarray(widths)
 
 
 def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: FloatArray) -> IntArray:
@@ -197,7 +203,7 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
 def _choose_number_position(
     canvas: Canvas, text: str, *, center: FloatArray, radius: float, centers: FloatArray, radii: FloatArray
 ) -> list[float]:
-    """Choose the position of the number of a failed robot, next to its disc.
+    """Choose the position of the number of a robot, next to its disc.
 
     The first side with enough space is chosen, so that numbers do not jump when other robots pass by; if no
     side has enough, the one with the most space.
@@ -275,6 +281,7 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
     """Draw a ring around the selected robot and, if messages can get lost, its beliefs.
 
     These are the cell that it computes, and the positions at which it believes itself and its neighbors.
+    If its disc is too small for its number, the number is drawn next to it.
     """
     assert scene.selected is not None
     robot = scene.selected
@@ -282,9 +289,31 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
     if scene.now.seen.reported_positions is not None:
         _draw_believed_cell(canvas, scene, robot)
         _draw_believed_positions(canvas, scene, robot, positions)
-    radius = compute_drawn_radii(canvas, scene)[robot] + _SELECTION_GAP_PX * canvas.scale
-    ring = partial(sprites.render_ring, radius, canvas.theme.ink, _SELECTION_WIDTH_PX * canvas.scale)
+    radii = compute_drawn_radii(canvas, scene)
+    ring_radius = radii[robot] + _SELECTION_GAP_PX * canvas.scale
+    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, _SELECTION_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, positions[robot])
+    inner_radii = radii - _choose_ring_widths(canvas, radii)
+    has_number_inside = _choose_numbers(canvas, scene, inner_radii)[robot] > 0
+    if not has_number_inside:
+        _draw_selected_number(canvas, scene, radii)
+
+
+def _draw_selected_number(canvas: Canvas, scene: Scene, radii: FloatArray) -> None:
+    """Draw the number of the selected robot next to its disc; `radii`, (n,), are those of all robots, px."""
+    assert scene.selected is not None
+    text = str(scene.get_number(scene.selected))
+    centers = canvas.camera.to_pixels(scene.now.positions)
+    position = _choose_number_position(
+        canvas,
+        text,
+        center=centers[scene.selected],
+        radius=float(radii[scene.selected]),
+        centers=centers,
+        radii=radii,
+    )
+    size = canvas.theme.small_text
+    canvas.draw_text(text, position, size=size, bold=True, anchor="middle")
 
 
 def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
