@@ -25,7 +25,7 @@ from robocov_app.report.analysis.groups import (
     list_variants,
 )
 from robocov_app.report.analysis.selection import MAX_SHOWN_RUNS, select_runs
-from robocov_app.report.analysis.tuning import choose_compared_groups
+from robocov_app.report.analysis.tuning import choose_compared_groups, choose_tuned_styles
 from robocov_app.report.descriptions import list_lifetimes
 from robocov_app.report.embedding import MAX_BYTES, ReplayRun
 from robocov_app.report.pictures import draw_map, draw_run, has_path
@@ -147,6 +147,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
 def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key: str) -> dict[str, Any]:
     """Build the template variables about comparisons in pairs, and the findings, which quote them."""
     compared_groups, tuning_note = choose_compared_groups(result)
+    pair_styles = {**styles, **choose_tuned_styles(result, compared_groups, styles)}
     comparisons = compare_groups(compared_groups)
     has_pairs = any(comparison.pair_count > 1 for comparison in comparisons)
     return {
@@ -155,7 +156,8 @@ def _build_comparison_variables(result: ReportedResult, styles: GroupStyles, key
         "comparisons": comparisons,
         "tuning_note": tuning_note,
         "pairs": build_pairs_table(comparisons),
-        "pair_plots": build_pair_plots(comparisons, styles, f"{key}p"),
+        "pair_styles": pair_styles,
+        "pair_plots": build_pair_plots(comparisons, pair_styles, f"{key}p"),
         "map_pairs": build_map_pairs_tables(comparisons),
     }
 

@@ -9,7 +9,8 @@ from reported_results import build_result, build_run
 
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_mean
 from robocov_app.report.analysis.comparisons import GroupComparison, compare_groups
-from robocov_app.report.analysis.tuning import choose_compared_groups
+from robocov_app.report.analysis.groups import TUNED_SUFFIX, RunGroup, choose_group_styles
+from robocov_app.report.analysis.tuning import choose_compared_groups, choose_tuned_styles
 from robocov_app.report.document import load_template
 from robocov_app.report.results.result import ReportedRun
 
@@ -192,6 +193,22 @@ def test_the_note_lists_the_chosen_gains_and_failed_runs_count_as_the_worst() ->
     assert {dict(run.gains)["k"] for run in groups[0].runs} == {2.0}
     assert "on the other maps" in note
     assert "Chosen: RAPF k 2 in 3 of 3." in note
+
+
+def test_a_tuned_controller_has_the_style_of_its_gains_if_they_are_the_same_for_all_maps() -> None:
+    result = build_result(build_tuning_study())
+    styles = choose_group_styles(result)
+    groups = choose_compared_groups(result).groups
+    assert choose_tuned_styles(result, groups, styles) == {"RAPF (tuned)": styles["RAPF k 2"]}
+
+
+def test_a_tuned_controller_with_different_gains_has_a_style_of_its_own() -> None:
+    result = build_result(build_tuning_study())
+    styles = choose_group_styles(result)
+    runs = tuple(run for run in result.completed_runs if run.controller == "rapf")
+    group = RunGroup("RAPF" + TUNED_SUFFIX, "rapf", None, runs)
+    tuned_styles = choose_tuned_styles(result, [group], styles)
+    assert tuned_styles[group.label] not in styles.values()
 
 
 def test_gains_are_chosen_from_other_seeds_if_there_is_only_one_map() -> None:

@@ -10,7 +10,6 @@ from reported_results import build_result, build_run
 
 from robocov_app.report.analysis.groups import (
     MAX_VARIANTS,
-    TUNED_SUFFIX,
     choose_group_styles,
     find_varying_gains,
     format_gains,
@@ -74,7 +73,7 @@ def test_variants_differ_in_color_dashes_and_mark() -> None:
     assert len(group_styles) == 5
     for values in zip(*group_styles, strict=True):
         assert len(set(map(str, values))) == 5
-    assert styles["RAPF"] == styles["RAPF" + TUNED_SUFFIX] == group_styles[0]
+    assert styles["RAPF"] == group_styles[0]
     assert styles["mine"] not in group_styles
 
 

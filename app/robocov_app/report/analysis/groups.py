@@ -120,8 +120,8 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
     Returns
     -------
     dict of str to CurveStyle
-        Displayed groups have different styles. Other variants, and tuned controllers, have the style of their
-        controller.
+        Displayed groups have different styles. Other variants have the style of their controller. That of
+        tuned controllers is chosen by `robocov_app.report.analysis.tuning.choose_tuned_styles`.
     """
     groups = list_displayed_groups(result)
     displayed_controllers = [group.controller for group in groups]
@@ -133,7 +133,6 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
     styles = {}
     for run in result.runs:
         styles[run.label] = controller_styles[run.controller]
-        styles[run.label + TUNED_SUFFIX] = controller_styles[run.controller]
     for variant in list_variants(result):
         styles[variant.label] = controller_styles[variant.controller]
     # Groups come first in `controllers`, so the styles of failed controllers are left over.

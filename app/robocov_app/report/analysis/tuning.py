@@ -1,14 +1,21 @@
 """Choice of the groups to compare. Controllers with several sets of gains are tuned fairly."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov_app.figures.statistics import group_by
-from robocov_app.report.analysis.groups import TUNED_SUFFIX, RunGroup, list_variants
+from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
+from robocov_app.report.analysis.groups import (
+    TUNED_SUFFIX,
+    RunGroup,
+    label_runs,
+    list_displayed_groups,
+    list_variants,
+)
 from robocov_app.report.analysis.scaling import Scales, compute_medians, scale_distance
 from robocov_app.report.results.result import Gains, ReportedResult, ReportedRun
 
@@ -97,6 +104,40 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
         groups.append(group)
         choices.append(choice)
     return ComparedGroups(groups, _describe_tuning(choices, has_several_maps=has_several_maps))
+
+
+def choose_tuned_styles(
+    result: ReportedResult, groups: Sequence[RunGroup], styles: Mapping[str, CurveStyle]
+) -> dict[str, CurveStyle]:
+    """Choose the styles of tuned controllers.
+
+    Parameters
+    ----------
+    result : ReportedResult
+    groups : sequence of RunGroup
+        Compared groups.
+    styles : mapping of str to CurveStyle
+        Style of each variant.
+
+    Returns
+    -------
+    dict of str to CurveStyle
+        By label. If the same gains were chosen for all runs, the style is that of these gains; otherwise no
+        displayed group has the style.
+    """
+    variant_labels = label_runs(result)
+    tuned_groups = [group for group in groups if group.label.endswith(TUNED_SUFFIX)]
+    displayed_controllers = [group.controller for group in list_displayed_groups(result)]
+    tuned_controllers = [group.controller for group in tuned_groups]
+    all_styles = choose_curve_styles([*displayed_controllers, *tuned_controllers])
+    own_styles = all_styles[len(displayed_controllers) :]
+    tuned_styles = {}
+    for group, own_style in zip(tuned_groups, own_styles, strict=True):
+        chosen_labels = {variant_labels[run] for run in group.runs}
+        tuned_styles[group.label] = own_style
+        if len(chosen_labels) == 1:
+            tuned_styles[group.label] = styles[chosen_labels.pop()]
+    return tuned_styles
 
 
 def _get_map(run: ReportedRun) -> _Fold:
