@@ -42,7 +42,7 @@ COMMANDS = {
     ),
     "metrics": Subcommand("metrics", "measure saved runs: visible area, energy, path length, clearance"),
     "paper": Subcommand(
-        "paper", "reproduce the paper's figures, and test its claims on many maps", uses_kernels=True
+        "paper", "draw counterparts of the paper's figures, and test its claims", uses_kernels=True
     ),
     "edit": Subcommand("edit", "draw, check and try maps in the editor"),
     "check": Subcommand("maps.check", "validate maps: free area, components, unreachable area, passages"),

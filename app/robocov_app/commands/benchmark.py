@@ -22,14 +22,20 @@ _OPTIONS_BY_ACTION = {
     "references": ("out", "workers"),
 }
 """The options of each action, in addition to --json."""
-_LEGEND = """\
-Gap: J / J_ref - 1, where J is the final cost and J_ref that of the best known placement (median, its 95%
-interval for at least 12 maps, worst); in brackets the median gap to bound, J / J_bound - 1, where J_bound is
-a proven lower bound. Within 5%: time from which the cost stays within
-5% of its final value. Path: mean path length of a robot. Contacts: runs in which a robot touched something.
-Settled: runs in which the team came to rest. B/s, µs/s: bytes sent and computing time per robot.
-robocov benchmark page explains all columns."""
-"""Explanation of the columns of the table of ratings."""
+_EXPLANATIONS = {
+    "Score, %": "Score: mean of J_ref / J over the runs; J is the final cost, J_ref that of the best known "
+    "placement.\n  Halved for a run with a contact, and halved again if the team has not settled.",
+    "Gap, %": "Gap: median of J / J_ref - 1; in brackets that of J / J_bound - 1 for a proven lower bound.",
+    "95%": "95%: confidence interval of the median gap, for at least 12 maps.",
+    "Worst": "Worst: largest gap of a run.",
+    "Within 5%, s": "Within 5%: time from which the cost stays within 5% of its final value, median.",
+    "Path, m": "Path: mean path length of a robot, median.",
+    "Contacts": "Contacts: runs in which a robot touched a wall or another robot.",
+    "Settled": "Settled: runs at whose end the team has settled.",
+    "B/s": "B/s: bytes that a robot sends per second, median.",
+    "µs/s": "µs/s: computing time of the controller per robot and second of simulation time, median.",
+}
+"""Explanations of the columns of the table of ratings."""
 
 
 @dataclass
@@ -78,7 +84,7 @@ class Arguments(JsonOption):
     sample: int = 10
     """Number of runs that verify repeats."""
     robots: int = 2
-    """Number of robots to isolate in each repeated run."""
+    """Number of robots that verify checks in each repeated run."""
     new_maps: int = 5
     """Number of new maps on which verify runs the controller, at most one of each family."""
     seed: int | None = None
@@ -161,21 +167,24 @@ def _run(options: Arguments) -> int:
     runs = len(result["rows"])
     failed = sum("error" in row for row in result["rows"])
     if not options.json:
-        _print_ratings(result)
+        _print_ratings(result, out)
     line = f"{format_count(runs, 'run')}, {failed} failed; written to {out / RESULT_FILE}"
     print_answer(options, {"out": str(out), "runs": runs, "failed": failed}, line)
     return FAILED if failed else 0
 
 
-def _print_ratings(result: dict[str, Any]) -> None:
-    """Print the table of the ratings on each track."""
+def _print_ratings(result: dict[str, Any], folder: Path) -> None:
+    """Print the table of the ratings on each track, and explain its columns."""
     from robocov_app.benchmark.ratings import build_summary_rows
 
     (first_title, *titles), rows = build_summary_rows(result)
     columns = [(first_title, BOLD)]
     columns += [(title, RIGHT) for title in titles]
     print_table(columns, rows)
-    echo(_LEGEND)
+    for title, explanation in _EXPLANATIONS.items():
+        if title in titles:
+            echo(explanation)
+    echo(f"`robocov benchmark page {folder}` compares this result with the built-in ones.")
 
 
 def _print_suite(options: Arguments) -> int:

@@ -27,7 +27,7 @@ FAILED = 1
 
 @dataclass
 class Arguments(JsonOption):
-    """Reproduce the paper's figures 1 to 8 and test its claims on many maps, starts and seeds.
+    """Draw counterparts of the paper's figures 1 to 8, and test its claims on many maps, starts and seeds.
 
     The folder contains index.html, a page with each figure next to the paper's claim about it and a plain
     verdict on each claim; beyond.html, with all registered controllers side by side and the questions that
