@@ -362,7 +362,7 @@ def build_names_page() -> str:
     text = build_heading("Python: every public name", "=")
     text += "\nAll are names of ``robocov``: ``import robocov as rc``. "
     text += ":doc:`/names-in-use` shows them by topic; :ref:`the index <genindex>` also lists methods and "
-    text += "attributes.\n"
+    text += "attributes. Classes for learning are on :doc:`learning`, keys of results on :doc:`metrics`.\n"
     names = sorted(rc.__all__, key=str.lower)
     text += build_letter_index(names)
     text += "\n.. py:currentmodule:: robocov\n"

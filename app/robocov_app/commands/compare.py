@@ -29,6 +29,8 @@ class Arguments(RunOptions):
 
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf", "rpf", "lloyd")
     """Names of controllers, or mine.py:MyController."""
+    out: Path | None = None
+    """Folder for the results (default: MAP-comparison)."""
 
 
 def command(options: Arguments) -> int:

@@ -24,14 +24,15 @@ _REQUIRED_MODULES = ("sphinx", "furo", "myst_parser")
 class Arguments:
     """Open the handbook in a browser: tutorials, guides, and a reference of all commands and names.
 
-    Installed packages contain it. A checkout builds it at first use, and again after changes of the program
-    (pip install "robocov[docs]"), and keeps it in the user's cache. Its search works offline.
+    A released wheel contains it. An installation from a checkout builds it at first use, and again after
+    changes of the program, which needs pip install "robocov[docs]", and keeps it in the user's cache. Its
+    search works offline.
 
     Example: robocov handbook --out site
     """
 
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """New folder for the handbook as static pages for any host, instead of opening it."""
+    """Write the handbook to this new folder as a static site, instead of opening it."""
 
 
 def command(options: Arguments) -> None:

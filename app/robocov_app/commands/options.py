@@ -329,7 +329,7 @@ class RunOptions(ScenarioOptions, JsonOption):
     turning_rate: float = DEFAULT_TURNING_RATE_RAD_S
     """Maximum turning rate of a unicycle, rad/s."""
     out: Path | None = None
-    """Folder for the results (default: MAP-CONTROLLER; for compare: MAP-comparison)."""
+    """Folder for the results (default: MAP-CONTROLLER)."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
     no_figures: bool = False

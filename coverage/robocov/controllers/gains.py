@@ -172,7 +172,7 @@ def gain(
     Returns
     -------
     field
-        Default value of the field of a dataclass.
+        A dataclass field with this default.
 
     See Also
     --------
@@ -223,7 +223,7 @@ def choice(default: str, choices: Sequence[str], meaning: str) -> Any:
     Returns
     -------
     field
-        Default value of the field of a dataclass.
+        A dataclass field with this default.
 
     Raises
     ------

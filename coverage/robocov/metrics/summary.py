@@ -30,8 +30,9 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     Returns
     -------
     dict
-        Results by name; the names end in the units. If there are remarks on the run, ``notes`` is a list of
-        them. ``sent_bytes_per_s`` is included only if robots send messages.
+        Results by name; the names end in the units. The handbook's page on metrics explains them. If there
+        are remarks on the run, ``notes`` is a list of them. ``sent_bytes_per_s`` is included only if robots
+        send messages.
 
     See Also
     --------
