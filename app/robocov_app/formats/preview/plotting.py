@@ -34,6 +34,8 @@ from robocov_app.look.theme import LIGHT, Theme, get_theme
 
 _MARK_OPACITY = 0.55
 _EDGE_WIDTH_PT = 0.8
+_BOUNDARY_WIDTH_PT = 1.6
+"""As wide as the boundary of the map as imported, which `draw_map` draws."""
 _AREA_ORDER = 2
 """Drawing order of areas: above the ground."""
 _MARK_ORDER = 5
@@ -186,11 +188,11 @@ def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport,
     outside = shapely.difference(comparison.region, comparison.before)
     _draw_area(axes, outside, theme.obstacle, theme.obstacle_edge)
     # Free space also has an edge where it ends at the edge of the arena.
-    rings = shapely.get_rings(shapely.get_parts(comparison.before))
+    outlines = shapely.get_exterior_ring(shapely.get_parts(comparison.before))
     edges = LineCollection(
-        [shapely.get_coordinates(ring) for ring in rings],
-        colors=to_plot_color(theme.obstacle_edge),
-        linewidths=_EDGE_WIDTH_PT,
+        [shapely.get_coordinates(outline) for outline in outlines],
+        colors=to_plot_color(theme.boundary),
+        linewidths=_BOUNDARY_WIDTH_PT,
         clip_on=False,
         zorder=_AREA_ORDER,
     )
