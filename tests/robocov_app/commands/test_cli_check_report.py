@@ -30,7 +30,7 @@ def test_a_report_contains_every_measure(hall: Environment) -> None:
         "components": "1 (100 m²)",
         "unreachable": "none, for robots of radius 0.1 m",
         "narrowest passage": "none",
-        "start corner": "disc, space for about 23 robots",
+        'start "corner"': "disc, space for about 23 robots",
     }
 
 
@@ -44,8 +44,8 @@ def test_changed_values_are_printed_with_previous_values(hall: Environment) -> N
     assert after["free area"] == "95.05 m² (95.1%), was 100 m² (100.0%)"
     assert after["narrowest passage"].startswith("0.100 m, between [")
     assert after["narrowest passage"].endswith(", was none")
-    assert after["start all"] == "disc, space for about 23 robots, was none"
-    assert after["start corner"] == "none, was disc, space for about 23 robots"
+    assert after['start "all"'] == "disc, space for about 23 robots, was none"
+    assert after['start "corner"'] == "none, was disc, space for about 23 robots"
     assert after["warning"].endswith("cannot pass (new)")
     assert after["name"] == "hall"
 

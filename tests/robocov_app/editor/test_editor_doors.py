@@ -22,7 +22,7 @@ def test_the_pieces_keep_name_note_and_group(sketch):
     assert second.shape.points == ((1.4, 0.0), (4.0, 0.0), (4.0, 3.0))
     for item in (first, second):
         assert (item.shape.name, item.shape.width, item.note, item.group) == ("west", 0.2, "oak", "outer")
-    assert change.description == "door of 0.8 m opened in wall “west”"
+    assert change.description == "0.8 m door added to the wall “west”"
     assert change.selection.items == {3, second.key}
 
 

@@ -101,8 +101,8 @@ def test_the_area_without_robots_is_cut_off() -> None:
     left = np.array([[1.0, 1.0]])
     right = np.array([[9.0, 1.0]])
     both = np.vstack([left, right])
-    assert describe_passage_changes(before, after, RADIUS, left) == "35.7 m² cut off"
-    assert describe_passage_changes(before, after, RADIUS, right) == "23.7 m² cut off"
+    assert describe_passage_changes(before, after, RADIUS, left) == "about 36 m² cut off"
+    assert describe_passage_changes(before, after, RADIUS, right) == "about 24 m² cut off"
     assert describe_passage_changes(before, after, RADIUS, both) == "the team is split into 2 groups"
 
 
@@ -111,7 +111,7 @@ def test_the_area_without_robots_is_cut_off() -> None:
     [
         (5.93, "a gap of 7 cm, too narrow for a robot", True),
         (5.7, "", False),
-        (6.0, "23.7 m² cut off", True),
+        (6.0, "about 24 m² cut off", True),
     ],
 )
 def test_a_gap_that_is_too_narrow_is_described(end: float, description: str, is_cut_off: bool) -> None:

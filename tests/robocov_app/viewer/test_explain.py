@@ -71,7 +71,7 @@ def test_each_force_is_described_with_its_cause():
         names=[4, 7, 9],
     )
     assert report.title == "Robot 4"
-    assert report.verdict == "moving 0.20 m/s east to its goal"
+    assert report.verdict == "moving east to its goal at 0.20 m/s"
     assert list_texts(report) == [
         "at (2.00, 4.00) m, 0.20 m/s east",
         "pulled with 0.31 N toward its goal, 3.0 m away",
@@ -175,7 +175,7 @@ def test_a_robot_pressed_against_an_obstacle_is_held_by_it():
     away = build_report([[3.9, 5]], points=[[4, 5]], environment=ROOMS, wind=[[-1.0, 0.0]])
     assert away.verdict == "setting off west"
     sliding = build_report([[3.9, 5]], points=[[4, 5]], velocities=[[0, -0.5]], **east)
-    assert sliding.verdict == "sliding 0.50 m/s south along the obstacle"
+    assert sliding.verdict == "sliding south at 0.50 m/s along the obstacle"
 
 
 def test_touching_robots():
@@ -213,9 +213,9 @@ def test_arrival_near_a_goal_inside_an_obstacle():
 @pytest.mark.parametrize(
     ("velocity", "force", "verdict"),
     [
-        ((0.58, 0.58), (0, 0), "moving 0.82 m/s northeast to its goal"),
-        ((-0.5, 0), (-1, 0), "moving 0.50 m/s west, its goal is 2.8 m away"),
-        ((0.5, 0.5), (-3, -3), "braking from 0.71 m/s northeast, its goal is 2.8 m away"),
+        ((0.58, 0.58), (0, 0), "moving northeast to its goal at 0.82 m/s"),
+        ((-0.5, 0), (-1, 0), "moving west at 0.50 m/s; its goal is 2.8 m away"),
+        ((0.5, 0.5), (-3, -3), "braking from 0.71 m/s northeast; its goal is 2.8 m away"),
         ((0.02, 0), (1, 1), "setting off northeast to its goal"),
         ((0.02, 0), (-1, 0), "setting off west"),
     ],
@@ -230,22 +230,29 @@ def build_wave(size, turns, drift=0.0, k=31):
     return np.column_stack([4 + size * np.sin(2 * np.pi * turns * phase) + drift * phase, np.full(k, 4.0)])
 
 
+def build_turn():
+    """Return the path of a robot that has moved back and forth, and travels now."""
+    jitter = build_wave(0.08, 6)
+    return np.vstack([jitter, jitter[-1] + [[0.02 * step, 0.0] for step in range(1, 15)]])
+
+
 @pytest.mark.parametrize(
     ("recent", "speed", "verdict"),
     [
         (build_wave(0.0, 0), 0.0, "at rest, no force acts on it"),
         (build_wave(0.001, 8), 0.04, "at rest, no force acts on it"),
-        (build_wave(0.01, 8), 0.2, "trembling in place"),
-        (build_wave(0.01, 8), 0.0, "trembling in place"),  # at a turning point
+        (build_wave(0.01, 8), 0.2, "at rest (trembling by less than 5 cm)"),
+        (build_wave(0.01, 8), 0.0, "at rest (trembling by less than 5 cm)"),  # at a turning point
         (build_wave(0.1, 4), 0.5, "trembling in place"),
-        (build_wave(0.0, 0), 0.2, "trembling in place"),  # too fast for the samples
-        (build_wave(0.0, 0, drift=2.0), 0.5, "moving 0.50 m/s east"),
-        (build_wave(0.0, 0, drift=0.08), 0.02, "moving 0.02 m/s east"),
-        (build_wave(0.0, 0, drift=0.03), 0.3, "moving 0.30 m/s east"),  # has just set off
+        (build_wave(0.0, 0), 0.2, "at rest (trembling by less than 5 cm)"),  # too fast for the samples
+        (build_turn(), 0.34, "moving east at 0.34 m/s"),
+        (build_wave(0.0, 0, drift=2.0), 0.5, "moving east at 0.50 m/s"),
+        (build_wave(0.0, 0, drift=0.08), 0.02, "moving east at 0.02 m/s"),
+        (build_wave(0.0, 0, drift=0.03), 0.3, "moving east at 0.30 m/s"),  # has just set off
         (build_wave(0.0, 0, drift=2.0), 0.001, "at rest, no force acts on it"),
-        (build_wave(0.0, 0, drift=2.0)[:1], 0.5, "moving 0.50 m/s east"),
-        (build_wave(0.0, 0, drift=2.0)[:0], 0.5, "moving 0.50 m/s east"),
-        (np.full((5, 2), np.nan), 0.5, "moving 0.50 m/s east"),
+        (build_wave(0.0, 0, drift=2.0)[:1], 0.5, "moving east at 0.50 m/s"),
+        (build_wave(0.0, 0, drift=2.0)[:0], 0.5, "moving east at 0.50 m/s"),
+        (np.full((5, 2), np.nan), 0.5, "moving east at 0.50 m/s"),
     ],
 )
 def test_motion_is_described_by_recent_positions(recent, speed, verdict):
@@ -254,7 +261,7 @@ def test_motion_is_described_by_recent_positions(recent, speed, verdict):
 
 
 def test_a_trembling_robot_may_be_stuck():
-    report = build_report([[3, 5]], goals=[[6, 5]], environment=ROOMS, recent=build_wave(0.02, 8))
+    report = build_report([[3, 5]], goals=[[6, 5]], environment=ROOMS, recent=build_wave(0.03, 8))
     assert report.verdict == "trembling in place, stuck: its goal is 3.0 m away, behind an obstacle"
 
 
@@ -335,7 +342,7 @@ def test_a_force_that_is_not_finite_is_reported():
 def test_braking_before_the_goal_is_not_described_as_a_pull():
     report = build_report([[4, 4]], goals=[[4.2, 4]], velocities=[[0.8, 0]], attraction=[[-3.0, 0.0]])
     assert get_line(report, "attraction").text == "braked with 3.0 N on the way to its goal, 20 cm away"
-    assert report.verdict == "braking from 0.80 m/s east, its goal is 20 cm away"
+    assert report.verdict == "braking from 0.80 m/s east; its goal is 20 cm away"
     aside = build_report([[4, 4]], goals=[[6, 4]], attraction=[[1.0, 1.0]])
     assert (
         get_line(aside, "attraction").text == "pulled northeast with 1.4 N on the way to its goal, 2.0 m away"

@@ -63,7 +63,7 @@ def test_a_single_robot_that_senses_nothing():
     team = Team.homogeneous(1, sensing_range=0.5)
     simulation = Simulation(square, Rapf(), [[2.0, 3.0]], team)
     assert explain_run(simulation, 0.0)[0].verdict == "setting off northeast to its centroid"
-    assert explain_run(simulation, 2.0)[0].verdict == "moving 0.98 m/s northeast to its centroid"
+    assert explain_run(simulation, 2.0)[0].verdict == "moving northeast to its centroid at 0.98 m/s"
     (report,) = explain_run(simulation, 60.0)
     assert report.verdict == "arrived: at rest on its centroid"
     assert {"no robot in communication range", "senses nothing within 50 cm", "not repelled by robots"} < {

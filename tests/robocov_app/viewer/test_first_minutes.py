@@ -236,7 +236,7 @@ def test_drafts_are_offered_and_the_session_waits_for_the_answer(
         launcher.session.playback.is_playing = True
         with launcher.window() as window:
             assert isinstance(window.dialogs.current, Question)
-            assert window.dialogs.current.text.startswith("Unsaved session from ")
+            assert window.dialogs.current.text.startswith("Unsaved session")
             window.run_frame(0.5)
             assert window.viewer.session.displayed.time == 0.0
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))

@@ -28,14 +28,14 @@ def viewer() -> Presenter:
 def test_the_status_line_contains_time_cost_and_speed(viewer: Presenter) -> None:
     facts = list_facts(viewer, 60.0, 60.0, None)
     assert facts[0] == "t = 0.00 s"
-    assert facts[1].startswith("J = ")
+    assert facts[1].startswith("cost ")
     assert facts[1].endswith(" m³")
     assert facts[-3:] == ["1×", "60 steps/s", "60 fps"]
 
 
 def test_the_cost_in_the_status_line_names_its_controller_if_there_are_several(viewer: Presenter) -> None:
     viewer.session.add_pane(ControllerChoice("lloyd"))
-    assert list_facts(viewer, 60.0, 60.0, None)[1].startswith("RAPF: J = ")
+    assert list_facts(viewer, 60.0, 60.0, None)[1].startswith("RAPF: cost ")
 
 
 def test_an_old_cost_is_shown_with_its_time(viewer: Presenter) -> None:

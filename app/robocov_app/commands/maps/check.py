@@ -254,7 +254,9 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         low, high = report.density_range
         rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
     for start in report.starts:
-        rows[f"start {start.name}"] = f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"
+        rows[f'start "{start.name}"'] = (
+            f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"
+        )
     return rows
 
 

@@ -245,7 +245,7 @@ def _open_wall_between(sketch: Sketch, key: int, start: float, end: float) -> Ch
             pieces.append(replace(wall, points=points))
     name = sketch.display_name(key)
     require(pieces, f"nothing would be left of the {name}")
-    return replace_obstacles(sketch, {key: pieces}, f"door of {end - start:.3g} m opened in {name}")
+    return replace_obstacles(sketch, {key: pieces}, f"{end - start:.3g} m door added to the {name}")
 
 
 def _build_wall_line(sketch: Sketch, key: int) -> shapely.LineString:

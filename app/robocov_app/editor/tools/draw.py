@@ -378,7 +378,7 @@ class CircleTool(DrawTool):
     name = "circle"
     title = "Circle"
     key = "c"
-    hint = "drag from the center to the rim, or click both; type the radius for meters"
+    hint = "drag from the center to the rim, click both, or type the radius in meters"
     max_points = 2
     allows_drag = True
 
@@ -403,7 +403,7 @@ class DiscTool(CircleTool):
     name = "disc"
     title = "Start disc"
     key = "s"
-    hint = "drag from the center to the rim: the robots start somewhere in it; type the radius for meters"
+    hint = "drag from the center to the rim: the robots start somewhere in it; or type the radius in meters"
 
     def build_change(self, context: EditorContext, points: Sequence[Point]) -> Change:
         """Return the change that adds the start."""

@@ -17,16 +17,14 @@ from robocov_app.viewer.session.pane import Pane
 
 GHOST_REACH_PX = 6.0
 """Maximum distance, at scale 1, of a click from the curve of another branch that it opens."""
-MIN_DASHED_POINTS = 12
-"""Curves of other branches with at least this many points are dashed."""
 MIN_THINNED_POINTS = 400
 """Curves with at least this many points are thinned."""
 _MAX_POINTS_PER_PX = 1.5
 _CURVE_WIDTH_PX = 1.8
 _DASH_STRETCH = 1.4  # dashes are longer than in figures, because the curves are short
 _GHOST_STRENGTH = 0.45
-_SEGMENTS_PER_DASH = 4
-"""Number of curve segments per dash; the last of them is the gap."""
+_GHOST_WIDTH_PX = 1.5
+_GHOST_DOTS_PX = (2.0, 3.0)  # lengths of a dot and of a gap
 
 
 class GhostLine(NamedTuple):
@@ -60,7 +58,7 @@ def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
 
 
 def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[GhostLine]:
-    """Draw the curves of other branches, pale and dashed.
+    """Draw the curves of other branches, pale and dotted.
 
     Returns
     -------
@@ -77,11 +75,9 @@ def draw_ghosts(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> list[Gh
 
 
 def _draw_ghost_line(canvas: Canvas, points: FloatArray, color: Color) -> None:
-    is_dashed = len(points) >= MIN_DASHED_POINTS
-    for index in range(len(points) - 1):
-        is_gap = is_dashed and index % _SEGMENTS_PER_DASH == _SEGMENTS_PER_DASH - 1
-        if not is_gap:
-            canvas.draw_line(points[index].tolist(), points[index + 1].tolist(), color)
+    width = canvas.scale_width(_GHOST_WIDTH_PX)
+    dots = [length * canvas.scale for length in _GHOST_DOTS_PX]
+    canvas.draw_segments(cut_into_dashes(points, dots), color, width)
 
 
 def find_nearest_ghost(ghosts: Sequence[GhostLine], point: FloatArray, reach: float) -> int | None:

@@ -15,6 +15,7 @@ _MIN_STEADY_SPEED_M_S = 0.1 * MAX_REST_SPEED_M_S  # enough for a robot that has 
 _MIN_SWAY_M = 0.02  # a robot that moves back and forth by less appears to stand still
 _TREMBLING_RATIO = 3.0  # a robot trembles if its path length is more than this many times its extent
 _STRAIGHT_RATIO = 1.5  # a path is straight if it is less than this many times the distance covered
+_MAX_TREMBLING_EXTENT_M = 0.3  # a robot that gets around more than this is moving
 _MIN_FORWARD_ALIGNMENT = 0.7  # cosine between the distance covered and the velocity of a robot that sets off
 _MIN_RUN_UP_FRACTION = 0.5  # of the distance in which a robot at maximum acceleration reaches its speed
 
@@ -24,6 +25,7 @@ class Motion(Enum):
 
     MOVING = "moving"
     TREMBLING = "trembling"
+    TREMBLING_AT_REST = "trembling at rest"
     AT_REST = "at rest"
     STARTING = "starting"
 
@@ -46,7 +48,7 @@ def classify_motion(situation: RobotSituation, recent: FloatArray | None) -> Mot
         return _classify_rest(situation, path_length)
     extent = float(np.hypot(*np.ptp(path, axis=0)))
     if path_length > _TREMBLING_RATIO * max(_MIN_SWAY_M, extent):
-        return Motion.TREMBLING
+        return _classify_trembling(extent)
     # A robot that has covered some distance is moving steadily, or has just stopped.
     covered = complex(*(path[-1] - path[0]))
     if abs(covered) >= SETTLED_DISTANCE_M:
@@ -56,6 +58,15 @@ def classify_motion(situation: RobotSituation, recent: FloatArray | None) -> Mot
     if situation.speed <= MAX_REST_SPEED_M_S:
         return _classify_rest(situation, path_length)
     if _has_set_off(situation, covered, path_length):
+        return Motion.MOVING
+    return _classify_trembling(extent)
+
+
+def _classify_trembling(extent: float) -> Motion:
+    """Classify a robot that moves back and forth by the extent of its path, m."""
+    if extent < SETTLED_DISTANCE_M:
+        return Motion.TREMBLING_AT_REST
+    if extent > _MAX_TREMBLING_EXTENT_M:
         return Motion.MOVING
     return Motion.TREMBLING
 

@@ -35,16 +35,24 @@ def _describe_trembling(situation: RobotSituation) -> str:
     return text
 
 
+def _describe_trembling_at_rest(situation: RobotSituation) -> str:
+    text = f"at rest (trembling by less than {format_length(SETTLED_DISTANCE_M)})"
+    if situation.is_stuck:
+        return f"{text}, stuck: {_describe_goal(situation)}"
+    return text
+
+
 def _describe_moving(situation: RobotSituation) -> str:
-    pace = f"{format_number(situation.speed)} m/s {format_direction(situation.velocity)}"
+    pace = f"{format_number(situation.speed)} m/s"
+    direction = format_direction(situation.velocity)
     alignment = compute_alignment(situation.velocity, situation.resultant)
     if situation.holding_names and abs(alignment) < _SLIDING_ALIGNMENT:
-        return f"sliding {pace} along {situation.holding_names}"
+        return f"sliding {direction} at {pace} along {situation.holding_names}"
     if not situation.is_balanced and alignment < _BRAKING_ALIGNMENT:
-        return _append_goal(f"braking from {pace}", situation)
+        return _append_goal(f"braking from {pace} {direction}", situation)
     if _is_ahead(situation.goal, situation.velocity):
-        return f"moving {pace} to {_name(situation.goal)}"
-    return _append_goal(f"moving {pace}", situation)
+        return f"moving {direction} to {_name(situation.goal)} at {pace}"
+    return _append_goal(f"moving {direction} at {pace}", situation)
 
 
 def _describe_starting(situation: RobotSituation) -> str:
@@ -98,6 +106,7 @@ def _explain_rest(situation: RobotSituation) -> str:
 
 _DESCRIPTIONS = {
     Motion.TREMBLING: _describe_trembling,
+    Motion.TREMBLING_AT_REST: _describe_trembling_at_rest,
     Motion.MOVING: _describe_moving,
     Motion.STARTING: _describe_starting,
     Motion.AT_REST: _describe_rest,
@@ -125,4 +134,4 @@ def _describe_goal(situation: RobotSituation) -> str:
 def _append_goal(text: str, situation: RobotSituation) -> str:
     if situation.goal is None:
         return text
-    return f"{text}, {_describe_goal(situation)}"
+    return f"{text}; {_describe_goal(situation)}"

@@ -7,7 +7,6 @@ from typing import ClassVar, NamedTuple
 
 import pygame
 
-from robocov.errors import format_count
 from robocov_app.look.colors import Color, mix
 from robocov_app.look.theme import Theme
 from robocov_app.render import sprites
@@ -308,8 +307,7 @@ class LessonPage:
         self._write_title(_CLOSING_TITLE)
         right_count, answer_count = lesson.score
         if answer_count:
-            predictions = format_count(answer_count, "prediction")
-            text = f"You got {right_count} of {predictions} right."
+            text = f"Right predictions: {right_count} of {answer_count}."
             self._write_paragraph(text, self.theme.accent)
             self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:

@@ -44,11 +44,11 @@ class ShareActions:
         run, note = self._describe_run()
         if can_be_command(run):
             self.clipboard.put(build_command(run))
-            return f"Copied as command{note}. Paste it in a terminal."
+            return f"Command copied{note}. Paste it into a terminal."
         path = self._viewer.files.save_copy()
         user_controllers = list_user_controllers(self._viewer.session.timeline.document)
         self.clipboard.put(build_session_command(path, user_controllers))
-        return f"Copied as command. It runs {path}, because options cannot describe this session."
+        return f"Command copied. It runs {path}, because options cannot describe this session."
 
     def copy_python(self) -> str:
         """Copy the Python script that simulates the run; return a message."""
@@ -56,8 +56,8 @@ class ShareActions:
         self.clipboard.put(build_python(run))
         if run.later_edits:
             edits = format_count(len(run.later_edits), "later edit")
-            return f"Copied as Python{note}, without {edits}. A copy of the session has them."
-        return f"Copied as Python{note}. Paste it in a script or a notebook."
+            return f"Python script copied{note}, without {edits}. A copy of the session has them."
+        return f"Python script copied{note}. Paste it into a file or a notebook."
 
     def save_copy(self) -> str:
         """Save a copy of the session, which a browser downloads; return a message."""

@@ -1,8 +1,9 @@
 """Menus of the viewer's window: those of the selection, of what can be shared, and of the presets."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.viewer.layer_presets import LAYER_PRESETS
@@ -67,8 +68,16 @@ class WindowMenus:
 
     def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
         """Open a menu of commands; an empty name separates two groups."""
-        rows = [self._commands[name] if name else None for name in names]
+        rows = [self._get_command(name) if name else None for name in names]
         self._dialogs.ask(Menu(rows, pixel, self._run_command))
+
+    def _get_command(self, name: str) -> Command:
+        """Return a command; that of the video says what it does now."""
+        command = self._commands[name]
+        if name != "video":
+            return command
+        title = "Stop recording" if self._viewer.view.is_recording else "Record a video"
+        return replace(command, title=title)
 
 
 def list_context_commands(viewer: Presenter) -> tuple[str, ...]:

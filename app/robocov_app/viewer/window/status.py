@@ -71,7 +71,7 @@ def describe_cut_off(viewer: ViewerModel, pane: Pane) -> str:
 
 def _list_cost_facts(known_cost: KnownCost, time: float) -> list[str]:
     age = f" (at {known_cost.time:.1f} s)" if abs(known_cost.time - time) > _MAX_COST_LAG_S else ""
-    facts = [f"J = {known_cost.result.value:.2f} m³{age}"]
+    facts = [f"cost {known_cost.result.value:.2f} m³{age}"]
     if known_cost.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
         facts.append(f"cut off {known_cost.result.uncovered_area:.1f} m²")
     return facts

@@ -50,6 +50,8 @@ class StatusDisplay:
         hint = self._hint if has_hint else ""
         if has_hint and self._lesson.is_waiting:
             hint = _LESSON_HINT
+        elif self._lesson.shown is not None:
+            hint = ""  # the page of the lesson names its keys; Space has another meaning there
         elif not self._viewer.session.playback.is_playing:
             hint = hint.replace("Space: pause", "Space: play")
         draw_status(screen, layout.status, theme, layout.scale, facts=facts, hint=hint)

@@ -11,6 +11,7 @@ from robocov.typing import FloatArray
 _WIDTH_TOLERANCE = 1e-6
 """Relative amount by which a gap may be narrower than a robot and still count as wide enough."""
 _QUARTER_SEGMENTS = 4
+_MIN_WHOLE_AREA_M2 = 10.0  # larger areas are rounded to whole numbers
 
 
 def describe_passage_changes(
@@ -50,9 +51,15 @@ def describe_passage_changes(
         lost_area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost_centers, radius)))
         # Smaller areas, such as corners, are not worth a message.
         if lost_area > radius * radius:
-            descriptions.append(f"{lost_area:.1f} m² cut off")
+            descriptions.append(f"about {_format_area(lost_area)} cut off")
     descriptions += _describe_narrow_gap(before, after, radius)
     return "; ".join(descriptions)
+
+
+def _format_area(area: float) -> str:
+    """Round an area, m²; exact areas follow later, when the cost is computed."""
+    digits = 0 if area >= _MIN_WHOLE_AREA_M2 else 1
+    return f"{area:.{digits}f} m²"
 
 
 def _split_components(before: Environment, after: Environment, radius: float) -> list[np.ndarray]:

@@ -155,7 +155,18 @@ def describe_draft(draft: autosave.Draft) -> str:
     nodes = session["touches"] if "touches" in session else session["edits"]  # the former in old drafts
     count = len(nodes) - 1
     unit = "edit" if count == 1 else "edits"
-    return f"Unsaved {name} from {draft.when:%H:%M}, with {count} {unit}"
+    map_name = _get_map_name(session)
+    if draft.path is None and map_name:
+        name = f"{name} of {map_name}"
+    return f"Unsaved {name}, {draft.when:%H:%M}, {count} {unit}"
+
+
+def _get_map_name(session: Mapping[str, Any]) -> str:
+    """Return the name of the first map of a saved session; empty if it has none."""
+    maps = session.get("maps")
+    if not isinstance(maps, list) or not maps or not isinstance(maps[0], dict):
+        return ""
+    return str(maps[0].get("bundled") or maps[0].get("name") or "").capitalize()
 
 
 def recover_draft(
