@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
-from robocov_app.viewer.lessons.session_before import SessionBefore
+from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.maps import find_bundled_name
 from robocov_app.viewer.session.files.models import (
@@ -201,9 +201,9 @@ class LessonPlayer:
         self._fit_view = fit_view
         self._waited_s = 0.0  # real time since the current state was entered
         self._workspace = SessionWorkspace(self.session, viewer.files.draft_folder)
-        self._before = SessionBefore(viewer)
+        self._suspended = SuspendedSession(viewer)
         self.go_to(0)
-        if self._before.has_work:
+        if self._suspended.has_work:
             viewer.show_message("Your session is set aside. It returns when the lesson ends.")
 
     @property
@@ -403,9 +403,9 @@ class LessonPlayer:
         """End the lesson, and restore the session from before it."""
         viewer = self._viewer
         keeps_draft = self._close_workspace()
-        self._before.restore()
+        self._suspended.restore()
         message = "the lesson has ended; F2 plays it again"
-        if self._before.has_work:
+        if self._suspended.has_work:
             message = "the lesson has ended; your session from before is back"
         if keeps_draft:
             message += f". {_DRAFT_HINT}"
@@ -431,13 +431,28 @@ class LessonPlayer:
         """Show the start of a chapter, by its index: session, layers and selected robot; ask its question."""
         self.number = number
         self.answer = None
-        chapter = self.chapter
-        viewer = self._viewer
-        session = self.session
         keeps_draft = False
         if self.state is LessonState.LEFT:
-            keeps_draft = self._close_workspace()
-            self._workspace = SessionWorkspace(session, viewer.files.draft_folder)
+            keeps_draft = self._renew_workspace()
+        self._show_start(self.chapter)
+        if keeps_draft:
+            self._viewer.show_message(_DRAFT_HINT)
+        self._fit_view()
+        if self.chapter.question is None:
+            self._enter_state(LessonState.PLAYING)
+        else:
+            self._enter_state(LessonState.ASKING)
+
+    def _renew_workspace(self) -> bool:
+        """Close the workspace with the user's changes, open another; return whether a draft keeps them."""
+        keeps_draft = self._close_workspace()
+        self._workspace = SessionWorkspace(self.session, self._viewer.files.draft_folder)
+        return keeps_draft
+
+    def _show_start(self, chapter: ChapterModel) -> None:
+        """Show the start of a chapter in the window, with its layers, speed and selected robot."""
+        session = self.session
+        viewer = self._viewer
         _go_to_start(session, chapter)
         session.playback.is_playing = chapter.question is None
         session.playback.stop_when_settled = False
@@ -451,13 +466,6 @@ class LessonPlayer:
         viewer.inspection.selected = chapter.robot
         viewer.view.layers = set(BASE_LAYERS | check_layer_names("show", chapter.show))
         viewer.clear_message()
-        if keeps_draft:
-            viewer.show_message(_DRAFT_HINT)
-        self._fit_view()
-        if chapter.question is None:
-            self._enter_state(LessonState.PLAYING)
-        else:
-            self._enter_state(LessonState.ASKING)
 
 
 def _compute_reading_time(texts: Iterable[str]) -> float:

@@ -3,7 +3,7 @@
 from robocov_app.viewer.presenter import Presenter
 
 
-class SessionBefore:
+class SuspendedSession:
     """The session from before a lesson, and the state of the viewer at that time.
 
     Parameters
