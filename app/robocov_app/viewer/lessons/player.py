@@ -433,8 +433,10 @@ class LessonPlayer:
         self.answer = None
         keeps_draft = False
         if self.state is LessonState.LEFT:
-            keeps_draft = self._renew_workspace()
-        self._show_start(self.chapter)
+            keeps_draft = self._close_workspace()
+            self._workspace = SessionWorkspace(self.session, self._viewer.files.draft_folder)
+        self._viewer.files.workspace = self._workspace
+        _show_start(self._viewer, self.session, self.chapter)
         if keeps_draft:
             self._viewer.show_message(_DRAFT_HINT)
         self._fit_view()
@@ -443,29 +445,21 @@ class LessonPlayer:
         else:
             self._enter_state(LessonState.ASKING)
 
-    def _renew_workspace(self) -> bool:
-        """Close the workspace with the user's changes, open another; return whether a draft keeps them."""
-        keeps_draft = self._close_workspace()
-        self._workspace = SessionWorkspace(self.session, self._viewer.files.draft_folder)
-        return keeps_draft
 
-    def _show_start(self, chapter: ChapterModel) -> None:
-        """Show the start of a chapter in the window, with its layers, speed and selected robot."""
-        session = self.session
-        viewer = self._viewer
-        _go_to_start(session, chapter)
-        session.playback.is_playing = chapter.question is None
-        session.playback.stop_when_settled = False
-        session.playback.clock.speed = chapter.speed
-        viewer.files.workspace = self._workspace
-        viewer.show_session(session)
-        environment = session.displayed.environment
-        viewer.files.map_name = find_bundled_name(environment) or environment.name
-        viewer.toolbox.current = viewer.toolbox.hand
-        viewer.inspection.active_pane = 0
-        viewer.inspection.selected = chapter.robot
-        viewer.view.layers = set(BASE_LAYERS | check_layer_names("show", chapter.show))
-        viewer.clear_message()
+def _show_start(viewer: Presenter, session: Session, chapter: ChapterModel) -> None:
+    """Show the start of a chapter of a session in the window, with its layers, speed and selected robot."""
+    _go_to_start(session, chapter)
+    session.playback.is_playing = chapter.question is None
+    session.playback.stop_when_settled = False
+    session.playback.clock.speed = chapter.speed
+    viewer.show_session(session)
+    environment = session.displayed.environment
+    viewer.files.map_name = find_bundled_name(environment) or environment.name
+    viewer.toolbox.current = viewer.toolbox.hand
+    viewer.inspection.active_pane = 0
+    viewer.inspection.selected = chapter.robot
+    viewer.view.layers = set(BASE_LAYERS | check_layer_names("show", chapter.show))
+    viewer.clear_message()
 
 
 def _compute_reading_time(texts: Iterable[str]) -> float:
