@@ -40,7 +40,7 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
 WITHOUT_DEADLINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 # Examples are the same every time, so that a new failure is caused by the change under test. A sixth of them
 # is run, unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones.
-settings.register_profile("thorough", max_examples=60, derandomize=True, database=None, **WITHOUT_DEADLINE)
+settings.register_profile("thorough", max_examples=45, derandomize=True, database=None, **WITHOUT_DEADLINE)
 settings.register_profile("explore", max_examples=500, print_blob=True, **WITHOUT_DEADLINE)
 settings.load_profile("thorough")
 
