@@ -51,7 +51,7 @@ _LAST_TICK_SPACE = 14
 
 @dataclass(frozen=True)
 class CoverageContents:
-    """What a page about the coverage cost contains.
+    """Content of a page about the coverage cost.
 
     Attributes
     ----------
