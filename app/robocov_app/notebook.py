@@ -172,7 +172,7 @@ def plot_history(
     controller: str = "",
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
+    title: str = "Mean distance over time",
 ) -> Axes:
     """Plot the mean distance against time.
 

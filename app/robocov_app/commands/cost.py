@@ -87,7 +87,7 @@ def command(options: Arguments) -> None:
             refine_cost_for_figures(environment, cost),
             positions,
             text,
-            title="Coverage cost",
+            title="Coverage",
             theme=options.theme,
             speeds=speeds,
             radius=options.radius or DEFAULT_RADIUS_M,

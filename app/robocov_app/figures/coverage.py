@@ -156,7 +156,7 @@ def plot_coverage(
     *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
-    title: str = "Coverage cost",
+    title: str = "Coverage",
     times: Sequence[TimeCurve] = (),
 ) -> Figure:
     """Plot cost curves, and maps of the distance to the nearest robot with a common color scale.

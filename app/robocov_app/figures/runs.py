@@ -412,7 +412,7 @@ def plot_cost(
     *,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
+    title: str = "Mean distance over time",
 ) -> Figure:
     """Plot mean distances against time, each curve labeled at its end with its name and final value.
 

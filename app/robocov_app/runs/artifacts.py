@@ -305,7 +305,7 @@ def _plot_cost(runs: Sequence[Run], cost: CoverageCost, settings: OutputSettings
         build_final_snapshots(runs, cost),
         theme=settings.video.color_theme,
         size=settings.video.size,
-        title=f"Coverage cost  ·  {record.environment.name}  ·  {robots}",
+        title=f"Coverage  ·  {record.environment.name}  ·  {robots}",
         times=_build_curves(runs, "mean_time"),
     )
 
