@@ -6,14 +6,11 @@ are not in this space, so that they neither hide obstacles nor are mistaken for 
 
 from __future__ import annotations
 
-import functools
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pymunk
 
-from robocov.compiled import IS_COMPILER_ENABLED, is_interpreting
 from robocov.observation import compute_ray_directions
 from robocov.typing import BoolArray, FloatArray
 from robocov.world.bodies import build_obstacle_space
@@ -118,15 +115,11 @@ class RangeSensor:
             Nearest point of each robot; nan if no obstacle is in range. Read-only.
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
-        queries = _get_compiled_queries()
-        if queries is not None:
-            points: FloatArray = queries.find_nearest_points(self._space, positions, limits)
-        else:
-            points = np.full((len(positions), 2), np.nan)
-            for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
-                nearest = self._space.point_query_nearest(tuple(position), limit, _EVERYTHING)
-                if nearest is not None:
-                    points[row] = nearest.point
+        points = np.full((len(positions), 2), np.nan)
+        for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
+            nearest = self._space.point_query_nearest(tuple(position), limit, _EVERYTHING)
+            if nearest is not None:
+                points[row] = nearest.point
         points.setflags(write=False)
         return points
 
@@ -151,11 +144,7 @@ class RangeSensor:
         """
         limits = np.minimum(ranges, _MAX_RANGE_M)
         ends = positions[:, None, :] + limits[:, None, None] * compute_ray_directions(rays)
-        queries = _get_compiled_queries()
-        if queries is not None:
-            fractions, is_hit = queries.cast_rays(self._space, np.ascontiguousarray(positions), ends)
-        else:
-            fractions, is_hit = self._cast_rays(positions, ends)
+        fractions, is_hit = self._cast_rays(positions, ends)
         distances = limits[:, None] * fractions
         distances.setflags(write=False)
         is_hit.setflags(write=False)
@@ -186,7 +175,21 @@ class RangeSensor:
         return distances[0], position + distances[0][:, None] * compute_ray_directions(rays)
 
     def _cast_rays(self, positions: FloatArray, ends: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Cast rays by the public query of pymunk; see `compiled_queries.cast_rays`."""
+        """Return the fraction of each ray up to the first shape, and whether there is one.
+
+        Parameters
+        ----------
+        positions : (n, 2) array, m
+            Start of the rays of each robot.
+        ends : (n, rays, 2) array, m
+            End of each ray.
+
+        Returns
+        -------
+        fractions : (n, rays) array
+            1 for a ray that meets no shape.
+        is_hit : (n, rays) bool array
+        """
         fractions = np.ones(ends.shape[:2])
         is_hit = np.zeros(ends.shape[:2], dtype=bool)
         for row, (position, robot_ends) in enumerate(zip(positions.tolist(), ends.tolist(), strict=True)):
@@ -196,22 +199,3 @@ class RangeSensor:
                     fractions[row, ray] = hit.alpha
                     is_hit[row, ray] = True
         return fractions, is_hit
-
-
-def _get_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries`, or None if the public queries of pymunk must be used."""
-    return None if is_interpreting() else _load_compiled_queries()
-
-
-@functools.cache
-def _load_compiled_queries() -> ModuleType | None:
-    """Return `robocov.compiled_queries`, or None if it does not work on this machine."""
-    if not IS_COMPILER_ENABLED:
-        return None
-    try:
-        from robocov import compiled_queries
-
-        return compiled_queries if compiled_queries.is_usable() else None
-    except Exception:
-        # The public queries work even if there is an error in the compiled queries.
-        return None

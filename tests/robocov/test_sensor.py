@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import platform
-import sys
-
 import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from robocov.compiled import IS_COMPILER_ENABLED
 from robocov.environment import Environment
-from robocov.sensor import RangeSensor, _load_compiled_queries
+from robocov.sensor import RangeSensor
 from robocov.world.obstacle_pieces import build_solid_pieces
 
 
@@ -43,40 +39,6 @@ def test_nothing_is_sensed_beyond_the_range(cluttered: Environment, sensor: Rang
     ranges = np.where(np.arange(len(points)) % 2, 0.5, 1.5)
     nearest = sensor.find_nearest_points(points, ranges)
     np.testing.assert_array_equal(np.isnan(nearest[:, 0]), distance > ranges)
-
-
-def test_compiled_queries_agree_with_public_ones(
-    cluttered: Environment, sensor: RangeSensor, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    positions = sample_free_points(cluttered, 100, 2)
-    for sensing_range in (0.3, 1.0, np.inf):
-        ranges = np.full(len(positions), sensing_range)
-        monkeypatch.undo()
-        nearest = sensor.find_nearest_points(positions, ranges)
-        distances, is_hit = sensor.scan(positions, 24, ranges)
-        monkeypatch.setattr("robocov.sensor._get_compiled_queries", lambda: None)
-        assert np.array_equal(sensor.find_nearest_points(positions, ranges), nearest, equal_nan=True)
-        public_distances, public_is_hit = sensor.scan(positions, 24, ranges)
-        assert np.array_equal(public_distances, distances)
-        assert np.array_equal(public_is_hit, is_hit)
-
-
-def test_compiled_queries_are_used_where_they_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    load = _load_compiled_queries.__wrapped__
-    monkeypatch.delenv("ROBOCOV_PUBLIC_QUERIES", raising=False)
-    if sys.platform == "linux" and platform.machine() == "x86_64" and IS_COMPILER_ENABLED:
-        assert load() is not None
-    monkeypatch.setenv("ROBOCOV_PUBLIC_QUERIES", "1")
-    assert load() is None
-
-
-@pytest.mark.skipif(not IS_COMPILER_ENABLED, reason="the queries are compiled")
-def test_wrong_results_of_compiled_queries_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another version of pymunk might have C functions with other arguments."""
-    from robocov import compiled_queries
-
-    monkeypatch.setattr(compiled_queries, "find_nearest_points", lambda *args: np.array([[7.0, 7.0]]))
-    assert not compiled_queries.is_usable()
 
 
 def test_a_query_does_not_depend_on_the_others(cluttered: Environment, sensor: RangeSensor) -> None:
