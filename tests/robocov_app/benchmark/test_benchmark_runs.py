@@ -78,6 +78,17 @@ def verify(out: Path, sample: int, controller: str | None = None) -> tuple[int, 
     return verification.runs, verification.differences
 
 
+def load_results_of(*controllers: str) -> list[dict[str, Any]]:
+    """Return the bundled results of some controllers."""
+    return [result for result in load_bundled_results() if result["entry"]["controller"] in controllers]
+
+
+@pytest.fixture
+def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the plots of the page, which take most of the time to build it."""
+    monkeypatch.setattr("robocov_app.benchmark.page._build_plots", lambda *args: [])
+
+
 def change_result(out: Path, change: Any) -> None:
     result = json.loads((out / RESULT_FILE).read_text())
     change(result)
@@ -235,10 +246,9 @@ def test_the_page_rejects_gaps_that_do_not_follow_from_costs(
     assert "rows[0]: gap: expected" in message
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_entries_made_with_an_earlier_version_are_marked() -> None:
-    results = load_bundled_results()
-    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
-    adaptive = next(result for result in results if result["entry"]["controller"] == "adaptive")
+    adaptive, rapf = load_results_of("adaptive", "rapf")
     earlier = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 4)"}}
     current = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 5)"}}
     note = "Adaptive: made with an earlier version"
@@ -246,9 +256,10 @@ def test_entries_made_with_an_earlier_version_are_marked() -> None:
     assert "made with an earlier version" not in build_page([rapf, current], "Test")
 
 
-def test_an_incomplete_entry_is_listed_separately(tmp_path: Path) -> None:
-    results = load_bundled_results()
-    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
+@pytest.mark.usefixtures("without_plots")
+def test_an_incomplete_entry_is_listed_separately() -> None:
+    results = load_results_of("atlas", "rapf")
+    _, rapf = results
     few_result = {**rapf, "rows": rapf["rows"][:3], "entry": {**rapf["entry"], "label": "Few"}}
     ratings_alone = ratings.build_ratings(results)
     ratings_with_few = ratings.build_ratings([*results, few_result])
@@ -267,19 +278,19 @@ def test_an_incomplete_entry_is_listed_separately(tmp_path: Path) -> None:
     assert rapf_row[1:] == few_row[1:]
 
 
+@pytest.mark.usefixtures("without_plots")
 @pytest.mark.parametrize("track", ["tuning", "plans-small"])
 def test_runs_on_other_tracks_do_not_change_the_overview(track: str) -> None:
-    results = load_bundled_results()
-    rapf = next(result for result in results if result["entry"]["controller"] == "rapf")
-    row = {**rapf["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
-    extended = {**rapf, "rows": [*rapf["rows"], row]}
-    extended_results = [extended if result is rapf else result for result in results]
-    assert build_tables(extended_results).overview == build_tables(results).overview
+    results = load_results_of("atlas", "exploring-lloyd")
+    atlas, explorer = results
+    row = {**explorer["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
+    extended = {**explorer, "rows": [*explorer["rows"], row]}
+    assert build_tables([atlas, extended]).overview == build_tables(results).overview
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_large_plans_have_a_ranking_of_their_own() -> None:
-    results = load_bundled_results()
-    page = build_page(results, "Test")
+    page = build_page(load_results_of("rapf", "lloyd"), "Test")
     overview = page.partition('id="overview-plans"')[2].partition("</section>")[0]
     assert "Overview of large plans" in overview
     first_row = re.findall(r"<tr>(.*?)</tr>", overview.partition("<tbody>")[2])[0]
@@ -520,7 +531,7 @@ def build_bundled_rapf() -> dict[str, Any]:
     return build_result("RAPF", 0.3, is_bundled=True, controller="rapf", source_sha256=None)
 
 
-@pytest.mark.usefixtures("short_ideal_track")
+@pytest.mark.usefixtures("short_ideal_track", "without_plots")
 def test_other_entries_do_not_replace_a_bundled_one() -> None:
     by_label = build_result("RAPF", 0.1)
     by_name = build_result("RAPF", 0.2, controller="rapf", source_sha256=None)
