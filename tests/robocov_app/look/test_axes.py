@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from robocov_app.look.axes import (
     MAX_LOW_FRACTION,
+    MIN_TIME_LIMIT_S,
     Axis,
     choose_growing_time_limit,
     choose_growing_value_axis,
@@ -65,6 +66,7 @@ def test_axis_without_values_is_from_zero_to_one(value: float) -> None:
 def test_growing_time_axis_ends_after_the_present_but_not_much(end: float) -> None:
     limit = choose_growing_time_limit(end)
     assert end < limit <= max(10.0, 2.0 * end)
+    assert limit >= MIN_TIME_LIMIT_S
 
 
 @given(st.floats(1e-6, 1e6), st.floats(1.0, 20.0))

@@ -89,6 +89,36 @@ def test_curves_of_a_comparison_start_at_time_0_while_it_plays(
             assert pane.distance_curve.times[-1] > STEPS_BEFORE_WALL / 60.0
 
 
+def test_a_curve_of_a_fast_run_begins_at_time_0_with_the_first_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_viewer(tmp_path, lattice=LATTICE) as driver:
+        (pane,) = driver.session.timeline.panes
+        pane.distance_curve.__init__()
+        driver.viewer.costs.forget()
+        run_fast(driver, 20.0)
+        answer_one_pane_per_frame(driver.viewer.costs, monkeypatch)
+        driver.run_frames(1, seconds=0.0)
+        assert pane.distance_curve.times.tolist() == [0.0]
+
+
+def run_fast(driver: Driver, duration: float) -> None:
+    """Run at once for a duration, s, as a fast run does between two answers about its cost."""
+    for _ in range(round(duration / driver.session.timeline.history.dt)):
+        driver.session.playback.step()
+
+
+def test_a_curve_of_a_fast_run_has_no_gaps(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, lattice=LATTICE) as driver:
+        (pane,) = driver.session.timeline.panes
+        run_fast(driver, 6.0)
+        driver.run_frames(60, seconds=0.0)
+        curve = pane.distance_curve
+        assert curve.times[0] == 0.0
+        assert curve.times[-1] == pytest.approx(6.0)
+        assert np.diff(curve.times).max() < 0.5
+
+
 def test_an_empty_chart_says_what_it_waits_for(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
     texts: list[str] = []
     monkeypatch.setattr(

@@ -66,11 +66,18 @@ def test_values_are_interpolated_linearly():
     assert math.isnan(curve.interpolate(0.5))
 
 
-def test_every_second_sample_of_the_older_half_is_removed():
-    curve = build_curve(*((float(k), float(-k)) for k in range(MAX_CURVE_SAMPLES + 1)))
-    assert len(curve) == MAX_CURVE_SAMPLES - MAX_CURVE_SAMPLES // 4 + 1
-    assert curve.times[:3].tolist() == [0.0, 2.0, 4.0]
-    assert (np.diff(curve.times[MAX_CURVE_SAMPLES // 4 :]) == 1.0).all()
+def test_samples_of_a_long_run_are_spread_evenly_over_its_time():
+    curve = build_curve(*((float(k), float(-k)) for k in range(10 * MAX_CURVE_SAMPLES)))
+    assert MAX_CURVE_SAMPLES // 3 < len(curve) <= MAX_CURVE_SAMPLES
+    assert curve.times[0] == 0.0
+    assert curve.last_time == 10 * MAX_CURVE_SAMPLES - 1
+    assert np.diff(curve.times).max() < 0.005 * curve.last_time
+
+
+def test_gaps_are_listed_from_the_longest_to_the_shortest():
+    curve = build_curve((0.0, 3.0), (1.0, 2.0), (1.2, 2.0), (4.0, 1.0))
+    assert curve.list_gaps(0.5) == [(1.2, 4.0), (0.0, 1.0)]
+    assert build_curve().list_gaps(0.5) == []
 
 
 @given(st.lists(st.floats(-1.0, 3.0), max_size=200), st.integers(4, 40))

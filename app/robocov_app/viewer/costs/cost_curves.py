@@ -12,7 +12,10 @@ from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.states import PaneSetup
 
-MAX_INITIAL_GAP_S = 0.3  # between the samples of a curve that are added at its start
+MAX_GAP_S = 0.3
+"""Longer intervals without samples are filled in short curves."""
+MAX_GAP_FRACTION = 1 / 150
+"""Intervals that are longer than this fraction of the curve are filled in long curves."""
 TIME_TOLERANCE_S = 1e-9
 
 
@@ -61,8 +64,10 @@ class CostCurves:
         self.answer_count = 0
         self._viewer = viewer
         self._past_version = -1  # of the timeline at the last request
-        # Numbers of panes whose next request is for the displayed step instead of the first seconds.
+        # Numbers of panes whose next request is for the displayed step instead of an earlier one.
         self._panes_due_for_displayed_step: set[int] = set()
+        # Numbers of panes, and times at which their cost is not finite and thus never in a curve.
+        self._without_cost: set[tuple[int, float]] = set()
         self._earlier_costs: Costs | None = None
         self._earlier_map: Environment | None = None
 
@@ -71,12 +76,13 @@ class CostCurves:
         session = self._viewer.session
         if session.timeline.past_version != self._past_version:
             self._past_version = session.timeline.past_version
+            self._without_cost.clear()
             self._viewer.costs.forget()
             if self._earlier_costs is not None:
                 self._earlier_costs.forget()
         for pane in session.timeline.panes:
             self._request_pane_cost(pane)
-        self._request_first_seconds()
+        self._request_missing_costs()
         self._add_answers()
 
     def _request_pane_cost(self, pane: Pane) -> None:
@@ -111,11 +117,11 @@ class CostCurves:
             return None
         return np.array(cursor)
 
-    def _request_first_seconds(self) -> None:
-        """Request costs of the first seconds, which had passed before costs could be computed on the map.
+    def _request_missing_costs(self) -> None:
+        """Request costs of earlier steps that the curves lack.
 
-        They are requested backwards in time from the first known cost. If the map was edited meanwhile,
-        costs on the earlier map are computed by another process.
+        These steps were simulated before costs could be computed on the map, or faster than costs are
+        computed. If the map was edited meanwhile, costs on the earlier map are computed by another process.
         """
         session = self._viewer.session
         if not session.timeline.is_live or self._viewer.costs.state:
@@ -133,19 +139,34 @@ class CostCurves:
             self.close()
 
     def _find_missing_state(self, pane: Pane) -> _MissingState | None:
-        """Return the state of a pane shortly before the start of its curve; None if it starts at time 0."""
-        first_time = min(pane.distance_curve.times, default=0.0)
-        if first_time <= TIME_TOLERANCE_S:
-            return None
+        """Return the next state whose cost the curve of a pane lacks; None if the curve is complete.
+
+        The first one is the start, so that every curve begins at time 0. The others halve the longest gaps.
+        """
+        curve = pane.distance_curve
+        if curve.first_time > TIME_TOLERANCE_S:
+            state = self._get_state(pane.number, 0.0)
+            is_requested = state is not None and state.time == self._viewer.session.displayed.time
+            return None if is_requested else state
+        min_length = max(MAX_GAP_S, MAX_GAP_FRACTION * curve.last_time)
+        for start, end in curve.list_gaps(min_length):
+            state = self._get_state(pane.number, 0.5 * (start + end))
+            # If the history was thinned, it may contain no state within the gap.
+            if state is not None and state.time > start + TIME_TOLERANCE_S:
+                return state
+        return None
+
+    def _get_state(self, pane_number: int, time: float) -> _MissingState | None:
+        """Return the recorded state of a pane at or before a time, s; None without a finite cost."""
         history = self._viewer.session.timeline.history
-        index = history.find_index(max(first_time - MAX_INITIAL_GAP_S, 0.0))
+        index = history.find_index(time)
         states = history[index].states
-        state = states.get(pane.number)
-        time = history.get_time(index)
-        if state is None or time >= first_time - TIME_TOLERANCE_S:
+        state = states.get(pane_number)
+        state_time = history.get_time(index)
+        if state is None or (pane_number, state_time) in self._without_cost:
             return None
         radius = min(other.setup.team.min_radius for other in states.values())
-        return _MissingState(pane.number, time, state.positions, state.setup, radius)
+        return _MissingState(pane_number, state_time, state.positions, state.setup, radius)
 
     def _request_on_displayed_map(self, state: _MissingState) -> None:
         """Request the cost of an earlier state on the displayed map.
@@ -192,8 +213,12 @@ class CostCurves:
         panes = {pane.number: pane for pane in self._viewer.session.timeline.panes}
         for number, known_cost in answers:
             pane = panes.get(number)
-            if pane is not None and known_cost.time <= pane.time + TIME_TOLERANCE_S:
+            if pane is None or known_cost.time > pane.time + TIME_TOLERANCE_S:
+                continue
+            if np.isfinite(known_cost.result.mean_distance):
                 _add_to_curves(pane, known_cost)
+            else:
+                self._without_cost.add((number, known_cost.time))
 
 
 def _request_for_curve(costs: Costs, state: _MissingState) -> None:

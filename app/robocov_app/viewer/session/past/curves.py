@@ -9,7 +9,7 @@ import numpy as np
 from robocov.typing import FloatArray
 
 MAX_CURVE_SAMPLES = 3000
-"""When a curve has this many samples, every second one of its older half is removed."""
+"""When a curve has this many samples, about half of them are removed."""
 _SAME_TIME_S = 1e-9
 _TIME_TOLERANCE_S = 1e-6
 _FILE_TIME_DECIMALS = 3
@@ -53,6 +53,13 @@ class Curve:
     def values(self) -> FloatArray:
         """Values of the samples, (k,)."""
         return np.array(self._values)
+
+    @property
+    def first_time(self) -> float:
+        """Time of the oldest sample, s; inf if there is none."""
+        if self._times:
+            return self._times[0]
+        return np.inf
 
     @property
     def last_time(self) -> float:
@@ -119,11 +126,33 @@ class Curve:
             return float("nan")
         return float(np.interp(time, self._times, self._values))
 
+    def list_gaps(self, min_length: float) -> list[tuple[float, float]]:
+        """Return the intervals between samples that are longer than a length, s, the longest first.
+
+        Parameters
+        ----------
+        min_length : float, s
+
+        Returns
+        -------
+        list of (float, float), s
+            Times of the samples at both ends of each interval.
+        """
+        times = self.times
+        lengths = np.diff(times)
+        longest_first = np.argsort(-lengths, kind="stable")
+        count = int((lengths > min_length).sum())
+        return [(float(times[index]), float(times[index + 1])) for index in longest_first[:count]]
+
     def _thin(self) -> None:
-        """Remove every second sample of the older half."""
-        half = MAX_CURVE_SAMPLES // 2
-        self._times[:half] = self._times[:half:2]
-        self._values[:half] = self._values[:half:2]
+        """Keep about half of the samples, evenly spread over time, with the first and the newest one."""
+        times = self.times
+        interval = (times[-1] - times[0]) / (MAX_CURVE_SAMPLES // 2)
+        intervals = np.floor((times - times[0]) / interval)
+        is_kept = np.append(True, intervals[1:] != intervals[:-1])
+        is_kept[-1] = True
+        self._times = times[is_kept].tolist()
+        self._values = self.values[is_kept].tolist()
 
 
 @dataclass(frozen=True, eq=False)
