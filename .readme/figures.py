@@ -10,7 +10,7 @@ from PIL import Image
 from robocov_app.benchmark import suite
 from robocov_app.cli import main
 from robocov_app.figures.files import save_figure
-from robocov_app.figures.runs import plot_maps
+from robocov_app.figures.map_sheets import plot_maps
 
 PICTURES = Path(__file__).parents[1] / "app/handbook/pictures"
 COMMANDS = {

@@ -106,10 +106,10 @@ def plot_environment(
     ParameterError
         If the axes or the theme cannot be used.
     """
-    from robocov_app.figures import runs
+    from robocov_app.figures.map_pages import plot_environment as plot_map
 
     _check_axes(axes)
-    return _get_axes(runs.plot_environment(environment, axes, theme=theme, size=size), axes)
+    return _get_axes(plot_map(environment, axes, theme=theme, size=size), axes)
 
 
 def plot_record(
@@ -117,7 +117,7 @@ def plot_record(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colors: ColorScheme = "paper",
+    colors: ColorScheme = "robots",
     size: tuple[int, int] | None = None,
     mean_distance: float | None = None,
     mean_time: float | None = None,
@@ -132,8 +132,8 @@ def plot_record(
         Axes to draw on; by default those of a new page.
     theme : {"light", "dark"}
         Color theme.
-    colors : {"paper", "robots"}
-        Colors of the paper, or a hue for each robot.
+    colors : {"robots", "paper"}
+        A hue for each robot, or the colors of the paper.
     size : (width, height) or None, px
         Size of the page.
     mean_distance, mean_time : float or None, m, s
@@ -149,10 +149,10 @@ def plot_record(
     ParameterError
         If the axes or an option cannot be used.
     """
-    from robocov_app.figures import runs
+    from robocov_app.figures.map_pages import plot_trajectories
 
     _check_axes(axes)
-    figure = runs.plot_trajectories(
+    figure = plot_trajectories(
         record,
         axes,
         theme=theme,
@@ -203,12 +203,12 @@ def plot_history(
     ParameterError
         If the axes or the theme cannot be used, or the history has no finite value.
     """
-    from robocov_app.figures import runs
+    from robocov_app.figures.cost_curves import plot_cost
     from robocov_app.figures.curves import TimeCurve
 
     _check_axes(axes)
     curve = TimeCurve(label, controller, history.time, history.mean_distance)
-    return _get_axes(runs.plot_cost([curve], axes, theme=theme, size=size, title=title), axes)
+    return _get_axes(plot_cost([curve], axes, theme=theme, size=size, title=title), axes)
 
 
 def plot_result(
@@ -275,7 +275,7 @@ def plot_comparison(
     axes: Axes | None = None,
     *,
     theme: Theme | str = LIGHT,
-    colors: ColorScheme = "paper",
+    colors: ColorScheme = "robots",
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot the runs of a comparison side by side.
@@ -288,8 +288,8 @@ def plot_comparison(
         A comparison is always drawn on a new page.
     theme : {"light", "dark"}
         Color theme.
-    colors : {"paper", "robots"}
-        Colors of the paper, or a hue for each robot.
+    colors : {"robots", "paper"}
+        A hue for each robot, or the colors of the paper.
     size : (width, height) or None, px
         Size of the page.
 
@@ -303,13 +303,13 @@ def plot_comparison(
     ParameterError
         If axes are given.
     """
-    from robocov_app.figures import runs
+    from robocov_app.figures import comparisons
 
     if axes is not None:
         raise ParameterError("axes: expected None, because a comparison has one panel for each run")
     mean_distances = [float(history.mean_distance[-1]) for history in comparison.histories.values()]
     records = list(comparison.records.values())
-    figure = runs.plot_comparison(
+    figure = comparisons.plot_comparison(
         records, theme=theme, colors=colors, size=size, mean_distances=mean_distances
     )
     return figure.axes[-1]

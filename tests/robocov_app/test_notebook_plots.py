@@ -22,9 +22,10 @@ from robocov.drawing import Drawable
 from robocov.errors import ParameterError
 from robocov.metrics import compute_cost_history
 from robocov_app import notebook as drawing_backend
-from robocov_app.figures import runs
+from robocov_app.figures.comparisons import plot_comparison
+from robocov_app.figures.cost_curves import plot_cost
+from robocov_app.figures.map_pages import plot_environment, plot_trajectories
 from robocov_app.figures.page import to_plot_color
-from robocov_app.figures.runs import plot_comparison, plot_environment, plot_trajectories
 from robocov_app.look.colors import format_hex_color
 from robocov_app.look.theme import DARK, LIGHT
 
@@ -362,9 +363,9 @@ def test_a_comparison_is_a_page_with_a_panel_for_each_run():
 def test_plot_documents_all_options_of_the_matplotlib_backend():
     # These functions pass further options on.
     passed_to = {
-        "plot_environment": runs.plot_environment,
-        "plot_record": runs.plot_trajectories,
-        "plot_history": runs.plot_cost,
+        "plot_environment": plot_environment,
+        "plot_record": plot_trajectories,
+        "plot_history": plot_cost,
     }
     text = inspect.getdoc(Drawable.plot).partition("Returns")[0].partition("Those of ``matplotlib`` are:")[2]
     entries = re.findall(r"^([\w, ]+) : .*\n((?: +.*\n)*)", textwrap.dedent(text), flags=re.MULTILINE)

@@ -16,7 +16,7 @@ from robocov_app.terminal.progress import make_counter, show_progress
 
 if TYPE_CHECKING:
     from robocov.metrics.run_metrics import RunMetrics
-    from robocov_app.figures.runs import MeasuredRun
+    from robocov_app.figures.metric_curves import MeasuredRun
     from robocov_app.runs.saved_runs import SavedRun
 
 _COLUMNS = {
@@ -59,7 +59,7 @@ def command(options: Arguments) -> None:
     """Run `robocov metrics`."""
     from robocov.files.result_folder import extend_result
     from robocov.metrics.run_metrics import COLUMNS
-    from robocov_app.figures.runs import MeasuredRun
+    from robocov_app.figures.metric_curves import MeasuredRun
     from robocov_app.runs.saved_runs import load_saved_runs
 
     saved_runs = load_saved_runs(options.folder)
@@ -119,7 +119,7 @@ def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
 def _save_figure(options: Arguments, path: Path, measured_runs: list[MeasuredRun]) -> None:
     """Draw the metrics of all runs against time, and save the figure."""
     from robocov_app.figures.files import save_figure
-    from robocov_app.figures.runs import plot_metrics
+    from robocov_app.figures.metric_curves import plot_metrics
 
     title = f"Metrics  ·  {options.folder.name}"
     save_figure(plot_metrics(measured_runs, options.theme, title=title), path)

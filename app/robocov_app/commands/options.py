@@ -224,8 +224,8 @@ class VideoOptions(LayerOptions):
     """Simulated seconds per second of video."""
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
     """Colors (default: light; in a window, those of the last window)."""
-    colors: Literal["paper", "robots"] = "paper"
-    """Colors of trajectories, also in videos: the paper's red, or one color per robot."""
+    colors: Literal["robots", "paper"] = "robots"
+    """Colors of trajectories, also in videos: one color per robot, or the paper's red."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size in pixels (default: 1280x720 for the video of a run, otherwise fitted to the map)."""
 

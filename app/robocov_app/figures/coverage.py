@@ -15,7 +15,8 @@ from robocov.environment import Environment
 from robocov.record import Record
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
-from robocov_app.figures import arena
+from robocov_app.figures import map_drawing, robot_drawing
+from robocov_app.figures.cost_curves import plot_cost
 from robocov_app.figures.coverage_layout import (
     BAR_INDENT,
     BAR_WIDTH,
@@ -45,7 +46,6 @@ from robocov_app.figures.page import (
     to_plot_color,
 )
 from robocov_app.figures.run_titles import build_run_title
-from robocov_app.figures.runs import plot_cost
 from robocov_app.look import legend
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.render.density_text import describe_density, format_cost, get_cost_name
@@ -227,7 +227,7 @@ def plot_distances(snapshot: DistanceSnapshot, axes: Axes, theme: Theme | str = 
     """
     theme = get_theme(theme)
     limit = _choose_limit([snapshot])
-    arena.set_meter_axes(axes, snapshot.environment, theme)
+    map_drawing.set_meter_axes(axes, snapshot.environment, theme)
     axes.apply_aspect()
     extent = axes.get_window_extent()
     # As on pages, texts and lines have scale 1 at 100 dots per inch.
@@ -258,12 +258,13 @@ def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[
     border = Line2D(
         [], [], color=to_plot_color(theme.geodesic_border), linewidth=1.6, label=legend.GEODESIC_BORDER
     )
-    handles: list[Artist] = [arena.build_robot_handle(legend.ROBOT, theme.final, theme), border]
+    handles: list[Artist] = [robot_drawing.build_robot_handle(legend.ROBOT, theme.final, theme), border]
     legends = [
-        arena.build_map_handles(snapshot.environment, theme, has_density=False)[1:] for snapshot in snapshots
+        map_drawing.build_map_handles(snapshot.environment, theme, has_density=False)[1:]
+        for snapshot in snapshots
     ]
-    for handle in legend.merge_legends(legends, arena.get_label):
-        if arena.get_label(handle) == legend.UNKNOWN_OBSTACLE:
+    for handle in legend.merge_legends(legends, map_drawing.get_label):
+        if map_drawing.get_label(handle) == legend.UNKNOWN_OBSTACLE:
             handle.set_label(legend.OBSTACLE)
         handles.append(handle)
     if any((snapshot.field.result.owners < 0).any() for snapshot in snapshots):
@@ -350,10 +351,10 @@ def _draw_snapshot(
         zorder=0,
     )
     image.set_clip_path(Polygon(snapshot.environment.region.vertices, transform=axes.transData))
-    arena.draw_map(axes, snapshot.environment, theme, has_density=False, time=snapshot.time)
+    map_drawing.draw_map(axes, snapshot.environment, theme, has_density=False, time=snapshot.time)
     positions = snapshot.field.result.positions
-    fills = [theme.final] * len(positions)
-    arena.draw_robots(axes, positions, snapshot.team.radius, fills, theme, numbers=snapshot.numbers)
+    numbers = snapshot.numbers or range(1, len(positions) + 1)
+    robot_drawing.draw_robots(axes, positions, snapshot.team.radius, numbers, theme)
 
 
 def _paint_distances(

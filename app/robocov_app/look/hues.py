@@ -30,9 +30,8 @@ _CROWDED_TRAIL_BACKGROUND_FRACTION = 0.25
 ColorScheme: TypeAlias = Literal["paper", "robots"]
 """Colors of robots and trajectories.
 
-"paper" uses the colors of the article: red trajectories, blue final positions and pale cells, which are
-legible in print and in small pictures. "robots" gives each robot its own hue, so that single robots can be
-followed.
+"robots" gives each robot its own hue, so that single robots can be followed. "paper" uses the colors of the
+article: green starts, red trajectories and blue final positions, which are legible in small pictures.
 """
 
 

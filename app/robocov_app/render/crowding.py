@@ -87,6 +87,33 @@ def fit_mark_size(points: FloatArray, low: float, high: float) -> float:
     return float(np.clip(np.median(distances), low, high))
 
 
+def select_spaced_rows(points: FloatArray, spacing: float) -> list[int]:
+    """Select points, in their order, that are at least `spacing` from all selected ones.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+    spacing : float
+        In the unit of the points.
+
+    Returns
+    -------
+    list of int
+        Rows of the selected points.
+
+    Examples
+    --------
+    >>> select_spaced_rows(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]), 2.0)
+    [0, 2]
+    """
+    selected: list[int] = []
+    for row, point in enumerate(points):
+        distances = np.hypot(*(points[selected] - point).T)
+        if (distances >= spacing).all():
+            selected.append(row)
+    return selected
+
+
 def is_crowd(positions: FloatArray, camera: Camera) -> bool:
     """Return whether more robots are in view than can be marked one by one.
 

@@ -271,7 +271,8 @@ def save_figures(
 
 def _plot_trajectories(runs: Sequence[Run], settings: OutputSettings, *, is_comparison: bool) -> Figure:
     """Plot the trajectories of the only run, or of several runs side by side."""
-    from robocov_app.figures.runs import plot_comparison, plot_trajectories
+    from robocov_app.figures.comparisons import plot_comparison
+    from robocov_app.figures.map_pages import plot_trajectories
 
     video = settings.video
     mean_distances = [float(run.history.mean_distance[-1]) for run in runs]

@@ -33,8 +33,8 @@ class VideoSettings:
         Simulated seconds per second of the video.
     theme : str
         Name of the color theme, ``light`` or ``dark``.
-    colors : {"paper", "robots"}
-        Trajectories in the paper's red, or in a color for each robot.
+    colors : {"robots", "paper"}
+        Trajectories in a color for each robot, or in the paper's red.
     size : (width, height) or None, px
         Size of frames and figures. By default, one that suits the content.
     shown_layers, hidden_layers : frozenset of str
@@ -46,7 +46,7 @@ class VideoSettings:
     fps: float = 30
     speed: float = 4.0
     theme: str = "light"
-    colors: ColorScheme = "paper"
+    colors: ColorScheme = "robots"
     size: tuple[int, int] | None = None
     shown_layers: frozenset[str] = frozenset()
     hidden_layers: frozenset[str] = frozenset()

@@ -32,7 +32,7 @@ def test_a_full_disk_leaves_no_partial_files_and_keeps_the_earlier_result(
         "import resource, signal, sys\n"
         f"signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "from robocov_app.cli import main\n"
-        "import robocov, robocov_app.runs.execution, robocov_app.figures.runs, matplotlib.figure\n"
+        "import robocov, robocov_app.runs.execution, robocov_app.figures.map_pages, matplotlib.figure\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"
         f"out = {str(tmp_path / 'run')!r}\n"
         "arguments = ['run', 'rooms', '--duration', '1', '--lattice', '16', '--overwrite', '--out', out]\n"

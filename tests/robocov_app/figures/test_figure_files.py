@@ -15,9 +15,10 @@ import pytest
 from drawn_run import HALL, ROOMS, record_walk
 
 from robocov.errors import OutputError, ParameterError
+from robocov_app.figures.cost_curves import plot_cost
 from robocov_app.figures.curves import TimeCurve
 from robocov_app.figures.files import check_figure_path, save_figure
-from robocov_app.figures.runs import plot_cost, plot_environment, plot_trajectories
+from robocov_app.figures.map_pages import plot_environment, plot_trajectories
 
 TIME = np.linspace(0.0, 60.0, 121)
 CURVES = [
@@ -118,7 +119,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from drawn_run import ROOMS, record_walk
 from robocov_app.figures.files import save_figure
-from robocov_app.figures.runs import plot_trajectories
+from robocov_app.figures.map_pages import plot_trajectories
 for suffix in ("svg", "pdf"):
     save_figure(plot_trajectories(record_walk(ROOMS, 4)), f"{sys.argv[2]}.{suffix}")
 """

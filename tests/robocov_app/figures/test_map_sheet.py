@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from robocov.environment import Environment
-from robocov_app.figures.runs import MAX_MAPS, plot_maps
+from robocov_app.figures.map_sheets import MAX_MAPS, plot_maps
 
 
 def list_texts(figure: Figure) -> list[str]:

@@ -8,8 +8,8 @@ import pytest
 from drawn_run import ROOMS, record_walk
 from PIL import Image
 
+from robocov_app.figures.map_pages import plot_trajectories
 from robocov_app.figures.page import FigurePage, PageBox
-from robocov_app.figures.runs import plot_trajectories
 from robocov_app.look.theme import DARK
 
 

@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.text import Annotation, Text
+from matplotlib.text import Text
 from page_layout import assert_layout_is_clear, boxes_overlap
 
 from robocov.density import Gaussian, Gaussians
@@ -23,10 +23,13 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.team import Team
 from robocov.voronoi import partition
+from robocov_app.figures.comparisons import plot_comparison
+from robocov_app.figures.cost_curves import plot_cost
 from robocov_app.figures.curves import TimeCurve, format_end_label
 from robocov_app.figures.files import save_figure
+from robocov_app.figures.map_pages import plot_environment, plot_trajectories
 from robocov_app.figures.page import to_plot_color
-from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
+from robocov_app.figures.run_drawing import START_NUMBER_PT
 from robocov_app.look.theme import DARK, LIGHT
 
 MAPS = [ROOMS, HALL, CORRIDOR, SHAFT]
@@ -69,14 +72,25 @@ def has_marks(axes, marker):
     return any(line.get_marker() == marker for line in axes.lines)
 
 
+def list_start_rings(axes):
+    """Return the rings at starts."""
+    return [line for line in axes.lines if line.get_marker() == "o"]
+
+
 def list_start_numbers(axes):
-    """Return the numbers next to starts."""
-    return [text for text in axes.texts if isinstance(text, Annotation)]
+    """Return the numbers next to starts, which are the smallest texts."""
+    return [text for text in axes.texts if text.get_fontsize() == START_NUMBER_PT]
 
 
 def list_robot_numbers(axes):
-    """Return the numbers on robots."""
-    return [text for text in axes.texts if not isinstance(text, Annotation)]
+    """Return the numbers in robots and next to them."""
+    return [text for text in axes.texts if text.get_fontsize() > START_NUMBER_PT]
+
+
+def measure_text_boxes(axes):
+    """Return the boxes of all texts in axes, px."""
+    renderer = axes.figure.canvas.get_renderer()
+    return [text.get_window_extent(renderer) for text in axes.texts]
 
 
 def to_colors(collection_colors):
@@ -179,7 +193,8 @@ class TestComparison:
 
     def test_the_legend_lists_centroids_if_one_of_the_controllers_has_some(self):
         figure = plot_comparison([record_walk(ROOMS, 5, controller="rpf"), record_walk(ROOMS, 5)])
-        assert list_legend_texts(figure)[2:5] == ["final position", "cell centroid", "final Voronoi cell"]
+        order = ["final position", "cell centroid", "final Voronoi cell"]
+        assert [text for text in list_legend_texts(figure) if text in order] == order
 
     def test_texts_are_legible_at_half_the_size(self):
         figure = plot_comparison([record_walk(ROOMS, 3)] * 3)
@@ -205,22 +220,62 @@ class TestTrajectories:
     def test_trajectories_have_the_positions_of_the_record(self):
         record = record_walk(ROOMS, 5)
         lines = find_collection(plot_trajectories(record).axes[0], LineCollection)
-        assert to_colors(lines.get_colors()) == {to_plot_color(LIGHT.trajectory)}
         for robot, segment in enumerate(lines.get_segments()):
             assert segment == pytest.approx(record.positions[:, robot])
 
-    def test_final_positions_are_blue_discs(self):
+    def test_final_positions_are_discs_and_starts_are_rings(self):
         record = record_walk(ROOMS, 5)
-        discs = find_collection(plot_trajectories(record).axes[0], PathCollection)
-        assert to_colors(discs.get_facecolors()) == {to_plot_color(LIGHT.final)}
+        axes = plot_trajectories(record).axes[0]
+        discs = find_collection(axes, PathCollection)
         assert np.asarray(discs.get_offsets()) == pytest.approx(record.positions[-1])
+        rings = list_start_rings(axes)
+        assert {ring.get_markerfacecolor() for ring in rings} == {"none"}
+        starts = np.concatenate([ring.get_xydata() for ring in rings])
+        assert starts == pytest.approx(record.positions[0])
 
-    def test_starts_are_green_rings(self):
-        record = record_walk(ROOMS, 5)
-        rings = find_marks(plot_trajectories(record).axes[0], "o")
-        assert to_rgb(rings.get_markeredgecolor()) == to_plot_color(LIGHT.start)
-        assert rings.get_markerfacecolor() == "none"
-        assert np.asarray(rings.get_xydata()) == pytest.approx(record.positions[0])
+    def test_trajectory_start_and_final_position_of_a_robot_have_the_same_color(self):
+        axes = plot_trajectories(record_walk(ROOMS, 5)).axes[0]
+        trails = [to_rgb(color) for color in find_collection(axes, LineCollection).get_colors()]
+        discs = [to_rgb(color) for color in find_collection(axes, PathCollection).get_facecolors()]
+        rings = [to_rgb(ring.get_markeredgecolor()) for ring in list_start_rings(axes)]
+        assert trails == discs == rings
+        assert len(set(trails)) == 5
+
+    def test_the_scheme_of_the_paper_is_green_red_and_blue(self):
+        axes = plot_trajectories(record_walk(ROOMS, 5), colors="paper").axes[0]
+        trails = find_collection(axes, LineCollection).get_colors()
+        assert to_colors(trails) == {to_plot_color(LIGHT.trajectory)}
+        discs = find_collection(axes, PathCollection).get_facecolors()
+        assert to_colors(discs) == {to_plot_color(LIGHT.final)}
+        rings = list_start_rings(axes)
+        assert to_colors(ring.get_markeredgecolor() for ring in rings) == {to_plot_color(LIGHT.start)}
+
+    def test_discs_have_the_radii_of_the_robots(self):
+        record = record_walk(ROOMS, 3)
+        radii = (0.3, 0.4, 0.5)
+        axes = plot_trajectories(replace(record, team=Team.homogeneous(3, radius=radii))).axes[0]
+        px_per_m = axes.get_window_extent().width / 16.0
+        assert measure_radii(axes) / px_per_m == pytest.approx(radii, rel=1e-3)
+
+    def test_numbers_do_not_overlap_each_other(self):
+        axes = plot_trajectories(record_walk(ROOMS, 9, seed=4)).axes[0]
+        boxes = measure_text_boxes(axes)
+        assert len(boxes) == 18
+        assert not any(boxes_overlap(first, second) for first, second in combinations(boxes, 2))
+
+    def test_contacts_are_stars_with_a_legend_entry(self):
+        record = record_walk(ROOMS, 2)
+        positions = record.positions.copy()
+        positions[20:, 0] = (0.6, 5.0)
+        positions[20:, 1] = (0.6 + 2 * float(record.team.radius[0]), 5.0)
+        figure = plot_trajectories(replace(record, positions=positions))
+        stars = find_marks(figure.axes[0], (8, 2, 0.0))
+        assert stars.get_xydata()[-1] == pytest.approx((0.6 + float(record.team.radius[0]), 5.0))
+        assert to_rgb(stars.get_markeredgecolor()) == to_plot_color(LIGHT.error)
+        assert "contact" in list_legend_texts(figure)
+
+    def test_a_run_without_contacts_has_no_legend_entry_for_them(self):
+        assert "contact" not in list_legend_texts(plot_trajectories(record_walk(HALL, 1)))
 
     def test_cells_and_centroids_are_the_final_ones(self):
         record = record_walk(ROOMS, 5)
@@ -236,8 +291,8 @@ class TestTrajectories:
         final_positions = record.positions[-1]
         for _ in range(61):
             final_positions = partition(final_positions, ROOMS.region).centroids
-        positions = np.concatenate([record.positions, final_positions[None]])
-        goals = np.concatenate([record.goals, final_positions[None]])
+        positions = np.concatenate([record.positions[:-1], final_positions[None]])
+        goals = np.concatenate([record.goals[:-1], final_positions[None]])
         figure = plot_trajectories(replace(record, positions=positions, goals=goals))
         assert not has_marks(figure.axes[0], "+")
         assert "cell centroid" not in list_legend_texts(figure)
@@ -257,12 +312,14 @@ class TestTrajectories:
         record = record_walk(ROOMS, 3)
         large_team = Team.homogeneous(3, radius=5.0 * float(record.team.radius[0]))
         large = plot_trajectories(replace(record, team=large_team)).axes[0]
-        assert find_marks(large, "o").get_markersize() > 2.0 * find_marks(small, "o").get_markersize()
+        large_size = list_start_rings(large)[0].get_markersize()
+        assert large_size > 2.0 * list_start_rings(small)[0].get_markersize()
 
     def test_starts_are_smaller_in_a_large_team(self):
         small_team = plot_trajectories(record_walk(CORRIDOR, 3)).axes[0]
         large_team = plot_trajectories(record_walk(CORRIDOR, 40)).axes[0]
-        assert find_marks(large_team, "o").get_markersize() < find_marks(small_team, "o").get_markersize()
+        large_team_size = list_start_rings(large_team)[0].get_markersize()
+        assert large_team_size < list_start_rings(small_team)[0].get_markersize()
 
     def test_titles_contain_changed_gains(self):
         record = record_walk(ROOMS, 3)
@@ -288,25 +345,30 @@ class TestTrajectories:
 
     def test_each_robot_has_its_number_at_its_final_position(self):
         record = record_walk(ROOMS, 12, seed=4)
-        texts = list_robot_numbers(plot_trajectories(record).axes[0])
+        large_team = Team.homogeneous(12, radius=0.3)
+        texts = list_robot_numbers(plot_trajectories(replace(record, team=large_team)).axes[0])
         final_positions = [tuple(position) for position in record.positions[-1].tolist()]
         assert [text.get_text() for text in texts] == [str(number) for number in range(1, 13)]
         assert [text.get_position() for text in texts] == final_positions
 
-    def test_each_robot_has_its_number_next_to_its_start(self):
-        record = record_walk(ROOMS, 12, seed=4)
-        numbers = list_start_numbers(plot_trajectories(record).axes[0])
-        assert [text.get_text() for text in numbers] == [str(number) for number in range(1, 13)]
-        assert np.array([text.xy for text in numbers]) == pytest.approx(record.positions[0])
-        assert {to_rgb(text.get_color()) for text in numbers} == {to_plot_color(LIGHT.start)}
+    @pytest.mark.parametrize("row", [0, -1], ids=["start", "end"])
+    def test_the_numbers_of_small_robots_are_next_to_them_and_their_starts(self, row):
+        record = record_walk(ROOMS, 6, seed=4)
+        axes = plot_trajectories(replace(record, team=Team.homogeneous(6, radius=0.05))).axes[0]
+        numbers = list_start_numbers(axes) if row == 0 else list_robot_numbers(axes)
+        assert [text.get_text() for text in numbers] == [str(number) for number in range(1, 7)]
+        places = np.array([text.get_position() for text in numbers])
+        distances = np.linalg.norm(places - record.positions[row], axis=1)
+        assert distances.min() > 0.05
+        assert distances.max() < 0.6
 
     def test_starts_of_a_large_team_have_no_numbers(self):
         axes = plot_trajectories(record_walk(ROOMS, 31)).axes[0]
         assert not list_start_numbers(axes)
 
     @pytest.mark.parametrize(("n", "n_colors"), [(5, 5), (40, 1)])
-    def test_only_robots_of_small_teams_have_their_own_color(self, n, n_colors):
-        axes = plot_trajectories(record_walk(ROOMS, n), colors="robots", theme=DARK).axes[0]
+    def test_only_trajectories_of_small_teams_have_different_colors(self, n, n_colors):
+        axes = plot_trajectories(record_walk(ROOMS, n), theme=DARK).axes[0]
         lines = find_collection(axes, LineCollection)
         assert len(to_colors(lines.get_colors())) == n_colors
 
@@ -383,13 +445,9 @@ class TestLargeTeam:
         np.fill_diagonal(distances, np.inf)
         assert (radii[:, None] + radii <= distances + 1e-6).all()
 
-    def test_other_robots_have_larger_discs_with_numbers(self):
+    def test_small_robots_have_no_numbers(self):
         axes = plot_trajectories(record_crowd(), size=(1000, 700)).axes[0]
-        radii = measure_radii(axes)
-        assert radii[N_CROWDED:].max() > 1.2 * radii[:N_CROWDED].max()
-        numbers = {int(text.get_text()) for text in axes.texts}
-        assert not numbers & set(range(12, 90))
-        assert numbers & set(range(101, 121))
+        assert not axes.texts
 
     def test_trajectories_are_thinner_than_those_of_a_small_team(self):
         widths = []
@@ -532,10 +590,10 @@ _IMPORT_AND_PLOT = """
 import sys
 import robocov_app.figures.files, robocov_app.look.curve_styles, robocov_app.report.replay
 assert "matplotlib" not in sys.modules
-import robocov_app.figures.runs
+import robocov_app.figures.map_pages
 sys.path.insert(0, sys.argv[1])
 from drawn_run import ROOMS, record_walk
-robocov_app.figures.runs.plot_trajectories(record_walk(ROOMS, 3))
+robocov_app.figures.map_pages.plot_trajectories(record_walk(ROOMS, 3))
 assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
 """
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from robocov.metrics.run_metrics import RunMetrics
-from robocov_app.figures.runs import METRIC_PANELS, MeasuredRun, plot_metrics
+from robocov_app.figures.metric_curves import METRIC_PANELS, MeasuredRun, plot_metrics
 
 TIME = np.linspace(0.0, 5.0, 11)
 FREE_AREA = 20.0

@@ -13,7 +13,7 @@ from robocov.cost import CoverageCost
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment
 from robocov.simulation import Simulation
-from robocov_app.figures.arena import build_map_handles, draw_map, set_meter_axes
+from robocov_app.figures.map_drawing import build_map_handles, draw_map, set_meter_axes
 from robocov_app.look.theme import DARK, LIGHT, Theme
 from robocov_app.render.distance_map.pixel_distances import DistanceField
 from robocov_app.render.distance_map.site_lattice import FieldLattice

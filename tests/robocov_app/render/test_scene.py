@@ -13,7 +13,7 @@ from robocov.environment import CircleObstacle, Environment, ObstaclePath
 from robocov.record import Record
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov_app.figures.runs import plot_trajectories
+from robocov_app.figures.map_pages import plot_trajectories
 from robocov_app.look.theme import LIGHT
 from robocov_app.render import sensed_points
 from robocov_app.render.layer_catalog import build_standard_layers

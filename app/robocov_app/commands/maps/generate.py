@@ -164,7 +164,7 @@ def _build_map(task: _MapTask) -> Environment:
 def _save_sheet(options: Arguments, path: Path, environments: list[Environment]) -> None:
     """Draw the maps on one sheet."""
     from robocov_app.figures.files import save_figure
-    from robocov_app.figures.runs import plot_maps
+    from robocov_app.figures.map_sheets import plot_maps
 
     save_figure(plot_maps(environments, options.theme), path)
 

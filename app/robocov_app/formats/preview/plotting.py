@@ -16,8 +16,8 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import Environment, Gap
-from robocov_app.figures.arena import build_map_handles, draw_map
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
+from robocov_app.figures.map_drawing import build_map_handles, draw_map
 from robocov_app.figures.page import HEADING, SMALL, TITLE, FigurePage, to_plot_color
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps

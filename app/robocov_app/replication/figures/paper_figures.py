@@ -18,7 +18,7 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov.voronoi import partition
-from robocov_app.figures import arena
+from robocov_app.figures import map_drawing, robot_drawing, run_drawing
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox, to_plot_color
@@ -223,15 +223,15 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
         "color": to_plot_color(theme.ink),
     }
     handles: list[Artist] = [
-        arena.build_robot_handle("robot", theme.final, theme),
+        robot_drawing.build_robot_handle("robot", theme.final, theme),
         Line2D([], [], label="center of mass of its cell", **dot_style),
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
-        *arena.build_map_handles(environment, theme)[1:],
+        *map_drawing.build_map_handles(environment, theme)[1:],
     ]
     page, boxes = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
     draw_panel_footer(page, boxes, environment, handles)
     axes = add_panel_axes(page, boxes[0], environment)
-    arena.draw_map(axes, environment, theme)
+    map_drawing.draw_map(axes, environment, theme)
     cells = partition(positions, environment.region)
     hues = [k % len(theme.robots) for k in range(len(positions))]
     fills = [to_plot_color(theme.get_paper_cell_color(hue)) for hue in hues]
@@ -240,7 +240,8 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     )
     axes.add_collection(collection, autolim=False)
     axes.plot(*cells.centroids.T, zorder=8, clip_on=False, **dot_style)
-    arena.draw_robots(axes, positions, run.team.radius, [theme.final] * len(positions), theme)
+    numbers = range(1, len(positions) + 1)
+    robot_drawing.draw_robots(axes, positions, run.team.radius, numbers, theme)
     return page.figure
 
 
@@ -260,20 +261,20 @@ def draw_side_by_side(records: Sequence[Record], headings: Iterable[tuple[str, s
     Figure
     """
     handles = merge_legends(
-        (arena.build_run_handles(record, theme, "paper") for record in records), arena.get_label
+        (run_drawing.build_run_handles(record, theme, "paper") for record in records), map_drawing.get_label
     )
     environment = records[0].environment
     page, boxes = build_panels(environment, len(records), WIDE_PX, handles, theme, above=30.0)
     panels = [add_panel_axes(page, box, environment) for box in boxes]
     for letter, record, (title, cost), axes in zip("abcdef", records, headings, panels, strict=False):
-        arena.draw_run(axes, record, theme, "paper")
+        run_drawing.draw_run(axes, record, theme, "paper")
         box = axes.get_position()
         left = box.x0 * page.size[0]
         right = box.x1 * page.size[0]
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
         page.write(f"({letter})  {title}", left, top, points=TITLE, bold=True)
         page.write(cost, right, top, points=SMALL, color=theme.faint, align="right")
-    draw_panel_footer(page, boxes, environment, arena.select_drawn(handles, panels))
+    draw_panel_footer(page, boxes, environment, run_drawing.select_drawn(handles, panels))
     return page.figure
 
 

@@ -9,8 +9,8 @@ from robocov.metrics.run_metrics import RunMetrics, compute_run_metrics
 from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
 from robocov_app.figures.curves import TIME
+from robocov_app.figures.metric_curves import to_free_area_percent
 from robocov_app.figures.page import ValueAxis
-from robocov_app.figures.runs import to_free_area_percent
 from robocov_app.look.labels import append_unit
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import has_path

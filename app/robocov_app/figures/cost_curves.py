@@ -1,0 +1,77 @@
+"""Figures of mean distances over time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from robocov.errors import ParameterError, quote
+from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import TITLE, FigurePage, check_not_empty, get_figure
+from robocov_app.look.theme import LIGHT, Theme, get_theme
+
+_MARGINS = CurveMargins(left=52, top=86, bottom=56, right=52)
+"""Space around the curves on a page without maps; the title is above them."""
+
+
+@plain_style()
+def plot_cost(
+    curves: Sequence[TimeCurve],
+    axes: Axes | None = None,
+    *,
+    theme: Theme | str = LIGHT,
+    size: tuple[int, int] | None = None,
+    title: str = "Mean distance over time",
+) -> Figure:
+    """Plot mean distances against time, each curve labeled at its end with its name and final value.
+
+    Parameters
+    ----------
+    curves : sequence of TimeCurve
+    axes : matplotlib.axes.Axes, optional
+        By default, new axes on a separate page.
+    theme : Theme or str
+    size : (width, height), px, optional
+        Size of the page.
+    title : str
+        Title of the page.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        If there are no curves, or one has no finite value.
+    """
+    check_not_empty("curves", curves)
+    for curve in curves:
+        _check_curve(curve)
+    theme = get_theme(theme)
+    if axes is None:
+        axes = _create_page(curves, theme, size or (1000, 560), title)
+    draw_curves(axes, curves, theme)
+    return get_figure(axes)
+
+
+def _check_curve(curve: TimeCurve) -> None:
+    """Raise a ParameterError unless a curve has a value for each time, at least one of them finite."""
+    if len(curve.times) != len(curve.values) or not np.isfinite(curve.values).any():
+        finite = int(np.isfinite(curve.values).sum())
+        raise ParameterError(
+            f"curve {quote(curve.label)}: expected a value for each time, at least one of them finite, "
+            f"got {len(curve.times)} times and {finite} finite values"
+        )
+
+
+def _create_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
+    """Create a page with only curves, whose texts can be larger than on pages with maps."""
+    width, height = size
+    page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
+    left = _MARGINS.left * page.scale
+    title_row = 30 * page.scale
+    page.write(title, left, title_row, points=TITLE, bold=True, max_width=width - left - page.margin)
+    return add_curve_axes(page, curves, _MARGINS)
