@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygame
@@ -17,9 +18,10 @@ from sample_sessions import HALL, advance_session, start_session
 from robocov.errors import InputError, MapError
 from robocov.mapfile import save_map
 from robocov_app.cli import main
+from robocov_app.render.fonts import render_text
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.viewer.launch import HEADLESS_FPS
-from robocov_app.viewer.lessons import player
+from robocov_app.viewer.lessons import page, player
 from robocov_app.viewer.lessons.player import (
     BASE_LAYERS,
     FIRST_LESSON,
@@ -207,6 +209,43 @@ def test_the_closing_page_says_what_was_found_out(tmp_path: Path) -> None:
     assert LESSON is not None
     assert LESSON.found
     assert LESSON.next_steps
+
+
+def read_lesson_page(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Draw the page of the lesson, and return its lines in one text."""
+    lines: list[str] = []
+
+    def record_and_render(text: str, *arguments: Any) -> pygame.Surface:
+        lines.append(text)
+        return render_text(text, *arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(page, "render_text", record_and_render)
+        driver.window.draw()
+    return "\n".join(lines)
+
+
+def test_the_closing_page_lists_skipped_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        lesson.skip(1)
+        driver.press_key("1")
+        driver.run_frames(30)
+        assert lesson.state == "task"
+        lesson.skip(1)
+        assert "Task skipped: Far" in read_lesson_page(driver, monkeypatch)
+        lesson.skip(-1)
+        driver.press_key("1")
+        driver.run_frames(30)
+        driver.session.place_robot(1, (1.0, 1.0))
+        driver.run_frames(2)
+        assert lesson.state == "ended"
+        lesson.skip(1)
+        assert lesson.state == "closing"
+        assert "skipped" not in read_lesson_page(driver, monkeypatch)
 
 
 def test_an_own_lesson_can_be_played_again(tmp_path: Path) -> None:

@@ -336,6 +336,45 @@ def test_the_buttons_of_a_lesson_are_covered_on_pages_that_watch(browser, tmp_pa
         browser.wait_until(lambda: not browser.find("#spectator").is_displayed())
 
 
+def test_answers_of_a_lesson_are_plain_text_on_pages_that_watch(browser, tmp_path):
+    browser.resize(1280, 720)
+    with (
+        serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
+        connect_page(link) as teacher,
+    ):
+        teacher.report_page(1280, 720)
+        browser.driver.get(read_watch_link(link))
+        browser.wait_until(lambda: browser.find("#spectator").is_displayed())
+        answers = browser.find("#answers")
+        teacher.press_key("ArrowRight")
+        browser.wait_until(answers.is_displayed)
+        assert len(browser.find_all("#answers li")) > 1
+        assert answers.text
+        left, _, width, height = browser.measure("#answers")
+        assert left > 900
+        assert left + width < 1280
+        assert height == browser.run_script("return arguments[0].scrollHeight", answers), "all is visible"
+        teacher.pass_control(2)
+        browser.wait_until(lambda: not answers.is_displayed())
+
+
+def test_a_request_for_control_is_visible_above_the_invitation(browser, tmp_path):
+    browser.resize(1280, 720)
+    with serve_window("demo", "rooms", "--paused", "--host", "0.0.0.0", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.wait_until(lambda: browser.find("#here").is_displayed())
+        with connect_page(read_watch_link(link)) as student:
+            student.report_page(1280, 720)
+            browser.find("#here summary").click()
+            push_button(browser, "#here button", "Invite others")
+            assert browser.find("#invitation").is_displayed()
+            student.request_control()
+            browser.wait_until(lambda: browser.find("#toast").is_displayed())
+            push_button(browser, "#toast button", "Hand over")
+            browser.wait_until(lambda: "watching" in get_classes(browser))
+        browser.find("#close-invitation").click()
+
+
 def test_everyone_can_invite_others_to_windows_of_their_own(browser, tmp_path):
     browser.resize(1280, 720)
     with serve_window("demo", "square", "--each", "--host", "0.0.0.0", "--folder", str(tmp_path)) as link:

@@ -37,6 +37,25 @@ class PageAppearance:
 
 
 @dataclass(frozen=True)
+class LessonAnswers:
+    """Answers to the open question of a lesson.
+
+    Attributes
+    ----------
+    box : Box
+        Part of the window that shows them.
+    texts : list of str
+        The answers in their order.
+    text_size : float, px
+        Size of their text in the window.
+    """
+
+    box: Box
+    texts: list[str]
+    text_size: float
+
+
+@dataclass(frozen=True)
 class WindowControls:
     """State of a window that the buttons of a phone's page show.
 
@@ -72,6 +91,8 @@ class WindowControls:
         Part of the window that shows the map and no controls.
     lesson_buttons_box : Box or None
         Part of the window that shows the buttons of a lesson.
+    lesson_answers : LessonAnswers or None
+        Answers of a lesson that can be clicked.
     """
 
     theme: str
@@ -89,6 +110,7 @@ class WindowControls:
     is_covered: bool = False
     map_box: Box | None = None
     lesson_buttons_box: Box | None = None
+    lesson_answers: LessonAnswers | None = None
 
 
 class MapDrawing(Protocol):

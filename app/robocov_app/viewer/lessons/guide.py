@@ -7,6 +7,7 @@ import pygame
 
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.window.layout import Box, Layout
+from robocov_app.toolkit.window.page_view import LessonAnswers
 from robocov_app.viewer.lessons.page import ClickArea, draw_caption, draw_lesson_page
 from robocov_app.viewer.lessons.player import FIRST_LESSON, LessonPlayer, LessonState, load_lesson
 from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
@@ -37,8 +38,11 @@ COMMANDS_WITHIN_LESSON = frozenset(
 """Commands after which the lesson continues; with any other command, the user takes over."""
 
 _BUTTON_NAMES = ("back", "next")
+_ANSWER_PREFIX = "answer:"
 _BUTTONS_MARGIN_PX = 4
 """Distance of the part with the buttons from the top of the buttons, and from the left edge of the panel."""
+_ANSWER_TEXT_PX = 13
+"""Size of the answers, at scale 1, on pages that cannot answer."""
 _ANSWER_KEYS = ("1", "2", "3", "4")
 
 _CHAPTER_STEPS = {"forward": 1, "back": -1}
@@ -194,6 +198,18 @@ class LessonGuide:
         left, top, width, height = layout.panel
         buttons_top = min(tops) - margin
         return Box(left + margin, buttons_top, width - margin, top + height - buttons_top)
+
+    def find_answers(self, layout: Layout) -> LessonAnswers | None:
+        """Return the answers that can be clicked, and the part of the panel that shows them."""
+        boxes = [area.box for area in self.click_areas if area.name.startswith(_ANSWER_PREFIX)]
+        if self.shown is None or not boxes:
+            return None
+        union = boxes[0].unionall(boxes[1:])
+        return LessonAnswers(
+            box=Box(union.left, union.top, union.width, union.height),
+            texts=[answer.text for answer in self.shown.marked_answers],
+            text_size=_ANSWER_TEXT_PX * layout.scale,
+        )
 
     def scroll(self, distance: float) -> bool:
         """Scroll the text in the sheet down by a distance, px; return whether there is more than fits."""

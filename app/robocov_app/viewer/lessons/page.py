@@ -141,7 +141,7 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     title_size = round(_CAPTION_TITLE_PX * scale)
     card_width = min(width - 2 * _CAPTION_SIDE_PX * scale, _CAPTION_WIDTH_PX * scale)
     is_closing = lesson.state is LessonState.CLOSING
-    text = " ".join(lesson.findings if is_closing else [lesson.chapter.text, *lesson.lines])
+    text = " ".join(_list_closing_lines(lesson) if is_closing else [lesson.chapter.text, *lesson.lines])
     lines = wrap_text(text, text_size, card_width - 2 * _CAPTION_MARGIN_PX * scale)
     card_height = (_CAPTION_HEIGHT_PX + _CAPTION_LINE_PX * len(lines)) * scale
     box = pygame.Rect(0, 0, round(card_width), round(card_height))
@@ -162,6 +162,11 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     screen.fill(mix(theme.panel, theme.ink, _EMPTY_BAR_STRENGTH), bar)
     bar.width = round(bar.width * lesson.progress)
     screen.fill(theme.accent, bar)
+
+
+def _list_closing_lines(lesson: LessonPlayer) -> list[str]:
+    """Return the texts of the closing page in a caption."""
+    return [*lesson.findings, *(f"{text}." for text in lesson.skipped_tasks)]
 
 
 def draw_lesson_page(
@@ -302,7 +307,7 @@ class LessonPage:
             self.y += _ITEM_GAP_PX * self.scale
 
     def _draw_closing(self) -> None:
-        """Draw the findings, the score of the user's predictions, and suggestions of next steps."""
+        """Draw the score of the user's predictions, the findings, skipped tasks, and suggested next steps."""
         lesson = self.lesson
         self._write_title(_CLOSING_TITLE)
         right_count, answer_count = lesson.score
@@ -312,15 +317,17 @@ class LessonPage:
             self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:
             self._draw_item("✓", finding)
+        for text in lesson.skipped_tasks:
+            self._draw_item("–", text, color=self.theme.faint)
         self.y += _TEXT_GAP_PX * self.scale
         self._write_title(_NEXT_TITLE)
         for step in list_next_steps(lesson.lesson):
             self._draw_item("→", step)
 
-    def _draw_item(self, sign: str, text: str) -> None:
-        """Write a paragraph with a sign at its left."""
-        self._write(sign, self.text_px, self.theme.start, bold=True)
-        self._write_paragraph(text, self.theme.ink, indent=_ITEM_INDENT_PX, right_indent=0)
+    def _draw_item(self, sign: str, text: str, *, color: Color | None = None) -> None:
+        """Write a paragraph with a sign at its left, in a color or as text behind a green sign."""
+        self._write(sign, self.text_px, color or self.theme.start, bold=True)
+        self._write_paragraph(text, color or self.theme.ink, indent=_ITEM_INDENT_PX, right_indent=0)
         self.y += _ITEM_GAP_PX * self.scale
 
     def _write_title(self, title: str) -> None:

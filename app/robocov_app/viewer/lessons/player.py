@@ -171,6 +171,8 @@ class LessonPlayer:
         Number of the user's answer, from 1.
     first_answers : dict of int to int
         The user's first answer to the question of each chapter, by the index of the chapter.
+    done_tasks : set of int
+        Indices of the chapters whose task the user has done.
     is_done : bool
         Whether the lesson has ended.
     is_held : bool
@@ -195,6 +197,7 @@ class LessonPlayer:
         self.number = 0
         self.answer: int | None = None
         self.first_answers: dict[int, int] = {}
+        self.done_tasks: set[int] = set()
         self.is_done = False
         self.is_held = False
         self._viewer = viewer
@@ -273,6 +276,17 @@ class LessonPlayer:
                 right_count += 1
         return right_count, len(self.first_answers)
 
+    @property
+    def skipped_tasks(self) -> list[str]:
+        """A text for each task that the user has not done, with the title of its chapter."""
+        if self.is_unattended:
+            return []
+        texts: list[str] = []
+        for index, chapter in enumerate(self.lesson.chapters):
+            if chapter.task is not None and index not in self.done_tasks:
+                texts.append(f"Task skipped: {chapter.title}")
+        return texts
+
     def _list_question_lines(self, question: QuestionModel) -> list[str]:
         if self.state is LessonState.ASKING:
             return _format_question(question)
@@ -338,6 +352,7 @@ class LessonPlayer:
     def _advance_task(self) -> None:
         assert self.chapter.task is not None
         if is_fulfilled(self.chapter.task.until, self.session):
+            self.done_tasks.add(self.number)
             self._enter_state(LessonState.ENDED)
 
     def _advance_end(self) -> None:

@@ -69,6 +69,7 @@ class WindowControlsReader:
             is_covered=is_covered,
             map_box=_find_map_box(layout),
             lesson_buttons_box=self._lesson.find_buttons_box(layout),
+            lesson_answers=self._lesson.find_answers(layout),
         )
 
     def _describe_lesson(self) -> str:
