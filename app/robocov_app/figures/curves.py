@@ -34,6 +34,16 @@ _MIN_EXPONENT_VALUE = 1e7
 _MIN_THOUSANDS_VALUE = 1e4
 _MIN_SHORT_VALUE = 10.0
 """From this value on, units other than meters have four significant digits instead of three decimals."""
+MAX_FILLED_BANDS = 2
+"""Maximum number of filled bands. The colors of more could not be told apart where they overlap."""
+_FILL_OPACITY = 0.14
+_EDGE_OPACITY = 0.6
+_EDGE_WIDTH_PT = 0.7
+_BARS = 6
+"""Number of bars of a band that is not filled."""
+_BAR_WIDTH_PT = 1.4
+_CAP_PT = 5.0
+"""Width of the ends of a bar."""
 _LINE_WIDTH_PT = 2.2
 _SOLID_ORDER = 2.0
 _DASHED_ORDER = 2.1
@@ -245,7 +255,8 @@ def draw_styled_curves(
 ) -> None:
     """Draw curves, each with its mark, name and final value next to its end.
 
-    Solid curves are below dashed ones, so that equal curves can be seen. Curves without a finite value are
+    Solid curves are below dashed ones, so that equal curves can be seen. At most `MAX_FILLED_BANDS` bands are
+    filled; more are drawn as bars at different times. Curves without a finite value are
     left out.
 
     Parameters
@@ -259,11 +270,7 @@ def draw_styled_curves(
     """
     _set_axes(axes, styled_curves, value_axis)
     style_axes(axes, theme, "time (s)", value_axis.label, grid="y")
-    for item in styled_curves:
-        if item.band is not None:
-            low, high = item.band
-            color = to_plot_color(item.style.get_color(theme))
-            axes.fill_between(item.curve.times, low, high, color=color, alpha=0.16, linewidth=0.0)
+    _draw_bands(axes, [item for item in styled_curves if item.band is not None], theme, weight)
     ends = []
     for item in styled_curves:
         if not np.isfinite(item.curve.values).any():
@@ -273,6 +280,54 @@ def draw_styled_curves(
         ends.append(_build_end(item, color, value_axis.unit))
     if ends:
         _draw_end_labels(axes, ends, weight)
+
+
+def _draw_bands(axes: Axes, items: Sequence[StyledCurve], theme: Theme, weight: float) -> None:
+    """Draw the bands of curves: filled if there are few, otherwise as bars, which do not hide each other."""
+    for number, item in enumerate(items):
+        color = to_plot_color(item.style.get_color(theme))
+        if len(items) <= MAX_FILLED_BANDS:
+            _fill_band(axes, item, color)
+        else:
+            _draw_bars(axes, item, color, weight, phase=(number + 0.5) / len(items))
+
+
+def _fill_band(axes: Axes, item: StyledCurve, color: PlotColor) -> None:
+    """Fill the band of a curve, and draw its edges as thin lines."""
+    assert item.band is not None
+    low, high = item.band
+    axes.fill_between(item.curve.times, low, high, color=color, alpha=_FILL_OPACITY, linewidth=0.0)
+    for edge in item.band:
+        axes.plot(item.curve.times, edge, color=color, linewidth=_EDGE_WIDTH_PT, alpha=_EDGE_OPACITY)
+
+
+def _draw_bars(axes: Axes, item: StyledCurve, color: PlotColor, weight: float, *, phase: float) -> None:
+    """Draw a band as vertical bars at even intervals.
+
+    `phase`, from 0 to 1, is the position of the first bar in the first interval. It differs between curves,
+    so that their bars are next to each other.
+    """
+    assert item.band is not None
+    times = item.curve.times
+    is_known = np.isfinite(item.curve.values)
+    if not is_known.any():
+        return
+    start = float(times[is_known][0])
+    duration = float(times[is_known][-1]) - start
+    bar_times = start + duration * (np.arange(_BARS) + phase) / _BARS
+    low, high = (np.interp(bar_times, times[is_known], edge[is_known]) for edge in item.band)
+    width = weight * _BAR_WIDTH_PT
+    axes.vlines(bar_times, low, high, colors=[color], linewidth=width, zorder=_DASHED_ORDER)
+    for ends in (low, high):
+        axes.plot(
+            bar_times,
+            ends,
+            "_",
+            color=color,
+            markersize=weight * _CAP_PT,
+            markeredgewidth=width,
+            zorder=_DASHED_ORDER,
+        )
 
 
 def _build_end(item: StyledCurve, color: PlotColor, unit: str) -> _CurveEnd:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from page_layout import assert_layout_is_clear
@@ -82,12 +83,26 @@ def assert_texts_end_on_page(figure: Figure) -> None:
 
 class TestBands:
     def test_a_band_reaches_from_the_first_quartile_to_the_third(self) -> None:
-        axes = plot_bands(BANDS).axes[0]
-        for band, collection in zip(BANDS, axes.collections, strict=True):
+        axes = plot_bands(BANDS[:2]).axes[0]
+        for band, collection in zip(BANDS[:2], axes.collections, strict=True):
             corners = collection.get_paths()[0].vertices
             y_at_end = corners[corners[:, 0] == TIME[-1], 1]
             quartiles = np.percentile(band.values[:, -1], [25, 75])
             assert (y_at_end.min(), y_at_end.max()) == pytest.approx(tuple(quartiles))
+
+    def test_more_than_two_bands_are_bars_between_the_quartiles(self) -> None:
+        axes = plot_bands(BANDS).axes[0]
+        assert all(isinstance(collection, LineCollection) for collection in axes.collections)
+        for band, bars in zip(BANDS, axes.collections, strict=True):
+            low, high = np.percentile(band.values, [25, 75], axis=0)
+            for (time, start), (_, end) in bars.get_segments():
+                assert start == pytest.approx(np.interp(time, TIME, low))
+                assert end == pytest.approx(np.interp(time, TIME, high))
+
+    def test_bars_of_different_bands_are_at_different_times(self) -> None:
+        axes = plot_bands(BANDS).axes[0]
+        times = [bar[0, 0] for bars in axes.collections for bar in bars.get_segments()]
+        assert np.diff(np.sort(times)).min() > 1.0
 
     def test_the_line_of_a_band_is_the_median(self) -> None:
         lines = list_curve_lines(plot_bands(BANDS).axes[0])

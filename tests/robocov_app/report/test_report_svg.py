@@ -114,7 +114,7 @@ def test_the_same_figure_gives_the_same_bytes() -> None:
 
 @pytest.mark.parametrize("build", [build_cost_plots, build_final_cost_plots])
 def test_panels_of_a_map_have_the_same_axis(build) -> None:
-    finals = {("rooms", 4): 4.0, ("rooms", 8): 5.0, ("hall", 4): 0.5, ("hall", 8): 0.7}
+    finals = {("rooms", 4): 40.0, ("rooms", 8): 50.0, ("hall", 4): 0.5, ("hall", 8): 0.7}
     runs = [
         build_run(seed=seed, final=final + 0.1 * seed, map_name=map_name, robots=robots)
         for (map_name, robots), final in finals.items()
@@ -126,3 +126,26 @@ def test_panels_of_a_map_have_the_same_axis(build) -> None:
     assert ticks["rooms, 4 robots"] == ticks["rooms, 8 robots"]
     assert ticks["hall, 4 robots"] == ticks["hall, 8 robots"]
     assert ticks["rooms, 4 robots"] != ticks["hall, 4 robots"]
+
+
+def test_all_cost_axes_are_the_same_and_begin_at_0() -> None:
+    runs = [
+        build_run(seed=seed, final=final + 0.1 * seed, map_name=map_name)
+        for map_name, final in (("rooms", 4.0), ("hall", 3.0))
+        for seed in range(3)
+    ]
+    result = build_recorded_result(runs)
+    plots = {plot.title: plot.svg for plot in build_cost_plots(result, choose_group_styles(result), "k")}
+    ticks = {title: re.findall(r">([\d.]+)</text>", svg) for title, svg in plots.items()}
+    assert ticks["rooms"] == ticks["hall"]
+    # The first 0 is that of the time axis.
+    assert ticks["rooms"].count("0") == 2
+
+
+def test_a_panel_of_costs_has_a_smaller_version_for_phones() -> None:
+    result = build_recorded_result([build_run(seed=seed, map_name=name) for name in "ab" for seed in (0, 1)])
+    for plot in build_cost_plots(result, choose_group_styles(result), "k"):
+        widths = [
+            float(ElementTree.fromstring(svg).get("viewBox").split()[2]) for svg in (plot.svg, plot.narrow)
+        ]
+        assert widths[0] > 1.3 * widths[1]

@@ -1,5 +1,6 @@
 """Plots of mean distances over time, and of final mean distances."""
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -14,6 +15,7 @@ from robocov_app.figures.page import ValueAxis
 from robocov_app.report.analysis.scaling import compute_medians, scale_distances
 from robocov_app.report.plots.plot import (
     FINAL_DISTANCE_LABEL,
+    LARGE_PANEL_SIZE_PX,
     SCALED_DISTANCE_LABEL,
     DrawnPanel,
     GroupStyles,
@@ -25,6 +27,8 @@ from robocov_app.report.plots.plot import (
 )
 from robocov_app.report.results.result import ReportedResult, ReportedRun
 
+MIN_COMMON_FRACTION = 0.4
+"""Maps have a common axis if the curves of each reach at least this fraction of it."""
 _CURVE_SAMPLES = 121
 """Number of samples of a curve over time, about one for every three pixels."""
 
@@ -43,7 +47,9 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
     -------
     list of PagePlot
         First all settings together, as fractions of the values at the start, then each setting. Panels
-        without any known cost are left out. The panels of a map have the same axes.
+        without any known cost are left out. All axes of distances are the same and begin at 0, unless the
+        curves of a map would use less than `MIN_COMMON_FRACTION` of it; then only panels of a map have the
+        same axis.
     """
     times, distances = _sample_histories(result)
     drawn_panels = []
@@ -58,10 +64,23 @@ def build_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> l
         if bands:
             values = np.concatenate([compute_quartiles(band.values) for band in bands])
             drawn_panels.append(DrawnPanel(panel, bands, values))
-    ranges = compute_map_ranges(drawn_panels)
+    maxima = _choose_axis_maxima(drawn_panels)
     return [
-        _build_cost_plot(drawn.panel, drawn.contents, ranges[drawn.panel.map_name]) for drawn in drawn_panels
+        _build_cost_plot(drawn.panel, drawn.contents, maxima[drawn.panel.map_name]) for drawn in drawn_panels
     ]
+
+
+def _choose_axis_maxima(panels: Sequence[DrawnPanel[Band]]) -> dict[str, float]:
+    """Choose the largest value on the axis of each map, by `Panel.map_name`.
+
+    All maps have the same axis, unless the curves of one would be too low to read.
+    """
+    maxima = {name: high for name, (_, high) in compute_map_ranges(panels).items()}
+    map_maxima = [high for name, high in maxima.items() if name]
+    if not map_maxima or min(map_maxima) < MIN_COMMON_FRACTION * max(map_maxima):
+        return maxima
+    common = max(map_maxima)
+    return {name: common if name else high for name, high in maxima.items()}
 
 
 def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[ReportedRun, FloatArray]]:
@@ -85,8 +104,8 @@ def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[Reported
     return times, distances
 
 
-def _build_cost_plot(panel: Panel, bands: list[Band], value_range: tuple[float, float]) -> PagePlot:
-    """Build the plot of the bands in a panel, with an axis for a range of values."""
+def _build_cost_plot(panel: Panel, bands: list[Band], maximum: float) -> PagePlot:
+    """Build the plot of the bands in a panel, with an axis from 0 to a maximum."""
     if panel.is_together:
         label = "mean distance / initial mean distance"
         unit = ""
@@ -96,8 +115,8 @@ def _build_cost_plot(panel: Panel, bands: list[Band], value_range: tuple[float, 
     texts = "; ".join(_describe_band(band, unit) for band in bands)
     description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
     # The unit is in the label of the axis, because there is little space for the names of the curves.
-    draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(label, value_range=value_range))
-    return build_panel_plot(panel, description, draw)
+    draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(label, value_range=(0.0, maximum)))
+    return build_panel_plot(panel, description, draw, size=LARGE_PANEL_SIZE_PX)
 
 
 def _describe_band(band: Band, unit: str) -> str:

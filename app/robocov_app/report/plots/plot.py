@@ -25,6 +25,8 @@ MAX_PANELS = 24
 """Maximum number of settings, or of maps, that get a panel each."""
 PANEL_SIZE_PX = (420, 290)
 """Size of a panel. On a phone it is displayed a little smaller."""
+LARGE_PANEL_SIZE_PX = (600, 380)
+"""Size of a panel with many curves, of which two fit next to each other on a wide screen."""
 WIDE_SIZE_PX = (860, 360)
 """Size of a plot that is alone in its row, if the screen is wide enough."""
 TOGETHER_TITLE = "All maps and teams together"
@@ -135,8 +137,16 @@ def compute_map_ranges(panels: Sequence[DrawnPanel[Any]]) -> dict[str, tuple[flo
     return ranges
 
 
-def build_panel_plot(panel: Panel, description: str, draw: Callable[[tuple[int, int]], Figure]) -> PagePlot:
-    """Build the plot of a panel. A panel without a title is alone in its row, and gets a second, wide SVG.
+def build_panel_plot(
+    panel: Panel,
+    description: str,
+    draw: Callable[[tuple[int, int]], Figure],
+    *,
+    size: tuple[int, int] = PANEL_SIZE_PX,
+) -> PagePlot:
+    """Build the plot of a panel.
+
+    A panel that is larger than `PANEL_SIZE_PX` gets a second SVG for small screens.
 
     Parameters
     ----------
@@ -145,14 +155,20 @@ def build_panel_plot(panel: Panel, description: str, draw: Callable[[tuple[int, 
         Description for readers who cannot see the plot.
     draw : callable
         Draws the figure at a given size, px.
+    size : (width, height), px
+        Size of a panel with a title. A panel without a title is alone in its row, and wider.
 
     Returns
     -------
     PagePlot
     """
+    text = description
     if panel.title:
-        svg = inline_svg(draw(PANEL_SIZE_PX), panel.key, f"{panel.title}: {description}")
+        text = f"{panel.title}: {description}"
+    else:
+        size = WIDE_SIZE_PX
+    svg = inline_svg(draw(size), panel.key, text)
+    if size == PANEL_SIZE_PX:
         return PagePlot(panel.title, svg)
-    wide_svg = inline_svg(draw(WIDE_SIZE_PX), panel.key, description)
-    narrow_svg = inline_svg(draw(PANEL_SIZE_PX), f"{panel.key}1", description)
-    return PagePlot(panel.title, wide_svg, narrow_svg)
+    narrow_svg = inline_svg(draw(PANEL_SIZE_PX), f"{panel.key}-narrow", text)
+    return PagePlot(panel.title, svg, narrow_svg)
