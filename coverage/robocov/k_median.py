@@ -76,7 +76,8 @@ def seed_sources(table: FloatArray, source_count: int, rng: np.random.Generator)
 
     Notes
     -----
-    This is k-means++ (Arthur and Vassilvitskii 2007), with distances in place of squared distances.
+    This is the seeding of k-means++ (Arthur and Vassilvitskii 2007) for the k-median problem: with distances
+    in place of squared distances.
     """
     sources: list[int] = []
     distances = np.ones(len(table))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from math import isfinite
 from typing import Any, Protocol, runtime_checkable
 
@@ -23,6 +23,12 @@ from robocov.voronoi.delaunay import Mesh
 @dataclass(eq=False)
 class OwnView:
     """Everything that one robot knows.
+
+    Parameters
+    ----------
+    cells : VoronoiPartition
+        Voronoi cells of the team. The view contains only the cell of the robot itself, as `cell` and
+        `centroid`.
 
     Attributes
     ----------
@@ -71,11 +77,15 @@ class OwnView:
     obstacle_point: FloatArray | None
     region: Region
     time: float
-    _cells: VoronoiPartition
+    cells: InitVar[VoronoiPartition]
     heading: float | None = None
     memory: Any = None
     messages: Sequence[ReceivedMessage] = ()
     sent_messages: list[Message] = field(default_factory=list)
+
+    def __post_init__(self, cells: VoronoiPartition) -> None:
+        # The polygons of cells are computed when they are first used, which many controllers never do.
+        self._cells = cells
 
     def send(self, payload: Any, size: int) -> None:
         """Send a message to all robots in communication range.
@@ -178,7 +188,7 @@ class IndividualControllerAdapter:
 
     Examples
     --------
-    >>> from dataclasses import dataclass, field
+    >>> from dataclasses import InitVar, dataclass, field
     >>> import robocov as rc
     >>> @dataclass(frozen=True)
     ... class Homing:
@@ -301,7 +311,7 @@ def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory:
         obstacle_point=obstacle_point,
         region=seen.region,
         time=seen.time,
-        _cells=cells,
+        cells=cells,
         heading=None if seen.steering is None else float(seen.steering[robot, 0]),
         memory=memory,
         messages=seen.get_messages(robot),

@@ -180,15 +180,21 @@ def find_optimum(
     Notes
     -----
     The coverage cost (22) has many local minima. Each restart first chooses from several hundred candidate
-    positions, between which and the sites it knows the geodesic distances: it draws positions at random by
-    k-median++, and improves them by Lloyd's iteration and then by interchange, which escapes most of the
-    local minima. From the chosen positions, it descends the exact cost. The best of all restarts is not
+    positions, whose geodesic distances to the sites are known. It draws them at random by the seeding of
+    k-means++ [1]_, applied to the k-median problem: with a probability proportional to the distance, rather
+    than to its square. Then it improves them by Lloyd's iteration, and by interchange, which escapes most of
+    the local minima. From the chosen positions, it descends the exact cost. The best of all restarts is not
     proven to be the global minimum. The more restarts agree on it, the more likely it is.
 
     If the free space has several components, the robots occupy the largest ones, to cover as much area as
     possible, and minimize the cost there. (The cost alone would be lowest with all robots in the smallest
     room.) Gaps that are narrower than a robot separate components; see `CoverageCost`. Components that are
     too small for a robot, or contain no site of the lattice, are ignored.
+
+    References
+    ----------
+    .. [1] D. Arthur and S. Vassilvitskii, "k-means++: The advantages of careful seeding", Proceedings of the
+       18th ACM-SIAM Symposium on Discrete Algorithms (SODA), 2007, pp. 1027-1035.
 
     Examples
     --------

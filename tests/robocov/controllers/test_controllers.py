@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import robocov as rc
 from robocov.controllers import (
     CONTROLLERS,
     Adaptive,
@@ -45,6 +46,17 @@ class Homing:
         )
         wall = 0.0 if own.obstacle_point is None else own.position - own.obstacle_point
         return pull + 0.1 * away + 0.1 * wall + 0.01 * own.cell.mean(axis=0)
+
+
+class ViewKeeping:
+    """An individual controller that keeps the last view of each robot."""
+
+    def __init__(self) -> None:
+        self.views: dict[int, OwnView] = {}
+
+    def force(self, own: OwnView) -> np.ndarray:
+        self.views[own.number] = own
+        return own.centroid - own.position
 
 
 ROOM = Environment("room", tuple((x, y) for x, y in REGION.vertices.tolist()))
@@ -263,3 +275,11 @@ def test_lloyd_drives_within_its_limits() -> None:
     controller = Lloyd()
     force = controller.decide(seen, controller.begin(REGION, Team.homogeneous(1))).forces
     np.testing.assert_allclose(force, 2.0 * heading[None], rtol=1e-9)
+
+
+def test_the_view_of_a_robot_prints_nothing_about_the_cells_of_others() -> None:
+    controller = ViewKeeping()
+    rc.run(ROOM, controller, robots=2, duration=0.1)
+    text = repr(controller.views[1])
+    assert text.startswith("OwnView(number=1, position=")
+    assert "cells" not in text
