@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from built_pages import HAS_SPHINX, find_broken_links
+from built_pages import HAS_SPHINX, UnlinkedNames, find_broken_links
 from hatchling.builders.sdist import SdistBuilder
 from hatchling.builders.wheel import WheelBuilder
 
@@ -143,6 +143,10 @@ def test_the_handbook_in_the_wheel_has_valid_links_and_a_complete_reference(unpa
     assert all(f'id="robocov_app.learning.{name}"' in reference["learning"] for name in learning.__all__)
     assert "Play or pause" in reference["keys"]
     assert "Undo" in reference["keys"]
+    for text in reference.values():
+        unlinked = UnlinkedNames(text)
+        assert not unlinked.listed_names, "names to see also are links"
+        assert not {name.split(".")[-1] for name in unlinked.names}.intersection(rc.__all__)
     assert 'href="#obstaclepath"' in reference["formats"], "types link to their tables"
     assert ">-1<" not in reference["formats"], "placeholders are no defaults"
     assert ">Type<" not in "".join(reference.values()), "descriptions of properties are not split at a colon"

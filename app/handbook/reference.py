@@ -60,6 +60,7 @@ OTHER_NAMES = {
         "robocov.environment.Start",
         "robocov.mapfile.check.MapReport",
         "robocov.environment.Gap",
+        "robocov.environment.find_narrowest_gap",
         "robocov.errors.Issue",
     ),
     "Controllers": (
@@ -130,16 +131,32 @@ def replace_signature(
 def find_public_name(
     app: Sphinx, env: BuildEnvironment, node: pending_xref, content: TextElement
 ) -> nodes.reference | None:
-    """Return a link to a name that another module mentions without its package, as in ``make_controller``."""
+    """Return a link to a name that a docstring mentions without its package, as in ``make_controller``.
+
+    Attributes that have no entry of their own link to their class, as in ``Decision.memory``.
+    """
     if node.get("refdomain") != "py":
         return None
-    for package in ("robocov", "robocov_app.learning"):
-        link = env.domains.python_domain.resolve_xref(
-            env, node["refdoc"], app.builder, node["reftype"], f"{package}.{node['reftarget']}", node, content
-        )
-        if link is not None:
-            return link
+    target = node["reftarget"].partition("(")[0]
+    owner = target.rpartition(".")[0]
+    for name in filter(None, (target, owner)):
+        for documented_name in list_documented_names(name):
+            link = env.domains.python_domain.resolve_xref(
+                env, node["refdoc"], app.builder, node["reftype"], documented_name, node, content
+            )
+            if link is not None:
+                return link
     return None
+
+
+def list_documented_names(name: str) -> list[str]:
+    """Return the full names under which a name may be documented in the reference."""
+    names = [f"{package}.{name}" for package in ("robocov", "robocov_app.learning")]
+    for others in OTHER_NAMES.values():
+        names += [other for other in others if other.rpartition(".")[2] == name]
+    if name in rc.__all__ and not callable(getattr(rc, name)):
+        names.append(f"{find_documenting_module(name)}.{name}")
+    return names
 
 
 # Commands and keys

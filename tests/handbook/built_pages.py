@@ -36,6 +36,48 @@ class PageLinks(HTMLParser):
                 self.identifiers.add(value)
 
 
+class UnlinkedNames(HTMLParser):
+    """The names of the program in a page that are not links.
+
+    Attributes
+    ----------
+    names : list of str
+        Names, in the order of the page.
+    listed_names : list of str
+        Those in lists of names to see also.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.names: list[str] = []
+        self.listed_names: list[str] = []
+        self._open_tags: list[str] = []
+        self._is_name = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("a", "dt", "code"):
+            self._open_tags.append(tag)
+        if tag == "code":
+            classes = (dict(attrs).get("class") or "").split()
+            self._is_name = "py-obj" in classes and "a" not in self._open_tags
+            if self._is_name:
+                self.names.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("a", "dt", "code") and tag in self._open_tags:
+            while self._open_tags.pop() != tag:
+                pass
+        if tag == "code" and self._is_name:
+            self._is_name = False
+            if "dt" in self._open_tags:
+                self.listed_names.append(self.names[-1])
+
+    def handle_data(self, data: str) -> None:
+        if self._is_name:
+            self.names[-1] += data
+
+
 def find_broken_links(site: Path) -> list[str]:
     """Return the links within a site that lead to no file, or to a place that the file does not have."""
     pages = {file.resolve(): PageLinks(file.read_text(encoding="utf-8")) for file in site.rglob("*.html")}

@@ -38,7 +38,7 @@ class Run:
     history : CostHistory
         The coverage cost over the run.
     summary : dict
-        Results of the run; see `robocov.metrics.summarize`.
+        Results of the run; see `summarize`.
     """
 
     record: Record

@@ -77,6 +77,11 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     Gap or None
         The narrowest passage. None if there is no passage.
 
+    See Also
+    --------
+    Gap : A narrow passage.
+    check_map : Check a map, for example for passages that are narrower than a robot.
+
     Examples
     --------
     >>> rooms = shapely.box(0, 0, 10, 4) - shapely.box(4.9, 0, 5.1, 3.2)

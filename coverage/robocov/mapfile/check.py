@@ -77,7 +77,7 @@ class MapReport:
     radius : float, m
         Radius of the robots.
     narrowest_gap : Gap or None
-        Narrowest passage of the free space; see `robocov.environment.find_narrowest_gap`.
+        Narrowest passage of the free space; see `find_narrowest_gap`.
     starts : tuple of StartReport
         Starts in the file of the map.
     warnings : tuple of str

@@ -342,7 +342,7 @@ class Record(Drawable):
         Parameters
         ----------
         summary : mapping or None
-            The summary of the run; see `metrics.summarize`.
+            The summary of the run; see `summarize`.
         lattice : int or None
             Number of lattice sites along each side of the map with which the cost was computed.
 
