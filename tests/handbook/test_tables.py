@@ -73,3 +73,11 @@ def test_tables_of_all_these_pages_are_found() -> None:
     own_controller_page = (list_handbook_pages()[0].parent / "own-controller.md").read_text(encoding="utf-8")
     table_count = sum(table.page.stem == "own-controller" for table in TABLES)
     assert table_count == own_controller_page.count("mean distance  above best")
+
+
+def test_the_exercise_with_a_dragged_robot_prints_its_costs(capsys: pytest.CaptureFixture[str]) -> None:
+    (page,) = (page for page in list_handbook_pages() if page.stem == "exercises")
+    blocks = list(find_code_blocks(page.read_text(encoding="utf-8")))
+    (number,) = (number for number, block in enumerate(blocks) if "dragged = rc.run" in block.code)
+    exec(blocks[number].code, {})
+    assert capsys.readouterr().out == blocks[number + 1].code
