@@ -87,10 +87,10 @@ def main(arguments: list[str] | None = None) -> int:
         hint = f"did you mean {similar[0]!r}?" if similar else f"known are {', '.join(COMMANDS)}"
         return _print_error(f"unknown command {name!r}: {hint}")
     # Calls from other code, such as tests, stay in this process.
-    return _run_protected(name, rest, may_supervise=arguments is None)
+    return _run_subcommand(name, rest, may_supervise=arguments is None)
 
 
-def _run_protected(name: str, rest: list[str], *, may_supervise: bool) -> int:
+def _run_subcommand(name: str, rest: list[str], *, may_supervise: bool) -> int:
     """Run a subcommand so that a user's controller cannot hide its failure, and return its exit status."""
     from robocov_app.terminal.standard_streams import StandardStreams
     from robocov_app.terminal.supervision import (

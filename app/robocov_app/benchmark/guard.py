@@ -100,7 +100,7 @@ def install_guard(
             return
         is_checking = True
         try:
-            if callers.are_trusted(sys._getframe(1)):
+            if callers.is_trusted_call(sys._getframe(1)):
                 return
         finally:
             is_checking = False
@@ -135,8 +135,8 @@ class _Callers:
         folders += [str(Path(path).parent) for path in (robocov.__file__, robocov_app.__file__)]
         self._library_folders = tuple(os.path.realpath(folder) + os.sep for folder in folders)
 
-    def are_trusted(self, frame: FrameType | None) -> bool:
-        """Return whether a compiler or an import called a frame, and no code of the controller is between."""
+    def is_trusted_call(self, frame: FrameType | None) -> bool:
+        """Return whether a compiler or an import called a frame, without own code in between."""
         while frame is not None:
             code = frame.f_code
             file = _find_file(code)

@@ -262,7 +262,7 @@ def _build_overview_cells(
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
     """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
-    plotted = _select_plotted(ranked, entries)
+    plotted = _select_ratings_to_plot(ranked, entries)
     family_head, family_rows = ratings.build_family_rows(ranked)
     return {
         "name": name,
@@ -315,7 +315,7 @@ def _build_rating_table(caption: str, track_ratings: Sequence[Rating], entries: 
     return PageTable(caption, ratings.HEAD, rows, text_columns=frozenset({1}))
 
 
-def _select_plotted(track_ratings: Sequence[Rating], entries: _Entries) -> list[Rating]:
+def _select_ratings_to_plot(track_ratings: Sequence[Rating], entries: _Entries) -> list[Rating]:
     """Return the ratings of bundled results, and the best of the others, in the order of their scores."""
     others = [rating for rating in track_ratings if rating.label not in entries.bundled]
     omitted = {rating.label for rating in others[MAX_PLOTTED_ENTRIES:]}

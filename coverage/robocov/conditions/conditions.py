@@ -113,7 +113,7 @@ class Conditions:
     --------
     >>> import robocov as rc
     >>> conditions = rc.Conditions(failures=((2, 10.0),))
-    >>> conditions.find_working(12.0, 3)
+    >>> conditions.find_working_robots(12.0, 3)
     array([ True, False,  True])
     """
 
@@ -253,7 +253,7 @@ class Conditions:
             stops[failure.robot - 1] = min(stops[failure.robot - 1], failure.time)
         return starts, stops
 
-    def find_working(self, time: float | FloatArray, robot_count: int) -> BoolArray:
+    def find_working_robots(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that are present and have not failed.
 
         Parameters
@@ -268,9 +268,9 @@ class Conditions:
         (n,) or (k, n) bool array
             Mask of the robots, at each time.
         """
-        return self.find_present(time, robot_count) & ~self.find_failed(time, robot_count)
+        return self.find_present_robots(time, robot_count) & ~self.find_failed_robots(time, robot_count)
 
-    def find_failed(self, time: float | FloatArray, robot_count: int) -> BoolArray:
+    def find_failed_robots(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that have failed.
 
         Parameters
@@ -289,7 +289,7 @@ class Conditions:
         # The last axis is that of the robots.
         return np.asarray(stops <= np.asarray(time)[..., None] + TIME_TOLERANCE_S)
 
-    def find_present(self, time: float | FloatArray, robot_count: int) -> BoolArray:
+    def find_present_robots(self, time: float | FloatArray, robot_count: int) -> BoolArray:
         """Find the robots that have joined the team, including those that have failed since.
 
         Parameters

@@ -37,7 +37,7 @@ class Failure(NamedTuple):
     --------
     >>> import robocov as rc
     >>> conditions = rc.Conditions(failures=(rc.Failure(robot=2, time=10.0),))
-    >>> conditions.find_working(12.0, 3)
+    >>> conditions.find_working_robots(12.0, 3)
     array([ True, False,  True])
     """
 
@@ -70,7 +70,7 @@ class Join(NamedTuple):
     --------
     >>> import robocov as rc
     >>> conditions = rc.Conditions(joins=(rc.Join(robot=3, time=5.0, position=(2.0, 1.0)),))
-    >>> conditions.find_working(4.0, 3)
+    >>> conditions.find_working_robots(4.0, 3)
     array([ True,  True, False])
     """
 

@@ -11,7 +11,7 @@ from robocov.controllers.driving import (
     clip_lengths,
     collect_obstacle_points,
     compute_approach_velocities,
-    find_nearest_allowed,
+    find_nearest_allowed_points,
     update_returns,
 )
 from robocov.controllers.gains import gain, response_time_gain
@@ -146,7 +146,7 @@ class Barrier(BaseController):
         robot_planes = self._build_robot_planes(seen, team, near, neighbor_velocities)
         obstacle_points = collect_obstacle_points(seen, returns)
         obstacle_planes = self._build_obstacle_planes(seen, team, obstacle_points)
-        nearest, is_feasible = find_nearest_allowed(
+        nearest, is_feasible = find_nearest_allowed_points(
             desired,
             np.concatenate([robot_planes.normals, obstacle_planes.normals], axis=1),
             np.concatenate([robot_planes.limits, obstacle_planes.limits], axis=1),

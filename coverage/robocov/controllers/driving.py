@@ -251,15 +251,15 @@ def limit_approach_speed(
     limits = np.minimum(rate * gap, np.sqrt(2.0 * braking * np.maximum(gap, 0.0)))
     # At full speed away from one object, a robot could not avoid another one.
     limits = np.maximum(limits, -0.5 * max_speed[:, None])
-    limited, is_feasible = find_nearest_allowed(velocities, -normals, limits, max_speed)
+    limited, is_feasible = find_nearest_allowed_points(velocities, -normals, limits, max_speed)
     if is_feasible.all():
         return limited
-    not_approaching, _ = find_nearest_allowed(velocities, -normals, np.maximum(limits, 0.0), max_speed)
+    not_approaching, _ = find_nearest_allowed_points(velocities, -normals, np.maximum(limits, 0.0), max_speed)
     return np.where(is_feasible[:, None], limited, not_approaching)
 
 
 @kernel
-def find_nearest_allowed(
+def find_nearest_allowed_points(
     points: FloatArray, normals: FloatArray, offsets: FloatArray, radius: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
     """Find the points nearest to desired ones in the intersections of discs and half planes.

@@ -129,14 +129,14 @@ class Record(Drawable):
         """Mask of the robots that are present and have not failed, (T, n) bool; read-only."""
         if self.conditions is None:
             return self.present
-        return _make_read_only(self.conditions.find_working(self.time, len(self.team)))
+        return _make_read_only(self.conditions.find_working_robots(self.time, len(self.team)))
 
     @cached_property
     def present(self) -> BoolArray:
         """Mask of the robots that have joined the team, including failed ones, (T, n) bool; read-only."""
         if self.conditions is None:
             return _make_read_only(np.ones(self.positions.shape[:2], dtype=bool))
-        return _make_read_only(self.conditions.find_present(self.time, len(self.team)))
+        return _make_read_only(self.conditions.find_present_robots(self.time, len(self.team)))
 
     @cached_property
     def traveled(self) -> BoolArray:

@@ -338,7 +338,7 @@ class Simulation:
         if self.conditions is None or not self.conditions.joins:
             return ()
         times = np.array([self.time - self.dt, self.time])
-        was_present, is_present = self.conditions.find_present(times, len(self.team))
+        was_present, is_present = self.conditions.find_present_robots(times, len(self.team))
         robots = np.flatnonzero(is_present & ~was_present & self.working)
         return tuple(
             JoinedRobot(
@@ -576,5 +576,5 @@ def _check_robots_fit(
     if state.velocities is not None:
         # Bodies in contact overlap a little, and a moving robot may be in contact.
         max_overlap = 2.0 * MAX_PENETRATION_M
-    working = None if conditions is None else conditions.find_working(time, len(state))
+    working = None if conditions is None else conditions.find_working_robots(time, len(state))
     require_free_starts(environment.at(time), state.positions, team, max_overlap, working)

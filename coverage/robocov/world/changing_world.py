@@ -76,8 +76,8 @@ class ChangingWorld:
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.steering = initialize_steering(team, self.velocities, steering)
-        self.working = conditions.find_working(time, len(team))
-        self._failed = conditions.find_failed(time, len(team))
+        self.working = conditions.find_working_robots(time, len(team))
+        self._failed = conditions.find_failed_robots(time, len(team))
         is_absent = ~(self.working | self._failed)
         for join in conditions.joins:
             if join.position is not None and is_absent[join.robot - 1]:
@@ -149,8 +149,8 @@ class ChangingWorld:
 
     def _change_team(self, time: float) -> None:
         """Apply the changes of the team up to a time: stop robots that fail, and place robots that join."""
-        working = self._conditions.find_working(time, len(self.team))
-        failed = self._conditions.find_failed(time, len(self.team))
+        working = self._conditions.find_working_robots(time, len(self.team))
+        failed = self._conditions.find_failed_robots(time, len(self.team))
         if (working == self.working).all() and (failed == self._failed).all():
             return
         is_present = self.working | self._failed

@@ -99,7 +99,7 @@ def test_a_team_must_contain_the_robots_of_all_events() -> None:
 
 def test_robots_work_from_joining_to_failing() -> None:
     conditions = Conditions(failures=((1, 5.0), (3, 7.0)), joins=((2, 4.0), (3, 6.0)))
-    working = conditions.find_working(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
+    working = conditions.find_working_robots(np.array([0.0, 3.99, 4.0, 5.0, 6.5, 7.0]), 4)
     assert working.astype(int).tolist() == [
         [1, 0, 0, 1],
         [1, 0, 0, 1],
@@ -108,17 +108,17 @@ def test_robots_work_from_joining_to_failing() -> None:
         [0, 1, 1, 1],
         [0, 1, 0, 1],
     ]
-    assert conditions.find_failed(7.0, 4).tolist() == [True, False, True, False]
-    assert conditions.find_present(5.0, 4).tolist() == [True, True, False, True]
+    assert conditions.find_failed_robots(7.0, 4).tolist() == [True, False, True, False]
+    assert conditions.find_present_robots(5.0, 4).tolist() == [True, True, False, True]
 
 
 def test_rounding_of_time_does_not_shift_events_by_a_step() -> None:
     conditions = Conditions(failures=((1, 0.8),))
     time = float(np.add.accumulate(np.full(8, 0.1))[-1])
     assert time < 0.8
-    assert conditions.find_failed(time, 1).all()
-    assert not conditions.find_failed(0.79, 1).any()
-    assert Conditions(joins=((1, 0.8),)).find_working(time, 2).all()
+    assert conditions.find_failed_robots(time, 1).all()
+    assert not conditions.find_failed_robots(0.79, 1).any()
+    assert Conditions(joins=((1, 0.8),)).find_working_robots(time, 2).all()
 
 
 def test_lifetimes_are_exponential() -> None:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
 from robocov.controllers.barrier import BarrierMemory
-from robocov.controllers.driving import find_nearest_allowed
+from robocov.controllers.driving import find_nearest_allowed_points
 from robocov.environment import Environment
 from robocov.mapfile import load_map
 from robocov.observation import Decision, Observations, Scanning
@@ -57,7 +57,7 @@ def list_candidates(
 def test_the_quadratic_programme_is_solved_exactly(seed: int, m: int) -> None:
     """Compare with the best of all candidates."""
     desired, normals, offsets, radius = sample_half_planes(seed, 5, m)
-    best, feasible = find_nearest_allowed(desired, normals, offsets, radius)
+    best, feasible = find_nearest_allowed_points(desired, normals, offsets, radius)
     for i in range(5):
         real = np.isfinite(offsets[i]) & np.isfinite(normals[i, :, 0])
         candidates = list_candidates(desired[i], normals[i], offsets[i], radius[i])
@@ -76,7 +76,7 @@ def test_the_solution_agrees_with_a_general_solver() -> None:
     is_empty = np.isinf(offsets) | np.isnan(normals[..., 0])
     normals[is_empty] = (1.0, 0.0)
     offsets[is_empty] = 9.0
-    best, feasible = find_nearest_allowed(desired, normals, offsets, radius)
+    best, feasible = find_nearest_allowed_points(desired, normals, offsets, radius)
     assert 5 < feasible.sum() < 20
     for i in np.flatnonzero(feasible):
         solution = minimize(
@@ -93,12 +93,12 @@ def test_the_solution_agrees_with_a_general_solver() -> None:
 
 
 def test_no_robots_and_no_constraints_are_valid() -> None:
-    best, feasible = find_nearest_allowed(
+    best, feasible = find_nearest_allowed_points(
         np.zeros((0, 2)), np.zeros((0, 3, 2)), np.zeros((0, 3)), np.zeros(0)
     )
     assert best.shape == (0, 2)
     assert feasible.shape == (0,)
-    best, feasible = find_nearest_allowed(
+    best, feasible = find_nearest_allowed_points(
         np.array([[3.0, 4.0]]), np.zeros((1, 0, 2)), np.zeros((1, 0)), np.ones(1)
     )
     np.testing.assert_allclose(best, [[0.6, 0.8]])

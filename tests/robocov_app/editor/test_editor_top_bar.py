@@ -90,6 +90,23 @@ def test_every_tool_has_a_button_with_its_key_and_an_icon(driver: EditorDriver) 
         assert [widget.key for widget in selected] == [f"tool:{tool.name}"]
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.25, 1.5, 2.0])
+def test_names_and_keys_on_the_rail_do_not_touch(tmp_path: Path, scale: float) -> None:
+    with open_editor(tmp_path, size=(round(1280 * scale), round(720 * scale)), scale=scale) as driver:
+        frame = driver.copy_frame()
+        for tool in driver.editor.toolbox.by_name:
+            button = driver.window.tool_rail.ui.find("button", f"tool:{tool}")
+            left, top, width, height = button.rect
+            # The edges of the button that is in use do not count.
+            margin = round(3 * scale)
+            rows = slice(top + margin, top + height - margin)
+            columns = slice(left + round(32 * scale), left + width - margin)
+            pixels = frame[rows, columns].astype(int)
+            has_ink = (abs(pixels - pixels[0, 0]).max(axis=2) > 40).any(axis=0)
+            inked_columns = np.flatnonzero(has_ink)
+            assert np.diff(inked_columns).max() >= 6 * scale, tool
+
+
 def test_presses_on_bar_and_rail_do_not_draw(driver: EditorDriver) -> None:
     driver.press_key("w")
     left, top, width, height = driver.window.layout.bar

@@ -300,6 +300,25 @@ class TestCrowds:
         assert inner_radii["9"] > min_numbered_radius
         assert inner_radii[""] < min_numbered_radius
 
+    def test_a_fine_screen_shows_smaller_numbers(self, monkeypatch):
+        """At scale 2, as on phones, digits of 10 px are sharp; at scale 1, they would be 5 px high."""
+        texts = []
+        render_disc = sprites.render_disc
+
+        def render_and_note_text(radius, shift, *, text, **style):
+            texts.append(text)
+            return render_disc(radius, shift, text=text, **style)
+
+        monkeypatch.setattr(sprites, "render_disc", render_and_note_text)
+        for scale, has_numbers in ((1.0, False), (2.0, True)):
+            painter = Painter(SQUARE, (640, 480), LIGHT, scale=scale)
+            center = np.array([320.0, 240.0])
+            positions = painter.camera.to_world(center + scale * np.array([[0.0, 0.0], [11.0, 0.0]]))
+            team = Team.homogeneous(2, radius=0.01)
+            texts.clear()
+            painter.render_frame(replace(build_scene(positions), team=team))
+            assert ({"1", "2"} <= set(texts)) == has_numbers
+
     def test_start_marks_shrink_in_a_crowd(self):
         crowd = 4.0 + 0.02 * np.arange(20).reshape(10, 2)
         radii = []

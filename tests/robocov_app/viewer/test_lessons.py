@@ -417,7 +417,7 @@ def test_curves_of_branches_are_hidden_while_a_question_is_open(tmp_path: Path) 
             driver.press_key("2")
             driver.run_frames(30)
             assert guide.player.state == "ended"
-            guide.player.go_to(1)
+            guide.player.show_chapter(1)
         # The user takes over, and sees the curve of the chapter that has just been played.
         driver.press_key("f2")
         driver.run_frames(10)

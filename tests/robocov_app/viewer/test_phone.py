@@ -158,7 +158,7 @@ def test_answers_are_large_enough_for_fingers(upright_phone: Driver) -> None:
     player = get_player(upright_phone)
     numbers = [k for k, chapter in enumerate(player.lesson.chapters) if chapter.question is not None]
     for number in numbers:
-        player.go_to(number)
+        player.show_chapter(number)
         upright_phone.settle()
         boxes = [
             area.box
@@ -200,7 +200,7 @@ def test_text_that_does_not_fit_is_scrolled(tmp_path: Path) -> None:
     with open_phone(tmp_path, LANDSCAPE) as driver:
         run_page_command(driver, "tour")
         player = get_player(driver)
-        player.go_to(next(k for k, chapter in enumerate(player.lesson.chapters) if chapter.question))
+        player.show_chapter(next(k for k, chapter in enumerate(player.lesson.chapters) if chapter.question))
         driver.settle()
         view = pygame.Rect(driver.window.layout.panel)
         last = f"answer:{len(player.chapter.question.answers)}"  # type: ignore[union-attr]

@@ -14,6 +14,7 @@ from PIL import Image
 from sample_sessions import RAPF, start_session
 
 from robocov_app.storage.settings import FOLDER_VARIABLE
+from robocov_app.toolkit.commands.palette import list_options
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.window.status import describe_cursor
 
@@ -211,6 +212,21 @@ def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     driver.press_key("return")
     assert driver.session.timeline.end_time > 0.0
     assert not dialogs.is_open
+
+
+def test_the_palette_says_whether_a_video_would_start_or_stop(driver: Driver) -> None:
+    command = driver.window.commands["video"]
+
+    def list_video_titles() -> list[str]:
+        return [option.text for option in list_options(driver.window.commands, "video")]
+
+    assert "Start recording a video" in list_video_titles()
+    driver.window.do("video")
+    assert command.current_title == "Stop recording the video"
+    assert "Stop recording the video" in list_video_titles()
+    assert "Start recording a video" not in list_video_titles()
+    driver.window.do("video")
+    assert command.current_title == "Start recording a video"
 
 
 def test_the_palette_is_navigated_by_keys(driver: Driver) -> None:

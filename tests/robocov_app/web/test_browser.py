@@ -18,6 +18,8 @@ MAPS = Path(__file__).parents[3] / "maps"
 ENTER = "\ue007"
 DOWNLOADS_HEIGHT = 32
 """Height of the bar of saved files on pages without touch, CSS px."""
+MAX_EDITS = 10
+"""Maximum number of edits that a test of the editor undoes at its end."""
 EMPTY_MAP = json.dumps(
     {
         "format": "robocov-map",
@@ -233,47 +235,83 @@ def record_messages(browser):
     return take_messages
 
 
-def test_a_phone_shows_the_map_and_controls_the_window_of_the_projector(browser, tmp_path):
+@pytest.fixture(scope="module")
+def shared_rooms(tmp_path_factory):
+    """Serve a window of the map Rooms for several tests, and yield its link."""
+    folder = tmp_path_factory.mktemp("rooms")
+    with serve_window("demo", "rooms", "--paused", "--folder", str(folder)) as link:
+        yield link
+
+
+@pytest.fixture
+def projector(browser, shared_rooms):
+    """Open a window on a projector, and also on a phone, which watches; yield the handle of the first page.
+
+    The driver is at the page of the phone.
+    """
     browser.resize(1280, 720)
-    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-        browser.driver.get(link)
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        assert not browser.find("#toast").is_displayed()
-        projector = browser.driver.current_window_handle
-        browser.driver.switch_to.new_window("tab")
-        browser.resize(390, 844, 2.0)
-        browser.set_touch(is_enabled=True)
-        browser.driver.get(link)
-        browser.wait_until(
-            lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent")
-        )
-        browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
-        assert browser.find("#line").text.startswith("You are watching Teacher 1")
-        assert list_bar_buttons(browser) == ["2 here"]
-        browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
-        browser.run_script("send({kind: 'control', to: 0})")
-        phone = browser.driver.current_window_handle
-        browser.driver.switch_to.window(projector)
-        browser.wait_until(lambda: browser.find("#toast").is_displayed())
-        assert "asks for control" in browser.find("#toast").text
-        later = browser.find_all("#toast button")[1]
-        hand_over = browser.find_all("#toast button")[0]
-        assert (hand_over.text, later.text) == ("Hand over", "Later")
-        hand_over.click()
-        browser.wait_until(lambda: get_classes(browser) == {"watching"})
-        assert not browser.find("#toast").is_displayed()
-        browser.driver.switch_to.window(phone)
-        browser.wait_until(lambda: get_classes(browser) == {"map", "phone"})
-        assert browser.run_script("return canvas.getBoundingClientRect().width") <= 390
-        browser.find("#to-tools").click()
-        wall = next(button for button in browser.find_all("#tools button") if button.text == "Wall")
-        wall.click()
-        browser.wait_until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
-        assert not browser.find("#tools").is_displayed()
-        browser.driver.close()
-        browser.driver.switch_to.window(projector)
-        assert get_canvas_size(browser) == [1280, 720], "the projector keeps its size"
-        assert not browser.read_console()
+    browser.driver.get(shared_rooms)
+    browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
+    projector = browser.driver.current_window_handle
+    browser.driver.switch_to.new_window("tab")
+    phone = browser.driver.current_window_handle
+    browser.resize(390, 844, 2.0)
+    browser.set_touch(is_enabled=True)
+    browser.driver.get(shared_rooms)
+    browser.wait_until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
+    browser.wait_until(lambda: get_classes(browser) == {"map", "phone", "watching"})
+    yield projector
+    assert not browser.read_console()
+    browser.driver.switch_to.window(phone)
+    browser.driver.close()
+    browser.driver.switch_to.window(projector)
+
+
+def request_control(browser, projector):
+    """Request control on the phone, and wait until the page of the projector shows this."""
+    browser.run_script("send({kind: 'control', to: 0})")
+    browser.driver.switch_to.window(projector)
+    browser.wait_until(lambda: browser.find("#toast").is_displayed())
+
+
+def hand_over_control(browser, projector):
+    """Request control on the phone, hand it over on the projector, and return to the phone."""
+    phone = browser.driver.current_window_handle
+    request_control(browser, projector)
+    push_button(browser, "#toast button", "Hand over")
+    browser.wait_until(lambda: get_classes(browser) == {"watching"})
+    browser.driver.switch_to.window(phone)
+    browser.wait_until(lambda: get_classes(browser) == {"map", "phone"})
+
+
+def test_a_phone_that_watches_shows_the_map_and_the_people(browser, projector):
+    assert browser.find("#line").text.startswith("You are watching Teacher 1")
+    assert list_bar_buttons(browser) == ["2 here"]
+    browser.wait_until(lambda: get_canvas_size(browser)[0] < get_canvas_size(browser)[1])
+
+
+def test_a_request_for_control_is_answered_on_the_projector(browser, projector):
+    request_control(browser, projector)
+    assert "asks for control" in browser.find("#toast").text
+    assert [button.text for button in browser.find_all("#toast button")] == ["Hand over", "Later"]
+    push_button(browser, "#toast button", "Hand over")
+    browser.wait_until(lambda: get_classes(browser) == {"watching"})
+    assert not browser.find("#toast").is_displayed()
+
+
+def test_a_phone_in_control_chooses_a_tool(browser, projector):
+    hand_over_control(browser, projector)
+    assert browser.run_script("return canvas.getBoundingClientRect().width") <= 390
+    browser.find("#to-tools").click()
+    push_button(browser, "#tools button", "Wall")
+    browser.wait_until(lambda: "Wall" in browser.find("#status").get_property("textContent"))
+    assert not browser.find("#tools").is_displayed()
+
+
+def test_the_projector_keeps_its_size_while_a_phone_is_in_control(browser, projector):
+    hand_over_control(browser, projector)
+    browser.driver.switch_to.window(projector)
+    assert get_canvas_size(browser) == [1280, 720]
 
 
 def list_bar_buttons(browser):
@@ -346,7 +384,8 @@ def test_answers_of_a_lesson_are_plain_text_on_pages_that_watch(browser, tmp_pat
         browser.driver.get(read_watch_link(link))
         browser.wait_until(lambda: browser.find("#spectator").is_displayed())
         answers = browser.find("#answers")
-        teacher.press_key("ArrowRight")
+        for _ in range(2):  # The third chapter asks a question.
+            teacher.press_key("ArrowRight")
         browser.wait_until(answers.is_displayed)
         assert len(browser.find_all("#answers li")) > 1
         assert answers.text
@@ -593,51 +632,114 @@ def test_the_bar_of_a_phone_opens_the_lesson_in_place_of_the_panel(phone):
     assert not phone.find("#panel").is_enabled()
 
 
-def test_the_editor_on_a_phone_is_used_by_touch_alone(browser, tmp_path):
+class PhoneEditor:
+    """An editor on a phone, which is used by touch alone.
+
+    Attributes
+    ----------
+    browser : Browser
+    path : Path
+        File of the map, whose content is compared with what was drawn.
+    """
+
+    def __init__(self, browser, path):
+        self.browser = browser
+        self.path = path
+
+    def touch(self, *points):
+        """Move a finger through points; the next touch is no double tap."""
+        self.browser.touch(*([point] for point in points))
+        time.sleep(0.6)
+
+    def choose_tool(self, name, label):
+        """Choose a tool, which the button of the tools then shows."""
+        self.browser.find("#to-tools").click()
+        self.browser.find(f"[data-command='tool:{name}']").click()
+        self.browser.wait_until(lambda: self.browser.find("#to-tools").text == label)
+
+    def draw_wall(self):
+        """Draw a wall across the screen."""
+        self.choose_tool("wall", "Wall")
+        self.touch((110, 400))
+        self.touch((250, 400))
+        self.browser.wait_until(lambda: self.browser.find("#try").text == "Finish")
+        self.browser.find("#try").click()
+        self.browser.wait_until(lambda: self.browser.find("#try").text == "Try it")
+
+    def drag_wall(self):
+        """Drag the wall down, which also selects it."""
+        self.choose_tool("select", "Tools")
+        self.touch(*((180, 400 + 10 * k) for k in range(8)))
+        self.browser.wait_until(lambda: self.browser.find("#delete").is_enabled())
+
+    def save_until(self, condition):
+        """Save the map, and wait until its obstacles fulfil a condition."""
+        self.browser.find("#save").click()
+        self.browser.wait_until(lambda: condition(json.loads(self.path.read_text())["obstacles"]))
+
+    def undo_all(self):
+        """Undo all edits, so that the next test starts with an empty map."""
+        undo = self.browser.find("#undo")
+        for _ in range(MAX_EDITS):
+            if not undo.is_enabled():
+                return
+            undo.click()
+            wait_for_unchanged_picture(self.browser)
+
+
+@pytest.fixture(scope="module")
+def shared_editor(tmp_path_factory):
+    """Serve an editor of an empty map for several tests, and yield its link and the file of the map."""
+    path = tmp_path_factory.mktemp("editor") / "plan.json"
+    path.write_text(EMPTY_MAP)
+    with serve_window("edit", str(path), "--folder", str(path.parent)) as link:
+        yield link, path
+
+
+@pytest.fixture
+def phone_editor(browser, shared_editor):
+    """Show an editor with an empty map on a phone."""
+    link, path = shared_editor
     with browser.emulate_touch():
         browser.resize(390, 844, 2.0)
-        path = tmp_path / "plan.json"
-        path.write_text(EMPTY_MAP)
-        with serve_window("edit", str(path), "--folder", str(tmp_path)) as link:
-            browser.driver.get(link)
-            browser.wait_until(lambda: get_classes(browser) == {"phone"})
-            browser.wait_until(lambda: browser.find("#try").is_displayed())
-            wait_for_unchanged_picture(browser)
-            shown = [button for button in browser.find_all("#touch button") if button.is_displayed()]
-            labels = [button.text for button in shown]
-            assert labels == ["Try it", "Undo", "Tools", "Delete", "Save", "More"]
-            assert all(min(button.size.values()) >= 48 for button in shown)
+        browser.driver.get(link)
+        browser.wait_until(lambda: "phone" in get_classes(browser))
+        browser.wait_until(lambda: browser.find("#try").is_displayed())
+        wait_for_unchanged_picture(browser)
+        editor = PhoneEditor(browser, path)
+        yield editor
+        editor.undo_all()
+        assert browser.read_console() == []
 
-            def touch(*points):
-                """Move a finger through points; the next touch is no double tap."""
-                browser.touch(*([point] for point in points))
-                time.sleep(0.6)
 
-            def choose_tool(name):
-                browser.find("#to-tools").click()
-                browser.find(f"[data-command='tool:{name}']").click()
+def test_the_bar_of_the_editor_on_a_phone_has_large_buttons(phone_editor):
+    labels = list_bar_buttons(phone_editor.browser)
+    # Another button follows after a test that has saved the map.
+    assert labels[:6] == ["Try it", "Undo", "Tools", "Delete", "Save", "More"]
+    assert are_large(phone_editor.browser.find_all("#touch button"))
 
-            choose_tool("wall")
-            browser.wait_until(lambda: browser.find("#to-tools").text == "Wall")
-            touch((110, 400))
-            touch((250, 400))
-            browser.wait_until(lambda: browser.find("#try").text == "Finish")
-            browser.find("#try").click()
-            browser.wait_until(lambda: browser.find("#try").text == "Try it")
-            browser.find("#save").click()
-            browser.wait_until(lambda: len(json.loads(path.read_text())["obstacles"]) == 1)
-            drawn = path.read_text()
-            choose_tool("select")
-            browser.wait_until(lambda: browser.find("#to-tools").text == "Tools")
-            touch(*((180, 400 + 10 * k) for k in range(8)))
-            browser.wait_until(lambda: browser.find("#delete").is_enabled())
-            browser.find("#save").click()
-            browser.wait_until(lambda: path.read_text() != drawn)
-            browser.find("#delete").click()
-            browser.wait_until(lambda: not browser.find("#delete").is_enabled())
-            browser.find("#save").click()
-            browser.wait_until(lambda: not json.loads(path.read_text())["obstacles"])
-            assert browser.read_console() == []
+
+def test_a_wall_is_drawn_and_saved_by_touch(phone_editor):
+    phone_editor.draw_wall()
+    phone_editor.save_until(lambda obstacles: len(obstacles) == 1)
+
+
+def test_a_finger_drags_an_obstacle_of_the_editor(phone_editor):
+    phone_editor.draw_wall()
+    phone_editor.save_until(lambda obstacles: len(obstacles) == 1)
+    drawn = json.loads(phone_editor.path.read_text())["obstacles"]
+    phone_editor.drag_wall()
+    phone_editor.save_until(lambda obstacles: len(obstacles) == 1 and obstacles != drawn)
+
+
+def test_a_button_of_the_editor_deletes_the_selected_obstacle(phone_editor):
+    phone_editor.draw_wall()
+    phone_editor.drag_wall()
+    phone_editor.save_until(lambda obstacles: len(obstacles) == 1)
+    delete = phone_editor.browser.find("#delete")
+    delete.click()
+    phone_editor.browser.wait_until(lambda: not delete.is_enabled())
+    phone_editor.save_until(lambda obstacles: not obstacles)
 
 
 def find_covering_elements(browser):

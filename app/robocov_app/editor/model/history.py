@@ -102,7 +102,7 @@ class UndoHistory:
             return None
         step = self._undoable.pop()
         self._redoable.append(step)
-        return self._go_to(step.before, step.description)
+        return self._restore_state(step.before, step.description)
 
     def redo(self) -> Change | None:
         """Redo the most recently undone change.
@@ -116,9 +116,9 @@ class UndoHistory:
             return None
         step = self._redoable.pop()
         self._undoable.append(step)
-        return self._go_to(step.after, step.description)
+        return self._restore_state(step.after, step.description)
 
-    def _go_to(self, state: State, description: str) -> Change:
+    def _restore_state(self, state: State, description: str) -> Change:
         self.sketch = state.sketch
         self.selection = state.selection
         self.starts_new_step = True

@@ -20,7 +20,9 @@ READABLE_RADIUS_PX = 9.0
 """Radius of robots that are not in a crowd: their numbers are readable."""
 MIN_RADIUS_PX = 2.4
 MIN_NUMBER_SIZE_PX = 6.6
-"""Smaller numbers are left out."""
+"""Text size, px of the surface, that digits need to be drawn sharply; smaller numbers are left out."""
+MIN_SCALED_NUMBER_SIZE_PX = 5.2
+"""Text size at scale 1 that digits need to be read on the fine screen of a phone."""
 _MAX_RADIUS_PX = 400.0
 """Maximum radius, px of the surface."""
 _RING_WIDTH_PX = 1.6
@@ -121,7 +123,8 @@ def _choose_numbers(canvas: Canvas, scene: Scene, inner_radii: FloatArray) -> In
     numbers = np.array([scene.get_number(row) for row in range(len(inner_radii))], dtype=int)
     n_digits = 1 + np.digitize(numbers, [10, 100, 1000])
     sizes = sprites.choose_number_size(inner_radii, n_digits)
-    return np.where(sizes < MIN_NUMBER_SIZE_PX * canvas.scale, 0, numbers)
+    min_size = max(MIN_NUMBER_SIZE_PX, MIN_SCALED_NUMBER_SIZE_PX * canvas.scale)
+    return np.where(sizes < min_size, 0, numbers)
 
 
 def _draw_noses(

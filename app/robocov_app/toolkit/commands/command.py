@@ -54,6 +54,8 @@ class Command:
         Whether it repeats while its key is held down.
     hidden : bool
         Whether it is left out of the palette and the help page.
+    build_current_title : callable or None
+        Returns what the command does in the present state, for the palette; None: always `title`.
     """
 
     name: str
@@ -65,6 +67,14 @@ class Command:
     argument: Argument | None = None
     repeats: bool = False
     hidden: bool = False
+    build_current_title: Callable[[], str] | None = None
+
+    @property
+    def current_title(self) -> str:
+        """What the command does in the present state."""
+        if self.build_current_title is None:
+            return self.title
+        return self.build_current_title()
 
     @property
     def key_text(self) -> str:
@@ -127,6 +137,7 @@ class CommandGroup:
         repeats: bool = False,
         argument: Argument | None = None,
         hidden: bool = False,
+        build_current_title: Callable[[], str] | None = None,
     ) -> None:
         """Add a command.
 
@@ -146,10 +157,20 @@ class CommandGroup:
             Argument that is typed after the name.
         hidden : bool
             Whether it is left out of the palette and the help page.
+        build_current_title : callable, optional
+            Returns what the command does in the present state, for the palette.
         """
         is_hidden = hidden or not title
         command = Command(
-            name, title, self.heading, action, keys, argument=argument, repeats=repeats, hidden=is_hidden
+            name=name,
+            title=title,
+            group=self.heading,
+            run=action,
+            keys=keys,
+            argument=argument,
+            repeats=repeats,
+            hidden=is_hidden,
+            build_current_title=build_current_title,
         )
         self.commands.append(command)
 
@@ -275,10 +296,10 @@ def find_commands(commands: Sequence[Command], text: str) -> list[Command]:
     start = text.lower().strip()
 
     def is_match(command: Command) -> bool:
-        line = f"{command.title} {command.name}".lower()
+        line = f"{command.title} {command.current_title} {command.name}".lower()
         return all(word in line for word in words)
 
     def is_worse(command: Command) -> bool:
-        return command.name != start and not command.title.lower().startswith(start)
+        return command.name != start and not command.current_title.lower().startswith(start)
 
     return sorted(filter(is_match, commands), key=is_worse)

@@ -91,6 +91,7 @@ def _list_completions(
 def _build_option(table: CommandTable, command: Command) -> Option:
     reason = command.get_disabled_reason()
     if command.argument is not None:
-        return Option(command.title, f"{command.name} …", f"{command.name} ", reason)
+        return Option(command.current_title, f"{command.name} …", f"{command.name} ", reason)
     keys = " or ".join(format_key(key) for key in command.keys[:_MAX_KEYS])
-    return Option(command.title, keys, command.title, reason, partial(table.attempt, command))
+    title = command.current_title
+    return Option(title, keys, title, reason, partial(table.attempt, command))

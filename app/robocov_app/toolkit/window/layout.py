@@ -9,7 +9,7 @@ from robocov_app.render.panel_grid import choose_column_count
 PANEL_WIDTH_PX = 320
 BAR_HEIGHT_PX = 44
 RAIL_WIDTH_PX = 44
-LABELED_RAIL_WIDTH_PX = 128
+LABELED_RAIL_WIDTH_PX = 136
 """Width of a tool rail that shows the names of the tools next to their icons."""
 MIN_LABELED_WINDOW_PX = 1100
 """Width of a window from which on the tool rail shows names."""

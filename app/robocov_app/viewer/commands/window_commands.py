@@ -24,6 +24,8 @@ class ViewerWindowActions(WindowActions):
         Zooms by a given factor.
     toggle_recording : callable
         Starts or stops a video.
+    describe_recording : callable
+        Returns what `toggle_recording` does now.
     save_run : callable
         Saves the run in a new folder.
     open_file : callable
@@ -48,6 +50,7 @@ class ViewerWindowActions(WindowActions):
 
     zoom: Callable[[float], None]
     toggle_recording: Action
+    describe_recording: Callable[[], str]
     save_run: Action
     open_file: Action
     list_branches: Action
@@ -103,7 +106,13 @@ def _list_view_commands(canvas: ViewerCanvas, chart: Chart, actions: ViewerWindo
 def _list_file_commands(actions: ViewerWindowActions) -> list[Command]:
     group = CommandGroup("File")
     group.add("screenshot", "Screenshot", actions.save_screenshot, "f12")
-    group.add("video", "Start or stop a video", actions.toggle_recording, "f9")
+    group.add(
+        "video",
+        "Start or stop recording a video",
+        actions.toggle_recording,
+        "f9",
+        build_current_title=actions.describe_recording,
+    )
     group.add("save:run", "Save run", actions.save_run, "ctrl+e")
     group.add("open:file", "Open a session or a map", actions.open_file, "ctrl+o")
     return group.commands

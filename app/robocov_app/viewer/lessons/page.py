@@ -436,7 +436,7 @@ class LessonPage:
             if number == self.lesson.number:
                 radius = _CURRENT_DOT_RADIUS_PX
             self._draw_dot(number, box.center, radius)
-            self.areas.append(ClickArea(box, partial(self.lesson.go_to, number), f"chapter:{number}"))
+            self.areas.append(ClickArea(box, partial(self.lesson.show_chapter, number), f"chapter:{number}"))
 
     def _draw_dot(self, number: int, center: tuple[float, float], radius: float) -> None:
         """Draw the dot of a chapter, filled if it was reached."""
@@ -462,7 +462,7 @@ class LessonPage:
         self._write(title, _CHAPTER_TEXT_PX, color, indent=_CHAPTER_INDENT_PX, bold=is_current)
         top = round(self.y - _CHAPTER_TOP_PX * scale)
         box = pygame.Rect(round(self.x), top, round(self.width), round(row))
-        self.areas.append(ClickArea(box, partial(lesson.go_to, number), f"chapter:{number}"))
+        self.areas.append(ClickArea(box, partial(lesson.show_chapter, number), f"chapter:{number}"))
 
     def _draw_progress(self) -> None:
         """Draw the progress bar above the buttons."""

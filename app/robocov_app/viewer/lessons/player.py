@@ -34,7 +34,7 @@ _DEFAULT_NEXT_STEPS = (
     "Let a robot fail (D), and watch its neighbors.",
     "Compare two controllers on a map of your own (K).",
 )
-_DRAFT_HINT = "What you have changed is kept: Ctrl+Shift+O opens it."
+_DRAFT_MESSAGE = "What you have changed is kept: Ctrl+Shift+O opens it."
 BASE_LAYERS = frozenset(
     {
         "cells",
@@ -205,7 +205,7 @@ class LessonPlayer:
         self._waited_s = 0.0  # real time since the current state was entered
         self._workspace = SessionWorkspace(self.session, viewer.files.draft_folder)
         self._suspended = SuspendedSession(viewer)
-        self.go_to(0)
+        self.show_chapter(0)
         if self._suspended.has_work:
             viewer.show_message("Your session is set aside. It returns when the lesson ends.")
 
@@ -388,7 +388,7 @@ class LessonPlayer:
         else:
             number = self.number + chapters
         if number <= last:
-            self.go_to(max(number, 0))
+            self.show_chapter(max(number, 0))
         elif self.state is LessonState.CLOSING:
             self.end()
         else:
@@ -423,7 +423,7 @@ class LessonPlayer:
         if self._suspended.has_work:
             message = "the lesson has ended; your session from before is back"
         if keeps_draft:
-            message += f". {_DRAFT_HINT}"
+            message += f". {_DRAFT_MESSAGE}"
         viewer.show_message(message)
         self._fit_view()
         self.is_done = True
@@ -442,7 +442,7 @@ class LessonPlayer:
         self.is_held = False
         self._viewer.revision += 1
 
-    def go_to(self, number: int) -> None:
+    def show_chapter(self, number: int) -> None:
         """Show the start of a chapter, by its index: session, layers and selected robot; ask its question."""
         self.number = number
         self.answer = None
@@ -453,7 +453,7 @@ class LessonPlayer:
         self._viewer.files.workspace = self._workspace
         _show_start(self._viewer, self.session, self.chapter)
         if keeps_draft:
-            self._viewer.show_message(_DRAFT_HINT)
+            self._viewer.show_message(_DRAFT_MESSAGE)
         self._fit_view()
         if self.chapter.question is None:
             self._enter_state(LessonState.PLAYING)

@@ -168,7 +168,7 @@ class Pane:
         numbers = tuple((np.flatnonzero(simulation.working) + 1).tolist())
         if numbers == setup.numbers:
             return False
-        has_failed = setup.conditions.find_failed(simulation.time, setup.scheduled_robots)
+        has_failed = setup.conditions.find_failed_robots(simulation.time, setup.scheduled_robots)
         failed: dict[int, Point] = {}
         for row in np.flatnonzero(has_failed).tolist():
             x, y = simulation.positions[row].tolist()

@@ -88,7 +88,7 @@ class PaneGroup:
         scheduled_robots = 0
         if conditions is not None:
             check_joins(scenario.environment, conditions)
-            is_working = conditions.find_working(0.0, len(positions))
+            is_working = conditions.find_working_robots(0.0, len(positions))
             if keeps_a_robot(conditions, len(positions)):
                 scheduled_robots = len(positions)
             else:
@@ -331,5 +331,5 @@ def keeps_a_robot(conditions: Conditions, robot_count: int) -> bool:
         return False
     starts, stops = conditions.compute_working_periods(robot_count)
     times = np.concatenate([[0.0], starts, stops])
-    working = conditions.find_working(times[np.isfinite(times)], robot_count)
+    working = conditions.find_working_robots(times[np.isfinite(times)], robot_count)
     return bool(working.any(axis=1).all())

@@ -50,6 +50,12 @@ class VideoRecorder:
             return self._start(screen)
         return self._stop(self.video)
 
+    def describe_toggle(self) -> str:
+        """Describe what `toggle` does now."""
+        if self.video is None:
+            return "Start recording a video"
+        return "Stop recording the video"
+
     def _start(self, screen: pygame.Surface) -> str:
         target = find_free_path(self._viewer.files.folder, "robocov", ".mp4")
         self.video = ScreenVideo(target, screen.get_size(), waits=self._waits)

@@ -181,6 +181,7 @@ class ViewerWindow(CommandWindow):
             toggle_fullscreen=self.toggle_fullscreen,
             save_screenshot=lambda: self.display.save_screenshot(viewer.files.folder),
             toggle_recording=lambda: self.video_recorder.toggle(self.screen),
+            describe_recording=self.video_recorder.describe_toggle,
             save_run=lambda: self.run_saver.save(viewer.session, viewer.files.folder, viewer.files.map_name),
             open_file=lambda: self.dialogs.ask(build_file_dialog(viewer)),
             list_branches=lambda: self.dialogs.ask(build_branch_dialog(viewer)),
