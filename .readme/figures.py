@@ -32,6 +32,9 @@ PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_COLORS = 16
 """Number of colors of the figure of the large plans, which contains shades of two colors only."""
 WIDTH_PX = 1400
+SHADED = Image.Quantize.MEDIANCUT
+COLORED = Image.Quantize.FASTOCTREE
+"""Choices of the colors of an image: the first suits shades, the second keeps the hues of lines apart."""
 SUFFIXES = {"light": "", "dark": "-dark"}
 
 
@@ -42,7 +45,8 @@ def draw_figure(name: str, theme: str) -> None:
         status = main([*COMMANDS[name], "--theme", theme, "--out", str(out)])
         if status:
             raise SystemExit(status)
-        save_small_image(out / FIGURES[name], f"{name}{SUFFIXES[theme]}.png")
+        method = COLORED if FIGURES[name] == "trajectories.png" else SHADED
+        save_small_image(out / FIGURES[name], f"{name}{SUFFIXES[theme]}.png", method=method)
 
 
 def draw_large_plans(theme: str) -> None:
@@ -55,12 +59,12 @@ def draw_large_plans(theme: str) -> None:
         save_small_image(path, f"plans{SUFFIXES[theme]}.png", colors=PLAN_COLORS)
 
 
-def save_small_image(source: Path, name: str, colors: int = 256) -> None:
+def save_small_image(source: Path, name: str, colors: int = 256, method: Image.Quantize = SHADED) -> None:
     """Reduce an image to the width of the handbook and a number of colors, and save it."""
     image = Image.open(source).convert("RGB")
     height = round(image.height * WIDTH_PX / image.width)
     image = image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
-    image = image.quantize(colors, dither=Image.Dither.NONE)
+    image = image.quantize(colors, method=method, dither=Image.Dither.NONE)
     image.save(PICTURES / name, optimize=True)
 
 
