@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 from robot_reports import assert_consistent, assert_forces_sum_up, explain_run, get_line, list_texts
 
@@ -32,6 +33,26 @@ def test_a_robot_stuck_in_the_trap(controller, reason):
     assert reason in list_texts(stuck)
     for report in reports:
         assert_forces_sum_up(report)
+
+
+def test_the_force_of_a_contact_balances_the_resultant():
+    trap = load_map("trap")
+    reports = explain_run(Simulation(trap, Lloyd(), trap.start("inside").sample(3, seed=0)), 40.0)
+    (stuck,) = [report for report in reports if "stuck" in report.verdict]
+    contact = get_line(stuck, "contact")
+    assert re.fullmatch(r"pushed \w+ with \d(\.\d+)? N by contact with the wall", contact.text)
+    team = Team.homogeneous(3)
+    # The robot is at rest, so the wall exerts the force to which the acceleration limits the motion.
+    limit = team.mass[0] * team.max_acceleration[0]
+    resultant = np.array(get_line(stuck, "resultant").vector)
+    drive = resultant * min(1.0, limit / np.hypot(*resultant))
+    assert np.array(contact.vector) == pytest.approx(-drive, abs=0.05 * limit)
+
+
+def test_robots_without_contact_have_no_contact_force():
+    square = load_map("square")
+    reports = explain_run(Simulation(square, Lloyd(), square.start().sample(4, seed=0)), 10.0)
+    assert not [line for report in reports for line in report.lines if line.kind == "contact"]
 
 
 def test_robots_at_rest_on_their_centroids():

@@ -2,6 +2,7 @@
 
 ``explain``                the report on a robot
 ``situation``              the facts: forces, goal, obstacles and robots nearby
+``contact_force``          the force of contacts on the robot
 ``motion_classification``  whether the robot moves, trembles, is at rest or is setting off
 ``motion_sentence``        the first sentence of the report: why the robot moves or has stopped
 ``sentences``              the other sentences

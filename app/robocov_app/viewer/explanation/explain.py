@@ -3,15 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment
 from robocov.observation import Snapshot
 from robocov.team import Team
 from robocov.typing import FloatArray
+from robocov_app.viewer.explanation.contact_force import compute_contact_force
 from robocov_app.viewer.explanation.motion_classification import classify_motion
 from robocov_app.viewer.explanation.motion_sentence import describe_motion
 from robocov_app.viewer.explanation.sentences import (
     ReportLine,
     build_position_line,
+    list_contact_lines,
     list_force_lines,
     list_reasons,
     list_surroundings,
@@ -55,6 +58,7 @@ def explain_robot(viewer: Presenter, number: int) -> RobotReport:
         setup.numbers.index(number),
         numbers=setup.numbers,
         recent=displayed.get_recent_positions(pane, number),
+        dt=viewer.session.timeline.scenario.dt,
     )
 
 
@@ -66,6 +70,7 @@ def explain(
     *,
     numbers: Sequence[int] | None = None,
     recent: FloatArray | None = None,
+    dt: float = DEFAULT_DT_S,
 ) -> RobotReport:
     """Explain why a robot moves, or why it does not.
 
@@ -84,6 +89,8 @@ def explain(
     recent : (k, 2) array, m, optional
         Positions of the robot during the last `SETTLED_WINDOW_S` seconds, oldest first. Without them its
         speed alone decides whether it is at rest.
+    dt : float, s
+        Control period, over which the force of contacts is averaged.
 
     Returns
     -------
@@ -93,10 +100,14 @@ def explain(
         numbers = range(1, len(team) + 1)
     situation = RobotSituation(snapshot, team, environment, robot, numbers)
     motion = classify_motion(situation, recent)
+    contact_force = 0j
+    if situation.touched and situation.forces:
+        contact_force = compute_contact_force(snapshot, team, environment, robot, dt=dt)
     sentences = [*list_reasons(situation, motion), *list_surroundings(situation)]
     lines = (
         build_position_line(situation),
         *list_force_lines(situation),
+        *list_contact_lines(situation, contact_force),
         *map(ReportLine, sentences),
     )
     return RobotReport(f"Robot {situation.number}", describe_motion(situation, motion), lines)

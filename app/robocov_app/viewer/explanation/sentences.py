@@ -46,8 +46,8 @@ class ReportLine:
     vector : tuple of float or None
         The force that the sentence is about, (x, y) N.
     kind : str
-        Kind of force: a term of the controller, `UNEXPLAINED_FORCE`, ``viscosity`` or ``resultant``; empty if
-        the sentence is not about a force.
+        Kind of force: a term of the controller, `UNEXPLAINED_FORCE`, ``viscosity``, ``resultant`` or
+        ``contact``; empty if the sentence is not about a force.
     """
 
     text: str
@@ -85,6 +85,18 @@ def list_force_lines(situation: RobotSituation) -> list[ReportLine]:
         text += f", opposed by {situation.holding_names}"
     lines.append(_build_force_line(text, "resultant", situation.resultant))
     return lines
+
+
+def list_contact_lines(situation: RobotSituation, contact_force: complex) -> list[ReportLine]:
+    """Return a sentence on the force of contacts, x + i y N, unless it is negligible.
+
+    The resultant does not include this force, which is the answer of the touched objects to it.
+    """
+    if abs(contact_force) < MIN_FORCE_N:
+        return []
+    names = " and ".join(touched.name for touched in situation.touched)
+    push = f"pushed {format_direction(contact_force)} with {format_force(abs(contact_force))}"
+    return [_build_force_line(f"{push} by contact with {names}", "contact", contact_force)]
 
 
 def _build_force_line(text: str, kind: str, force: complex) -> ReportLine:

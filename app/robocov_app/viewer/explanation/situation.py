@@ -29,7 +29,7 @@ _MIN_PRESSING_ALIGNMENT = 0.1  # cosine above which the resultant presses the ro
 _FORCE_TOLERANCE_N = 1e-6
 _RELATIVE_FORCE_TOLERANCE = 1e-9
 _MAX_VALUE = 1e100  # larger numbers would overflow in products
-_RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant"})
+_RESERVED_KINDS = frozenset({"", UNEXPLAINED_FORCE, "viscosity", "resultant", "contact"})
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from robocov_app.viewer.lessons.player import (
     LessonState,
     MarkedAnswer,
     list_next_steps,
+    list_skipped_tasks,
 )
 
 
@@ -166,7 +167,14 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
 
 def _list_closing_lines(lesson: LessonPlayer) -> list[str]:
     """Return the texts of the closing page in a caption."""
-    return [*lesson.findings, *(f"{text}." for text in lesson.skipped_tasks)]
+    return [*lesson.findings, *(f"{text}." for text in _list_skipped_tasks(lesson))]
+
+
+def _list_skipped_tasks(lesson: LessonPlayer) -> list[str]:
+    """Return a text for each task that the user has skipped; none if there is no user."""
+    if lesson.is_unattended:
+        return []
+    return list_skipped_tasks(lesson.lesson, lesson.done_tasks)
 
 
 def draw_lesson_page(
@@ -317,7 +325,7 @@ class LessonPage:
             self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:
             self._draw_item("✓", finding)
-        for text in lesson.skipped_tasks:
+        for text in _list_skipped_tasks(lesson):
             self._draw_item("–", text, color=self.theme.faint)
         self.y += _TEXT_GAP_PX * self.scale
         self._write_title(_NEXT_TITLE)

@@ -1,6 +1,6 @@
 """Playing of lessons: session files with chapters that play, ask questions, and set tasks."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -111,6 +111,26 @@ def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
 def list_next_steps(lesson: LessonModel) -> list[str]:
     """Return what to try after a lesson: the suggestions of its author, or else general ones."""
     return lesson.next_steps or list(_DEFAULT_NEXT_STEPS)
+
+
+def list_skipped_tasks(lesson: LessonModel, done_tasks: Container[int]) -> list[str]:
+    """Return a text for each task of a lesson that was not done, with the title of its chapter.
+
+    Parameters
+    ----------
+    lesson : LessonModel
+    done_tasks : container of int
+        Indices of the chapters whose task was done.
+
+    Returns
+    -------
+    list of str
+    """
+    texts: list[str] = []
+    for index, chapter in enumerate(lesson.chapters):
+        if chapter.task is not None and index not in done_tasks:
+            texts.append(f"Task skipped: {chapter.title}")
+    return texts
 
 
 def is_fulfilled(condition: ConditionModel, session: Session) -> bool:
@@ -275,17 +295,6 @@ class LessonPlayer:
             if question is not None and answer == question.right:
                 right_count += 1
         return right_count, len(self.first_answers)
-
-    @property
-    def skipped_tasks(self) -> list[str]:
-        """A text for each task that the user has not done, with the title of its chapter."""
-        if self.is_unattended:
-            return []
-        texts: list[str] = []
-        for index, chapter in enumerate(self.lesson.chapters):
-            if chapter.task is not None and index not in self.done_tasks:
-                texts.append(f"Task skipped: {chapter.title}")
-        return texts
 
     def _list_question_lines(self, question: QuestionModel) -> list[str]:
         if self.state is LessonState.ASKING:
