@@ -57,8 +57,8 @@ def test_all_commands_and_maps_exist() -> None:
     assert len(calls) > 8
     for command, argument in calls:
         assert command in COMMANDS
-        # `story` is the file of a session.
-        if command in MAP_COMMANDS and argument != "story":
+        # The argument may be the file of a session.
+        if command in MAP_COMMANDS and argument != "session":
             assert argument in list_bundled_maps()
 
 

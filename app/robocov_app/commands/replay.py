@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, ParameterError, summarize_names
-from robocov.files.result_names import REPLAY_FILE, SESSION_FILE, STORY_FILE
+from robocov.files.result_names import REPLAY_FILE, SESSION_FILE
 from robocov_app.commands.options import JsonOption, VideoOptions, WebOptions
 from robocov_app.terminal.arguments import parse_window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -85,8 +85,10 @@ def command(options: Arguments) -> int:
 def _replay(options: Arguments) -> int:
     """Replay a session or saved runs, in the window or as a video, and return the exit status."""
     options.video.read_layers()
+    from robocov_app.viewer.branch_output.folders import find_branch_file
+
     path = options.run
-    if (path / STORY_FILE).is_file():
+    if find_branch_file(path) is not None:
         path = path / SESSION_FILE
     if path.suffix == ".robocov":
         return _replay_session(path, options)

@@ -31,8 +31,8 @@ class Arguments(RunOptions):
     The folder contains run.json and record.npz (the whole run), cost.csv, figures of the trajectories and
     the cost as PNG and SVG, and on request frames and a video.
 
-    MAP may also be a session that was saved in the window, such as story.robocov: it is simulated again with
-    all edits.
+    MAP may also be a session that was saved in the window, such as session.robocov: it is simulated again
+    with all edits.
 
     Example: robocov run rooms --robots 8 --set k_rep=0.5 --video --out eight
     """
@@ -123,7 +123,7 @@ def _print_branch(answer: dict[str, Any]) -> None:
     for row in answer["runs"]:
         part = answer["parts"][row["part"] - 1]
         span = f"{part['from_s']:6.1f} to {part['to_s']:.1f} s"
-        echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {part['words']}")
+        echo(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {part['description']}")
     echo(f"saved in {answer['out']}/: {list_files(Path(answer['out']))}")
 
 
@@ -144,7 +144,7 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
     compile_kernels()
     for node, step, suffix in branches:
         out = Path(f"{options.out or path.stem}{suffix}")
-        with create_result(out, "story", overwrite=options.overwrite) as result:
+        with create_result(out, "branch", overwrite=options.overwrite) as result:
             session_copy = result.staging / SESSION_FILE
             save_session(session_copy, session.document, node, step, session.view)
             try:

@@ -18,6 +18,8 @@ from robocov.typing import BoolArray, FloatArray
 TIME_TOLERANCE_S = 1e-9
 """Maximum difference between two times that count as equal: sums of steps have rounding errors."""
 
+_FORMER_POSITION_KEY = "place_m"
+"""Key of the position of a robot that joins in files of earlier versions."""
 
 DensityKnowledge: TypeAlias = Literal["known", "sensed"]
 """Whether robots know the density φ from the start, or have to measure it within their sensing range."""
@@ -326,7 +328,7 @@ class Conditions:
             {
                 "robot": join.robot,
                 "time_s": join.time,
-                "place_m": None if join.position is None else list(join.position),
+                "position_m": None if join.position is None else list(join.position),
             }
             for join in self.joins
         ]
@@ -358,7 +360,7 @@ class Conditions:
             document = {PARAMETERS["bandwidth"].json_key: None, **document}
             numbers = {name: document[parameter.json_key] for name, parameter in PARAMETERS.items()}
             failures = [(failure["robot"], failure["time_s"]) for failure in document["failures"]]
-            joins = [(join["robot"], join["time_s"], join["place_m"]) for join in document["joins"]]
+            joins = [(join["robot"], join["time_s"], _read_position(join)) for join in document["joins"]]
             arguments: dict[str, Any] = {**numbers, "failures": failures, "joins": joins}
             density = document.get("density", "known")
             return cls(**arguments, seed=document["seed"], density=density)
@@ -372,3 +374,10 @@ class Conditions:
             if repr(value) != repr(parameter.default):
                 arguments.append(f"{parameter.name}={value!r}")
         return f"Conditions({', '.join(arguments)})"
+
+
+def _read_position(join: Mapping[str, Any]) -> Any:
+    """Return the requested position of a robot that joins, from a JSON object; None for its start."""
+    if _FORMER_POSITION_KEY in join:
+        return join[_FORMER_POSITION_KEY]
+    return join["position_m"]

@@ -1,4 +1,4 @@
-"""Arrays in .npz files, which are read only if their sizes are reasonable, and a cache for arrays."""
+"""Read .npz files with size limits, and cache arrays."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ MAX_BYTES = 2_000_000_000
 """Default limit for the total size of the arrays of one file: about the largest run that the application
 accepts."""
 _MAX_COMPRESSION_RATIO = 100
-"""Largest size of the arrays relative to the size of the file. A larger ratio suggests a decompression
+"""Maximum size of the arrays relative to the size of the file. A larger ratio suggests a decompression
 bomb."""
 _RATIO_EXEMPT_BYTES = 256_000_000
 """Arrays up to this total size may have any compression ratio."""
 _MAX_READ_BYTES = 1 << 20
-"""Largest single read. A longer one would be the central directory of a zip file with too many entries."""
+"""Maximum size of a single read. A longer one would be the central directory of a zip file with too many
+entries."""
 _DAMAGE_ERRORS = (
     ValueError,
     EOFError,
@@ -50,7 +51,7 @@ _FORMAT = b"robocov arrays 1\n"
 """Start of each file of the cache."""
 _DIGEST_BYTES = 16
 """Length of the checksum, which follows the format. The arrays, as an .npz file, follow the checksum."""
-_ABANDONED_S = 24 * 3600.0
+_ABANDONED_AGE_S = 24 * 3600.0
 """Age from which a partly written file counts as abandoned."""
 
 
@@ -64,7 +65,7 @@ def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) ->
     source_name : str
         Name of the source in messages, such as the path of the file.
     max_bytes : int
-        Largest total size of the arrays.
+        Maximum total size of the arrays.
 
     Returns
     -------
@@ -106,7 +107,7 @@ def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, 
 
 
 class _LimitedReader:
-    """A file that refuses any single read of more than `_MAX_READ_BYTES`, such as of a large directory."""
+    """A file that rejects reads above `_MAX_READ_BYTES`, such as that of an oversized zip directory."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -118,7 +119,7 @@ class _LimitedReader:
         """Read up to `size` bytes, or the rest of the file."""
         # `zipfile` omits the size only near the end of the file, where at most 64 KiB follow.
         if size > _MAX_READ_BYTES:
-            raise zipfile.BadZipFile("its directory is too large")
+            raise zipfile.BadZipFile("its central directory is too large")
         return self._file.read(size)
 
 
@@ -133,14 +134,14 @@ class ArrayCache:
     folder : Path
         Folder of the cache, which the first `save` creates.
     max_bytes : int
-        Largest total size of the files. If they become larger, the least recently used files are removed.
+        Maximum total size of the files. If they become larger, the least recently used files are removed.
 
     Attributes
     ----------
     folder : Path
         Folder of the cache.
     max_bytes : int
-        Largest total size of the files.
+        Maximum total size of the files.
 
     See Also
     --------
@@ -265,7 +266,7 @@ class ArrayCache:
                 is_temporary = path.name.startswith(".")
                 if not is_temporary:
                     entries.append((status.st_mtime, status.st_size, path))
-                elif status.st_mtime < time.time() - _ABANDONED_S:
+                elif status.st_mtime < time.time() - _ABANDONED_AGE_S:
                     path.unlink()
         total_size = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):

@@ -131,7 +131,7 @@ def check_header(document: object, source_name: str, format_name: str, version: 
     Raises
     ------
     MapError
-        If the document is not an object, or has another format or version.
+        If the document is not an object, or has a different format or version.
     """
     if not isinstance(document, dict):
         expected = f"a JSON object with a {format_name.removeprefix('robocov-')}"

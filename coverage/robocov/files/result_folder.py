@@ -22,12 +22,14 @@ from typing import Literal, TypeAlias
 from robocov.errors import InputError, OutputError, describe_error, quote
 from robocov.files.folder_lock import lock_folder
 from robocov.files.result_names import (
+    BRANCH_FILE,
     COMPARISON_FILE,
     COMPARISON_TABLE_FILE,
     COMPARISON_VIDEO_FILE,
     COST_FIGURE,
     COST_FILE,
     FIGURE_SUFFIXES,
+    FORMER_BRANCH_FILE,
     FRAMES_FOLDER,
     METRICS_FILE,
     RECORD_FILE,
@@ -36,13 +38,12 @@ from robocov.files.result_names import (
     RUN_FILE,
     RUN_VIDEO_FILE,
     SESSION_FILE,
-    STORY_FILE,
     TRAJECTORIES_FIGURE,
 )
 from robocov.files.writing import flush_to_disk, replace_file
 
-ResultKind: TypeAlias = Literal["run", "comparison", "replay", "story"]
-"""Kind of a result. A story is a branch of a session that consists of several runs."""
+ResultKind: TypeAlias = Literal["run", "comparison", "replay", "branch"]
+"""Kind of a result. A branch of a session consists of several runs."""
 MANIFEST_FILE = ".robocov.json"
 _JOURNAL_FILE = ".robocov-commit.json"
 _STAGING_FOLDER = ".robocov-new"
@@ -56,20 +57,21 @@ _MAIN_FILES: dict[ResultKind, str] = {
     "comparison": COMPARISON_FILE,
     "run": RUN_FILE,
     "replay": REPLAY_FILE,
-    "story": STORY_FILE,
+    "branch": BRANCH_FILE,
 }
 """File that marks a folder as the folder of a result, for each kind of result."""
 _FILES: dict[ResultKind, tuple[str, ...]] = {
     "comparison": (COMPARISON_FILE, COMPARISON_TABLE_FILE, COMPARISON_VIDEO_FILE, *_FIGURE_FILES),
     "run": (RUN_FILE, RECORD_FILE, COST_FILE, RUN_VIDEO_FILE, *_FIGURE_FILES),
     "replay": (REPLAY_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
-    "story": (STORY_FILE, SESSION_FILE, COST_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
+    "branch": (BRANCH_FILE, SESSION_FILE, COST_FILE, RUN_VIDEO_FILE, COMPARISON_VIDEO_FILE),
 }
 """Files of each kind of result, except for ``frames/`` and the folders of the runs of a comparison."""
 _KNOWN_NAMES = {
     MANIFEST_FILE,
     METRICS_FILE,
     REPORT_FILE,
+    FORMER_BRANCH_FILE,
     *(name for names in _FILES.values() for name in names),
 }
 """Names of all files of results, except for the frames of videos."""
@@ -81,6 +83,7 @@ _SIGNATURES = {
         main_file: re.compile(rf'"format":\s*"robocov-{kind}"'.encode())
         for kind, main_file in _MAIN_FILES.items()
     },
+    FORMER_BRANCH_FILE: re.compile(rb'"format":\s*"robocov-story"'),
     METRICS_FILE: re.compile(rb"time_s,sensed_area_m2,"),
     REPORT_FILE: re.compile(rb'<meta name="generator" content="robocov'),
 }
@@ -166,7 +169,7 @@ class ResultFolder:
                 temporary.write_text(json.dumps(journal, indent=0) + "\n", encoding="utf-8")
             # From here on, the new result is the valid one.
             (staging_root / _JOURNAL_FILE).replace(self.path / _JOURNAL_FILE)
-            _carry_out_journal(self.path)
+            _apply_journal(self.path)
             self._owned_files = files
             self._replaces = False
             self.staging.mkdir(parents=True)
@@ -194,7 +197,7 @@ def create_result(
     ----------
     folder : Path
         Folder of the result.
-    kind : {"run", "comparison", "replay", "story"}
+    kind : {"run", "comparison", "replay", "branch"}
         Kind of the result.
     overwrite : bool
         Whether to replace a result that is already in the folder.
@@ -293,7 +296,7 @@ def complete_commit(folder: Path) -> None:
     """
     if os.path.lexists(folder / _JOURNAL_FILE):
         with lock_folder(folder, _LOCK_FILE, remove=True), report_folder_errors(folder):
-            _carry_out_journal(folder)
+            _apply_journal(folder)
     result_root, run_name = _find_result_root(folder, _JOURNAL_FILE)
     if run_name:
         raise InputError(f"{folder}: its replacement was interrupted; open {result_root} to complete it")
@@ -369,7 +372,7 @@ def _require_result_file(name: str) -> None:
         raise ValueError(f"expected a file of a result, got {quote(name)}")
 
 
-def _carry_out_journal(folder: Path) -> None:
+def _apply_journal(folder: Path) -> None:
     """Complete the steps in the journal of a folder, if there is one, and make the journal the manifest."""
     journal = _read_file_lists(folder / _JOURNAL_FILE)
     if journal is None:
@@ -398,16 +401,15 @@ def _carry_out_journal(folder: Path) -> None:
 
 @contextmanager
 def _open_folder(folder: Path) -> Iterator[None]:
-    """Lock a folder and complete its last commit; at the end, discard uncommitted files."""
+    """Lock a folder and complete an interrupted commit, if any; at the end, discard uncommitted files."""
     with lock_folder(folder, _LOCK_FILE, remove=True):
         with report_folder_errors(folder):
-            _carry_out_journal(folder)
+            _apply_journal(folder)
             _discard_staging(folder)
         try:
             yield
         finally:
-            # A journal was left by an interrupted commit. The staged files must then remain, so that the
-            # commit can be completed when the folder is opened next.
+            # If a commit was interrupted, its journal and staged files must remain for the next process.
             if not os.path.lexists(folder / _JOURNAL_FILE):
                 with suppress(OSError):
                     _discard_staging(folder)
@@ -474,7 +476,8 @@ def _list_owned_files(folder: Path) -> set[str] | None:
     if kind is None and not os.path.lexists(folder / MANIFEST_FILE):
         return None
     names = {name for name in _FILES[kind or "run"] if _is_file_or_link(folder / name)}
-    names |= {name for name in (METRICS_FILE, REPORT_FILE) if _has_signature(folder / name, name)}
+    signed_files = (METRICS_FILE, REPORT_FILE, FORMER_BRANCH_FILE)
+    names |= {name for name in signed_files if _has_signature(folder / name, name)}
     if kind == "comparison":
         for run_folder in _list_run_folders(folder):
             run_files = {*(_list_owned_files(run_folder) or ()), MANIFEST_FILE}
@@ -488,7 +491,7 @@ def _identify_kind(folder: Path) -> ResultKind | None:
     for kind, main_file in _MAIN_FILES.items():
         if _has_signature(folder / main_file, main_file):
             return kind
-    return None
+    return "branch" if _has_signature(folder / FORMER_BRANCH_FILE, FORMER_BRANCH_FILE) else None
 
 
 def _list_frames(folder: Path) -> set[str]:

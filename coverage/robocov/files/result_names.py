@@ -25,8 +25,10 @@ COMPARISON_VIDEO_FILE = "comparison.mp4"
 REPLAY_FILE = "replay.json"
 """Folder of the replayed result. The file marks a folder as that of a rendered replay."""
 
-STORY_FILE = "story.json"
+BRANCH_FILE = "branch.json"
 """Folders of the parts of a branch. The file marks a folder as that of a branch with several parts."""
+FORMER_BRANCH_FILE = "story.json"
+"""Name of this file in folders of earlier versions."""
 SESSION_FILE = "session.robocov"
 """Session from which a branch was saved."""
 

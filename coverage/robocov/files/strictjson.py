@@ -24,20 +24,20 @@ from robocov.errors import (
 from robocov.files.json_positions import find_deep_nesting, find_line_and_column, find_offset
 
 MAX_BYTES = 50_000_000
-"""Largest size of a JSON file."""
+"""Maximum size of a JSON file."""
 MAX_DEPTH = 32
-"""Largest depth of nested lists and objects. Maps need 6."""
+"""Maximum depth of nested lists and objects. Maps need 6."""
 MAX_TOML_BYTES = 4_000_000
-"""Largest size of a TOML file. Parsing a file of this size takes a second."""
+"""Maximum size of a TOML file. Parsing a file of this size takes a second."""
 _TOML_SEPARATOR = re.compile(rb"[=,\n]")
 """Characters that end a key in TOML. They may also occur in texts."""
 _MAX_TOML_DOTS = 1000
-"""Largest number of dots between two separators."""
+"""Maximum number of dots between two separators."""
 _TOO_DEEP = f"nested too deeply, expected at most {MAX_DEPTH} levels"
 _MAX_DIGITS = 400
-"""Largest number of digits of an integer. Numbers with more digits are larger than any float."""
+"""Maximum number of digits of an integer. Numbers with more digits are larger than any float."""
 _MAX_BITS = 1023
-"""Largest number of bits of an integer, so that it can be converted to a float."""
+"""Maximum number of bits of an integer, so that it can be converted to a float."""
 _SYNTAX_EXCERPT_CHARACTERS = 12
 """Number of characters of the text that the message about a syntax error quotes."""
 _WHITESPACE = " \t\n\r"

@@ -73,7 +73,7 @@ class Record(Drawable):
     steering : (T, n, 2) rad, rad/s
         Heading, from +x, and turning rate of unicycles; None in a team of point robots.
     session : mapping
-        Origin of the run in a session of the window, as in ``run.json``; empty for any other run.
+        Origin of the run in a session of the application, as in ``run.json``; empty for any other run.
     conditions : Conditions or None
         Noise, limits of communication, and robots that fail or join. None if the conditions are ideal.
     joined : tuple of JoinedRobot
@@ -125,14 +125,14 @@ class Record(Drawable):
     sent_bytes: FloatArray | None = None
 
     @cached_property
-    def working(self) -> BoolArray:
+    def is_working(self) -> BoolArray:
         """Mask of the robots that are present and have not failed, (T, n) bool; read-only."""
         if self.conditions is None:
-            return self.present
+            return self.is_present
         return _make_read_only(self.conditions.find_working_robots(self.time, len(self.team)))
 
     @cached_property
-    def present(self) -> BoolArray:
+    def is_present(self) -> BoolArray:
         """Mask of the robots that have joined the team, including failed ones, (T, n) bool; read-only."""
         if self.conditions is None:
             return _make_read_only(np.ones(self.positions.shape[:2], dtype=bool))
@@ -145,9 +145,9 @@ class Record(Drawable):
         The displacement between two time steps does not count if the robot has not joined yet, or if the user
         placed it at another position in between.
         """
-        mask = self.present[:-1].copy()
+        mask = self.is_present[:-1].copy()
         row_of_number = {number: row for row, number in enumerate(self.robot_numbers)}
-        for placement in self.session.get("placed", ()):
+        for placement in self.session.get("placements", ()):
             step = int(np.searchsorted(self.time, placement["time_s"] - TIME_ROUNDING_S))
             rows = [row_of_number[number] for number in placement["robots"] if number in row_of_number]
             if 0 < step < len(self.time):
@@ -196,12 +196,12 @@ class Record(Drawable):
         VoronoiPartition or WeightedCells
             `WeightedCells` if `has_travel_time_cells`. The cells are those under unlimited communication.
         """
-        working = slice(None) if self.conditions is None else self.working[k]
-        positions = self.positions[k][working]
+        rows = slice(None) if self.conditions is None else self.is_working[k]
+        positions = self.positions[k][rows]
         region = self.environment.region
         density = self.environment.density
         if self.has_travel_time_cells:
-            speeds = self.team.max_speed[working]
+            speeds = self.team.max_speed[rows]
             return partition_by_travel_time(positions, speeds, region, density=density)
         return partition(positions, region, density=density)
 
@@ -217,12 +217,12 @@ class Record(Drawable):
         -------
         Snapshot
         """
-        working = None if self.conditions is None else self.working[k]
+        is_working = None if self.conditions is None else self.is_working[k]
         neighbors = Neighbors.from_ranges(self.positions[k], self.team.communication_range)
         observations = Observations(
             positions=self.positions[k],
             velocities=self.velocities[k],
-            neighbors=neighbors if working is None else neighbors.restrict_to_working(working),
+            neighbors=neighbors if is_working is None else neighbors.restrict_to_working(is_working),
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),
@@ -235,7 +235,7 @@ class Record(Drawable):
             goals=None if np.isnan(self.goals[k]).all() else self.goals[k],
             cells=self.cells(k) if self.has_travel_time_cells else None,
         )
-        return Snapshot(observations, decision, working=working)
+        return Snapshot(observations, decision, is_working=is_working)
 
     def at(self, time: float) -> Snapshot:
         """Return the state and the decision at the time step nearest to a time.
@@ -470,8 +470,8 @@ def _to_event(joined: JoinedRobot) -> dict[str, Any]:
         "kind": "join",
         "robot": joined.robot,
         "time_s": joined.time,
-        "place_m": list(joined.position),
-        "requested_m": list(joined.requested_position),
+        "position_m": list(joined.position),
+        "requested_position_m": list(joined.requested_position),
     }
 
 
@@ -480,6 +480,6 @@ def _from_event(event: JoinEvent) -> JoinedRobot:
     return JoinedRobot(
         robot=event.robot,
         time=event.time_s,
-        position=(event.place_m[0], event.place_m[1]),
-        requested_position=(event.requested_m[0], event.requested_m[1]),
+        position=(event.position_m[0], event.position_m[1]),
+        requested_position=(event.requested_position_m[0], event.requested_position_m[1]),
     )

@@ -1,10 +1,13 @@
-"""The model of ``run.json``, against which the file is checked when it is read."""
+"""The model of ``run.json``, against which the file is checked when it is read.
+
+The second name of a field is its former name, under which files of earlier versions contain it.
+"""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, create_model
+from pydantic import AliasChoices, Field, create_model
 
 from robocov.conditions import PARAMETERS, DensityKnowledge
 from robocov.files.documents import Document, expect
@@ -30,7 +33,7 @@ class _Failure(Document):
 
 
 class _Join(_Failure):
-    place_m: Point | None
+    position_m: Point | None = Field(validation_alias=AliasChoices("position_m", "place_m"))
 
 
 _LATER_CONDITIONS = ("bandwidth",)
@@ -72,7 +75,7 @@ class _Controller(Document):
     gains: dict[str, Annotated[float | str | bool | None, expect("a number, a word or null")]]
 
 
-class _Touch(Document):
+class _EditPeriod(Document):
     """A period during which the user moved robots."""
 
     from_s: Time
@@ -93,19 +96,19 @@ class JoinEvent(Document):
     kind: Literal["join"]
     robot: RobotNumber
     time_s: Time
-    place_m: Point
-    requested_m: Point
+    position_m: Point = Field(validation_alias=AliasChoices("position_m", "place_m"))
+    requested_position_m: Point = Field(validation_alias=AliasChoices("requested_position_m", "requested_m"))
 
 
 class _Session(Document):
-    """Origin of a run that is part of a session in the window."""
+    """Origin of a run that is part of a session of the application."""
 
     began_at_s: Time = 0.0
     start_velocities_m_per_s: list[Point] = Field([])
     robots: list[RobotNumber] = Field([])
     failed: dict[RobotKey, Point] = Field({})
-    touched: list[_Touch] = Field([])
-    placed: list[_Placement] = Field([])
+    edits: list[_EditPeriod] = Field([], validation_alias=AliasChoices("edits", "touched"))
+    placements: list[_Placement] = Field([], validation_alias=AliasChoices("placements", "placed"))
     control_dt_s: Seconds = 1.0
     repeatable: bool = True
 

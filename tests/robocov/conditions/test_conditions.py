@@ -177,6 +177,14 @@ def test_conditions_of_earlier_versions_have_no_bandwidth() -> None:
     assert Conditions.from_dict(data) == Conditions()
 
 
+def test_the_former_key_of_a_joining_position_is_read() -> None:
+    conditions = Conditions(joins=((2, 5.0, (1.0, 3.0)), (3, 5.0)))
+    document = conditions.to_dict()
+    for join in document["joins"]:
+        join["place_m"] = join.pop("position_m")
+    assert Conditions.from_dict(document) == conditions
+
+
 def test_a_known_density_does_not_change_files_of_earlier_versions() -> None:
     assert "density" not in Conditions().to_dict()
     assert Conditions(density="sensed").to_dict()["density"] == "sensed"

@@ -69,6 +69,18 @@ def test_after_an_interruption_the_folder_contains_the_old_or_the_new_result(
     assert set(statuses) == ({9} if outcome == "kill" else {0, 2})
 
 
+@pytest.mark.parametrize("has_manifest", [True, False])
+def test_a_branch_with_the_former_file_name_is_replaced(tmp_path: Path, has_manifest: bool) -> None:
+    former = {"story.json": '{"format": "robocov-story"}', "session.robocov": "session", "notes.txt": "mine"}
+    write_files(tmp_path, former)
+    if has_manifest:
+        manifest = {"format": "robocov-folder", "version": 1, "files": ["session.robocov", "story.json"]}
+        (tmp_path / ".robocov.json").write_text(json.dumps(manifest))
+    branch = {"branch.json": '{"format": "robocov-branch"}', "session.robocov": "new"}
+    save_result(tmp_path, branch, kind="branch")
+    assert read_contents(tmp_path) == branch | {"notes.txt": "mine"}
+
+
 def test_an_error_keeps_the_old_result_and_saved_progress(tmp_path: Path) -> None:
     save_result(tmp_path, OLD)
     with pytest.raises(KeyboardInterrupt), create_result(tmp_path, overwrite=True) as result:

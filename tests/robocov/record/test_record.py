@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robocov.conditions import Conditions
+from robocov.conditions import Conditions, JoinedRobot
 from robocov.controllers import IndividualControllerAdapter, Rapf, Rpf, get_gain_values, make_controller
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, RobocovError
@@ -53,6 +53,27 @@ def test_gains_with_a_former_spelling_are_loaded_with_the_present_one(record: Re
     run["controller"] = {"name": "poduri", "gains": {"neighbours": 3.0}}
     (tmp_path / "run.json").write_text(json.dumps(run))
     assert Record.load(tmp_path).gains == {"neighbors": 3.0}
+
+
+def test_former_keys_of_joins_and_edits_are_read(record: Record, tmp_path: Path) -> None:
+    session = {
+        "edits": [{"from_s": 0.0, "to_s": 0.5, "robots": [1]}],
+        "placements": [{"time_s": 0.2, "robots": [1]}],
+    }
+    conditions = Conditions(joins=((2, 0.5, (1.0, 1.0)),))
+    joined = (JoinedRobot(2, 0.5, (1.0, 1.5), (1.0, 1.0)),)
+    saved = replace(record, session=session, conditions=conditions, joined=joined)
+    saved.save(tmp_path)
+    run = json.loads((tmp_path / "run.json").read_text())
+    run["session"] = {"touched": run["session"]["edits"], "placed": run["session"]["placements"]}
+    (join,) = run["conditions"]["joins"]
+    join["place_m"] = join.pop("position_m")
+    (event,) = run["events"]
+    event["place_m"] = event.pop("position_m")
+    event["requested_m"] = event.pop("requested_position_m")
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    loaded = Record.load(tmp_path)
+    assert (loaded.session, loaded.conditions, loaded.joined) == (session, conditions, joined)
 
 
 def test_run_json_suffices_to_repeat_the_run(record: Record, tmp_path: Path) -> None:
@@ -237,9 +258,9 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
         ),
         (
             edit_document(
-                "conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "place_m": [1]}]}
+                "conditions", to={**CONDITIONS, "joins": [{"robot": 1, "time_s": 0.0, "position_m": [1]}]}
             ),
-            "run.json: conditions.joins[0].place_m: expected a point [x, y], got [1]",
+            "run.json: conditions.joins[0].position_m: expected a point [x, y], got [1]",
         ),
         (edit_document("session", to=[1]), "run.json: session: expected an object, got [1]"),
         (
@@ -256,8 +277,8 @@ CONDITIONS = Conditions(loss=0.1, failures=((1, 0.5),), joins=((2, 0.5, (1.0, 1.
             'run.json: session.failed["4"]: expected a point [x, y]',
         ),
         (
-            edit_document("session", "touched", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
-            'run.json: session.touched[0].to_s: expected a number from 0 (s), got "soon"',
+            edit_document("session", "edits", to=[{"from_s": 0, "to_s": "soon", "robots": [1]}]),
+            'run.json: session.edits[0].to_s: expected a number from 0 (s), got "soon"',
         ),
         (
             lambda folder: (folder / "record.npz").write_bytes(b"PK\x03\x04 no"),
@@ -325,7 +346,7 @@ def test_loading_a_run_does_not_load_its_controller(record: Record, tmp_path: Pa
 def test_the_mask_of_working_robots_is_read_only(record: Record) -> None:
     """Snapshots contain views of the mask."""
     failing = replace(record, conditions=Conditions(failures=((1, 0.5),)))
-    for mask in (failing.working, failing.present, failing.snapshot(3).working, record.working):
+    for mask in (failing.is_working, failing.is_present, failing.snapshot(3).is_working, record.is_working):
         with pytest.raises(ValueError, match="read-only"):
             mask[...] = False
 

@@ -33,7 +33,7 @@ def run_with_joins(*joins: tuple[object, ...], duration: float = 3.0) -> Record:
 def test_paths_start_where_robots_join(place: tuple[float, float]) -> None:
     record = run_with_joins((3, 1.0, place))
     lengths = compute_path_lengths(record.positions, record.traveled)
-    first_moment = int(np.argmax(record.present[:, 2]))
+    first_moment = int(np.argmax(record.is_present[:, 2]))
     np.testing.assert_array_equal(lengths[2], compute_path_lengths(record.positions[first_moment:])[2])
     assert 0.0 < lengths[2] <= 2.0  # in 2 s at 1 m/s
     assert compute_run_metrics(record).path_length[-1] == pytest.approx(lengths.mean())
@@ -46,7 +46,7 @@ def test_moved_joining_positions_are_recorded(tmp_path: Path) -> None:
     assert joined.robot == 3
     assert joined.time == pytest.approx(1.0)
     assert joined.requested_position == (10.0, 5.0)
-    first_moment = int(np.argmax(record.present[:, 2]))
+    first_moment = int(np.argmax(record.is_present[:, 2]))
     np.testing.assert_array_equal(record.positions[first_moment, 2], joined.position)
     assert joined.offset > 1.0
     record.save(tmp_path)
@@ -105,7 +105,7 @@ def test_robots_that_are_placed_by_the_user_do_not_travel() -> None:
     record = run_with_joins(duration=2.0)
     positions = record.positions.copy()
     positions[20:, 1] += 5.0
-    session = {"placed": [{"time_s": float(record.time[20]), "robots": [7]}], "robots": [4, 7, 9]}
+    session = {"placements": [{"time_s": float(record.time[20]), "robots": [7]}], "robots": [4, 7, 9]}
     edited = replace(record, positions=positions, session=session)
     original_lengths = compute_path_lengths(record.positions)
     lengths = compute_path_lengths(edited.positions, edited.traveled)

@@ -261,7 +261,7 @@ def test_a_record_is_continued_like_a_longer_run_bit_for_bit(name: str, conditio
         session.branch()
         advance_session(session, round((2.0 - time_s) / DT))
         pane = session.timeline.panes[0]
-        rows = np.flatnonzero(expected.working[-1])
+        rows = np.flatnonzero(expected.is_working[-1])
         assert [number - 1 for number in pane.numbers] == rows.tolist()
         assert pane.positions.tobytes() == expected.positions[-1, rows].tobytes()
         assert pane.velocities.tobytes() == expected.velocities[-1, rows].tobytes()

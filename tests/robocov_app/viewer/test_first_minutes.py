@@ -301,7 +301,7 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
         viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
         viewer.session.fail_robot(2)
-        viewer.files.save_session(tmp_path / "story.robocov")
+        viewer.files.save_session(tmp_path / "session.robocov")
         (tmp_path / "bad.robocov").write_text("{}")
 
         def drop(name: str) -> None:
@@ -311,9 +311,9 @@ def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
         drop("other.json")
         assert viewer.files.map_name == str(tmp_path / "other.json")
         assert viewer.session.displayed.numbers == (1, 2, 3)
-        drop("story.robocov")
+        drop("session.robocov")
         assert viewer.session.displayed.numbers == (1, 3)
-        assert viewer.files.workspace.path == tmp_path / "story.robocov"
+        assert viewer.files.workspace.path == tmp_path / "session.robocov"
         drop("bad.robocov")
         assert viewer.has_error_message
         assert "bad.robocov" in viewer.message

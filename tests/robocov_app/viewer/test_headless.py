@@ -29,7 +29,7 @@ SMALL = ["--lattice", "16", "--size", "320x240"]
 
 def save_session_file(session: Session, folder: Path) -> str:
     session.timeline.cache_present()
-    path = folder / "story.robocov"
+    path = folder / "session.robocov"
     save_session(path, session.timeline.document, session.timeline.head, session.timeline.step, {})
     return str(path)
 
@@ -109,15 +109,22 @@ def test_reports_contain_saved_branches_and_sessions(
     capsys.readouterr()
     assert main(["report", path]) == 0
     assert capsys.readouterr().out.startswith(Path(path).stem)
-    page = (tmp_path / "story.html").read_text()
+    page = (tmp_path / "session.html").read_text()
     assert "0.2 to 0.4 s, robot 2 failed</h2>" in page
     assert titles[2] in page, "the report contains all branches"
     assert str(tmp_path) not in page
     assert "/robocov-" not in page, "the report contains no path of a temporary folder"
-    (tmp_path / "branch" / "story.json").write_text('{"format": "robocov-story"}')
+    branch_file = tmp_path / "branch" / "branch.json"
+    former_text = branch_file.read_text().replace("robocov-branch", "robocov-story")
+    branch_file.unlink()
+    (tmp_path / "branch" / "story.json").write_text(former_text.replace('"description"', '"words"'))
+    assert main(["report", str(tmp_path / "branch")]) == 0
+    former_page = (tmp_path / "branch" / "report.html").read_text()
+    assert all(f" · {title}</h2>" in former_page for title in titles), "the former file name is read"
+    branch_file.write_text('{"format": "robocov-branch"}')
     capsys.readouterr()
     assert main(["report", str(tmp_path / "branch")]) == 2
-    assert "story.json: cannot be read" in capsys.readouterr().err
+    assert "branch.json: cannot be read" in capsys.readouterr().err
 
 
 def test_a_video_has_a_legend_and_names_the_edits(tmp_path: Path) -> None:
@@ -148,7 +155,7 @@ def test_a_drag_belongs_to_the_part_before_and_is_recorded_there() -> None:
     record = build_record(session)
     assert part.first_step == 0
     assert len(record) == 19
-    (drag,) = record.session["touched"]
+    (drag,) = record.session["edits"]
     assert drag["robots"] == [2]
     assert drag["from_s"] == pytest.approx(0.1)
     assert record.session["repeatable"] is False
@@ -210,7 +217,7 @@ def test_the_path_length_excludes_placing_a_robot() -> None:
     advance_session(session, 12)
     record = build_record(session)
     assert len(record) == 25
-    (placed,) = record.session["placed"]
+    (placed,) = record.session["placements"]
     assert placed["robots"] == [2]
     assert placed["time_s"] == pytest.approx(0.2)
     jump = np.hypot(*np.diff(record.positions[:, 1], axis=0).T)

@@ -122,8 +122,8 @@ def test_typed_commands_run(tmp_path: Path) -> None:
     run_text(viewer, "robot 3")
     assert viewer.selected_robot == 3
     run_text(viewer, "branch 1")
-    run_text(viewer, f"save {tmp_path / 'story.robocov'}")
-    run_text(viewer, f"open {tmp_path / 'story.robocov'}")
+    run_text(viewer, f"save {tmp_path / 'session.robocov'}")
+    run_text(viewer, f"open {tmp_path / 'session.robocov'}")
     assert viewer.message.startswith("Session opened: ")
     run_text(viewer, "map square")
     assert viewer.files.map_name == "square"

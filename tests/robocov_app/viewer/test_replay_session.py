@@ -294,7 +294,7 @@ def test_session_content_that_contradicts_the_record_is_ignored(
 
 def test_dragged_robots_are_events(record: Record) -> None:
     drags = [{"from_s": 0.1, "to_s": 0.2, "robots": [2, 3]}]
-    (event,) = replay(replace(record, session={"touched": drags})).timeline.events
+    (event,) = replay(replace(record, session={"edits": drags})).timeline.events
     assert (event.time, event.kind, event.text) == (0.2, "hand", "robot 2, 3 was dragged")
 
 

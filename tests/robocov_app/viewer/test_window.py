@@ -23,12 +23,12 @@ from robocov_app.viewer.window.status import describe_cursor
 
 def test_the_title_names_the_map_and_then_the_file(driver: Driver) -> None:
     assert pygame.display.get_caption()[0] == "hall • robocov"
-    driver.viewer.files.save_session(driver.viewer.files.folder / "story.robocov")
+    driver.viewer.files.save_session(driver.viewer.files.folder / "session.robocov")
     driver.run_frames(1)
-    assert pygame.display.get_caption()[0] == "story.robocov • robocov"
+    assert pygame.display.get_caption()[0] == "session.robocov • robocov"
     driver.viewer.attempt(lambda: driver.session.fail_robot(1))
     driver.run_frames(1)
-    assert pygame.display.get_caption()[0] == "● story.robocov • robocov"
+    assert pygame.display.get_caption()[0] == "● session.robocov • robocov"
 
 
 # playing

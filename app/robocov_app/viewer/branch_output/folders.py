@@ -1,20 +1,43 @@
-"""Folders of the parts of a saved branch, which are listed in ``story.json``."""
+"""Folders of the parts of a saved branch, which are listed in ``branch.json``."""
 
 import json
 from pathlib import Path
 from typing import Any
 
 from robocov.errors import InputError, to_one_line
-from robocov.files.result_names import STORY_FILE
+from robocov.files.result_names import BRANCH_FILE, FORMER_BRANCH_FILE
 from robocov_app.terminal.output import write_json
 
-_FORMAT = "robocov-story"
+_FORMAT = "robocov-branch"
+_FORMER_FORMAT = "robocov-story"
+"""Format of files of earlier versions."""
+_FORMER_DESCRIPTION_KEY = "words"
+"""Key of the description of a part in these files."""
 _VERSION = 1
 
 
 def write_branch_file(folder: Path, parts: list[dict[str, Any]]) -> None:
     """Write the file that lists the parts of a branch."""
-    write_json(folder / STORY_FILE, {"format": _FORMAT, "version": _VERSION, "parts": parts})
+    write_json(folder / BRANCH_FILE, {"format": _FORMAT, "version": _VERSION, "parts": parts})
+
+
+def find_branch_file(folder: Path) -> Path | None:
+    """Return the file that lists the parts of a branch.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of a branch, or of any other result.
+
+    Returns
+    -------
+    Path or None
+        None if this is not the folder of a branch.
+    """
+    for name in (BRANCH_FILE, FORMER_BRANCH_FILE):
+        if (folder / name).is_file():
+            return folder / name
+    return None
 
 
 def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
@@ -33,21 +56,22 @@ def list_part_folders(folder: Path) -> list[tuple[Path, str]]:
     Raises
     ------
     InputError
-        If ``story.json`` is damaged.
+        If ``branch.json`` is damaged.
     """
-    file = folder / STORY_FILE
+    file = find_branch_file(folder)
+    if file is None:
+        # This is another kind of result, whose reader reports any problems.
+        return [(folder, "")]
     try:
         content = json.loads(file.read_bytes())
-        if content["format"] != _FORMAT:
+        if content["format"] not in (_FORMAT, _FORMER_FORMAT):
             return [(folder, "")]
         return [_read_part(folder, part) for part in content["parts"]]
-    except OSError:
-        # Without the file, this is another kind of result, whose reader reports any problems.
-        return [(folder, "")]
-    except (ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         raise InputError(f"{file}: cannot be read: {to_one_line(error)}") from None
 
 
 def _read_part(folder: Path, part: dict[str, Any]) -> tuple[Path, str]:
-    description = "{from_s:.1f} to {to_s:.1f} s, {words}".format(**part)
+    key = _FORMER_DESCRIPTION_KEY if _FORMER_DESCRIPTION_KEY in part else "description"
+    description = f"{part['from_s']:.1f} to {part['to_s']:.1f} s, {part[key]}"
     return folder / to_one_line(part["folder"]), description

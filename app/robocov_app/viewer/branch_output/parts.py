@@ -254,9 +254,9 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
     """Return the robots that the user dragged or placed, with times since the start of the part, s."""
     origin: dict[str, Any] = {}
     if part.handled:
-        origin["touched"] = [_describe_handled(time, part.first_step, dt) for time in part.handled]
+        origin["edits"] = [_describe_handled(time, part.first_step, dt) for time in part.handled]
     if part.placed:
-        origin["placed"] = [
+        origin["placements"] = [
             {"time_s": (step - part.first_step) * dt, "robots": [robot]} for step, robot in part.placed
         ]
     return origin

@@ -81,7 +81,7 @@ class _BranchWriter:
                 mean_distance = run.summary["mean_distance_m"]
                 run_rows.append({"part": number, "controller": name, "mean_distance_m": mean_distance})
             times = {"from_s": part.first_step * dt, "to_s": part.last_step * dt}
-            part_rows.append({"folder": folder, **times, "words": description})
+            part_rows.append({"folder": folder, **times, "description": description})
             self.result.save_progress()
         if has_several_parts:
             write_branch_file(self.result.staging, part_rows)

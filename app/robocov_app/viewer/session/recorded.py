@@ -183,7 +183,7 @@ def _build_history(records: Sequence[Record], scenario: SessionScenario) -> RunH
 def _list_drag_events(record: Record, dt: float) -> list[AutomaticEvent]:
     """Return an event for each drag of robots while the record was made."""
     events = []
-    for drag in record.session.get("touched", ()):
+    for drag in record.session.get("edits", ()):
         numbers = ", ".join(map(str, drag["robots"]))
         events.append(AutomaticEvent(round(drag["to_s"] / dt), "hand", f"robot {numbers} was dragged"))
     return events
@@ -202,7 +202,7 @@ def _build_states(record: Record, setup: PaneSetup) -> list[PaneState]:
     for index in range(len(record)):
         rows: Any = slice(None)  # all robots, unless some do not work in this state
         if setups[index] is not setup:
-            rows = np.flatnonzero(record.working[index])
+            rows = np.flatnonzero(record.is_working[index])
         has_goals = not np.isnan(record.goals[index]).all()
         decision = Decision(forces[index][rows], goals[index][rows] if has_goals else None)
         steering = None if record.steering is None else record.steering[index][rows]
@@ -232,7 +232,9 @@ def _build_setups(record: Record, setup: PaneSetup) -> list[PaneSetup]:
         conditions = record.conditions
         scheduled_robots = len(record.team)
     setups = []
-    for positions, working, present in zip(record.positions, record.working, record.present, strict=True):
+    for positions, working, present in zip(
+        record.positions, record.is_working, record.is_present, strict=True
+    ):
         key = working.tobytes() + present.tobytes()
         if key not in setup_by_robots:
             # Failed robots do not move, so their positions are the same in all states that share the setup.
@@ -310,7 +312,7 @@ def _restore_pane(pane: Pane, saved: SavedRun, history: RunHistory) -> None:
     stride = max(1, round(STEPS_BETWEEN_SENSED_POINTS * history.dt / record.dt))
     for index in range(0, len(record), stride):
         numbers = history[index].states[pane.number].setup.numbers
-        points = record.obstacle_points[index][record.working[index]]
+        points = record.obstacle_points[index][record.is_working[index]]
         pane.sensed.add(index * record.dt, numbers, points)
     if saved.history is None:
         return
