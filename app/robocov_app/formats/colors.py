@@ -28,7 +28,7 @@ MIN_PALE_LUMINANCE = 0.75
 _LUMA_WEIGHTS = (0.299, 0.587, 0.114)
 """Weights of red, green and blue (ITU-R BT.601)."""
 _MAX_COLORS = 32
-"""Largest number of declared colors. Each of them is compared with every pixel."""
+"""Maximum number of declared colors. Each of them is compared with every pixel."""
 _MAX_LISTED_COLORS = 6
 _MAX_NAME_CHARACTERS = 100
 _FUNCTION = re.compile(r"rgba?\(([^()]*)\)", re.IGNORECASE)
@@ -60,7 +60,7 @@ class ColorKey:
     ----------
     entries : sequence of (color, role)
     tolerance : float
-        Largest difference in each of red, green and blue, from 0 to 255.
+        Maximum difference in each of red, green and blue, from 0 to 255.
 
     Notes
     -----

@@ -70,7 +70,7 @@ class ImportReport(_Report):
     moved_area : float, m²
         Area that the simplification made free or solid.
     moved : float, m
-        Largest distance by which the simplification moved a wall: a Hausdorff distance.
+        Maximum distance by which the simplification moved a wall: a Hausdorff distance.
     removed, removed_area : int, float m²
         Number and area of removed hairs: slits and spurs thinner than the resolution of coordinates.
     others : tuple of (x, y), m

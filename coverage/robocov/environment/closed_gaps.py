@@ -15,7 +15,7 @@ from robocov.environment.polygons import GRID_M, extract_polygons
 from robocov.typing import BoolArray, FloatArray, IntArray, Point
 
 _WIDTH_TOLERANCE_M = 2 * GRID_M
-"""Largest difference by which a gap may be narrower than the disc and still stay open. Vertices are rounded,
+"""Maximum difference by which a gap may be narrower than the disc and still stay open. Vertices are rounded,
 so that the width of a gap is not exact."""
 _SNAP_DISTANCE_M = 2 * GRID_M
 """Distance from a vertex within which the end of a segment is moved to the vertex."""

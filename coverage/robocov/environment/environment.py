@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.density import Density
 from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
@@ -174,10 +174,10 @@ class Environment(Drawable):
         """Integral of φ over each component of the free space, m². It is the area if there is no density."""
         components = self.free.geoms
         if self.density is None:
-            return freeze([component.area for component in components])
+            return copy_read_only([component.area for component in components])
         if self.density.is_uniform:
-            return freeze([component.area * self.density.max_value for component in components])
-        return freeze(compute_polygon_masses(self.density, list(components)))
+            return copy_read_only([component.area * self.density.upper_bound for component in components])
+        return copy_read_only(compute_polygon_masses(self.density, list(components)))
 
     def with_density(self, density: Density | None) -> Environment:
         """Return the same map with another density, without computing its geometry again.

@@ -20,7 +20,7 @@ Repeat: TypeAlias = Literal["loop", "back-and-forth"]
 REPEATS: tuple[str, ...] = get_args(Repeat)
 """The values of `Repeat`."""
 _PARALLEL_TOLERANCE_M2 = 1e-12
-"""Largest cross product of an edge and the motion if the edge counts as parallel to the motion. Such an edge
+"""Maximum cross product of an edge and the motion if the edge counts as parallel to the motion. Such an edge
 sweeps no area."""
 
 

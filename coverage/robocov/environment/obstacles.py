@@ -15,9 +15,9 @@ from robocov.environment.obstacle_paths import ObstaclePath
 from robocov.typing import FloatArray, Point, Ring
 
 MAX_SAGITTA_M = 1e-3
-"""Largest distance between a circle and the polygon that represents the circle."""
+"""Maximum distance between a circle and the polygon that represents the circle."""
 _MIN_SIDES = 12
-"""Smallest number of sides of such a polygon."""
+"""Minimum number of sides of such a polygon."""
 _MITRE_LIMIT = 4.0
 """Maximum distance between the tip of a wall's corner and the axis of the wall, in half widths."""
 

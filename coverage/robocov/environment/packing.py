@@ -30,7 +30,7 @@ _CANDIDATES_PER_POINT = 4
 _MAX_CANDIDATES_PER_NEW_POINT = 100
 """The random packing ends when fewer than one in this number of candidates inside the area become points."""
 _MIN_AREA_FRACTION = 1e-3
-"""Smallest fraction of its bounding box that an area is assumed to fill."""
+"""Minimum fraction of its bounding box that an area is assumed to fill."""
 
 
 def bound_point_count(area: BaseGeometry, spacing: float) -> int:
@@ -41,7 +41,7 @@ def bound_point_count(area: BaseGeometry, spacing: float) -> int:
     area : geometry, m
         Area that contains the points.
     spacing : float, m
-        Smallest distance between two points.
+        Minimum distance between two points.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def estimate_point_count(area: BaseGeometry, spacing: float) -> int:
     area : geometry, m
         Area that contains the points.
     spacing : float, m
-        Smallest distance between two points.
+        Minimum distance between two points.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def pack_densely(area: BaseGeometry, spacing: float) -> FloatArray:
     area : geometry, m
         Area that contains the points.
     spacing : float, m
-        Smallest distance between two points.
+        Minimum distance between two points.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, 
     max_count : int
         Maximum number of points.
     spacing : float, m
-        Smallest distance between two points.
+        Minimum distance between two points.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def pack_lattice(rng: np.random.Generator, area: BaseGeometry, max_count: int, s
     max_count : int
         Maximum number of points. If more lie in the area, a random selection of this number is returned.
     spacing : float, m
-        Smallest distance between two points.
+        Minimum distance between two points.
 
     Returns
     -------

@@ -17,9 +17,9 @@ from robocov.environment.polygons import GRID_M
 from robocov.typing import BoolArray, FloatArray, IntArray, Point
 
 MIN_POCKET_AREA_M2 = math.pi * DEFAULT_RADIUS_M**2
-"""Smallest area of a part of the free space to which a passage may lead; no robot enters a smaller one."""
+"""Minimum area of a part of the free space to which a passage may lead; no robot enters a smaller one."""
 _MAX_CRACK_M = 2 * MAX_SAGITTA_M
-"""Largest distance between walls that count as touching. A circle that touches a wall is represented by a
+"""Maximum distance between walls that count as touching. A circle that touches a wall is represented by a
 polygon, which may leave a crack."""
 _CLOSED_CRACK_M = 1e-9
 """Remaining width of a closed crack, so that walls do not touch in a single point."""
@@ -30,9 +30,9 @@ _CORNERS_PER_BATCH = 256
 _CANDIDATES_PER_BATCH = 512
 """Number of candidates that are examined together, the narrowest first. Most searches end after one batch."""
 _FIRST_WIDTH_FRACTION = 1 / 4096
-"""Largest width of the gaps that are searched for first, as a fraction of the diagonal of the free space."""
+"""Maximum width of the gaps that are searched for first, as a fraction of the diagonal of the free space."""
 _COSINE_TOLERANCE = 1e-9
-"""Largest cosine of an angle that counts as a right angle or more."""
+"""Maximum cosine of an angle that counts as a right angle or more."""
 _DISC_RELATIVE_TOLERANCE = 1e-9
 _DISC_TOLERANCE_M = 1e-12
 """Amounts by which the radii of discs are reduced, relative and absolute. Otherwise, because of rounding

@@ -29,7 +29,7 @@ MIN_START_GAP_RADII = 0.02
 """Half of the minimum gap between two robots at the start, and the minimum gap between robots and walls, as a
 multiple of the radius of a robot."""
 MAX_COUNTED_ROBOTS = 2000
-"""Largest capacity of a start that is determined by packing. Larger capacities are estimated from the
+"""Maximum capacity of a start that is determined by packing. Larger capacities are estimated from the
 area."""
 _DISC_QUADRANT_SEGMENTS = 64
 """Edges per quadrant of the polygon that represents the disc of a start."""

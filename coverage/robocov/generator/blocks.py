@@ -18,9 +18,9 @@ from robocov.generator.request import MapRequest
 _TILT_DEVIATIONS_RAD = (0.0, 0.05, 0.1)
 """Possible standard deviations of the tilts of the streets of a town."""
 _MAX_TILT_DEVIATIONS = 1.5
-"""Largest tilt of a street, in standard deviations."""
-_MAX_WIDENING_GAPS = 1.2
-"""Largest widening of the first street beyond its smallest width, as a multiple of the requested gap."""
+"""Maximum tilt of a street, in standard deviations."""
+_MAX_WIDENING_PER_GAP = 1.2
+"""Maximum widening of the first street beyond its minimum width, as a multiple of the requested gap."""
 _MIN_WIDENING_SHARE = 0.4
 """Widening of the narrowest streets, which divide only two blocks or lie along the boundary, relative to the
 widening of the first street."""
@@ -29,16 +29,17 @@ _CHAMFER_PROBABILITY = 0.25
 _NOTCH_PROBABILITY = 0.2
 """Probability that a corner of a block is cut out as a parallelogram."""
 _CHAMFER_FRACTIONS = (0.2, 0.45)
+"""Minimum and maximum fraction of an edge that a chamfer cuts off; see `Trim`."""
 _NOTCH_FRACTIONS = (0.35, 0.6)
-"""Smallest and largest fraction of an edge that is cut off; see `Trim`."""
+"""Minimum and maximum fraction of an edge that a notch cuts off; see `Trim`."""
 _CORNER_CHOICES = 12
 """Range of the random number that, modulo the number of corners, is the corner to trim."""
 _MAX_UNEVENNESS = 0.25
-"""Largest offset of a cut from an even division, relative to the width of one block."""
+"""Maximum offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
-"""Smallest thickness of a block, relative to the side of a square of its area."""
+"""Minimum thickness of a block, relative to the side of a square of its area."""
 _MIN_THICK_FRACTION = 0.97
-"""Smallest fraction of a block's area that must be at least so thick; acute corners are always thinner."""
+"""Minimum fraction of a block's area that must be at least that thick; acute corners are always thinner."""
 _WIDENING_BISECTIONS = 16
 """Number of bisections by which the width of the streets is chosen."""
 
@@ -115,7 +116,7 @@ def build_town(
     feasible_widening = _find_feasible_widening(cells, request, corner_disc)
     if feasible_widening is None:
         return None
-    trims = _draw_trims(cells, feasible_widening, corner_disc, rng)
+    trims = _sample_trims(cells, feasible_widening, corner_disc, rng)
 
     def build_blocks(widening: float) -> list[Polygon]:
         """Return the blocks between streets of the given widening, m."""
@@ -202,7 +203,7 @@ class _Street(NamedTuple):
     normal : (x, y)
         Unit vector across the street.
     width : float, m
-        Smallest width.
+        Minimum width.
     widening_share : float
         Widening share of the edges on either side; see `Edge`.
     """
@@ -310,7 +311,7 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
     cell : Cell
         A cell, with the streets along its edges.
     widening : float, m
-        Widening of the first street beyond its smallest width.
+        Widening of the first street beyond its minimum width.
 
     Returns
     -------
@@ -331,20 +332,22 @@ def remove_streets(cell: Cell, widening: float) -> Cell:
 
 def _find_feasible_widening(cells: list[Cell], request: MapRequest, corner_disc: DiscStart) -> float | None:
     """Find a widening of the first street, m, at which no block is too thin; return None if there is none."""
-    widening = _MAX_WIDENING_GAPS * request.gap
-    while not all(_is_thick(_build_block(cell, widening, corner_disc, None)) for cell in cells):
+    widening = _MAX_WIDENING_PER_GAP * request.gap
+    while True:
+        blocks = [_build_block(cell, widening, corner_disc, trim=None) for cell in cells]
+        if all(_is_thick(block) for block in blocks):
+            return widening
         if widening == 0.0:
             return None
-        # After widenings down to one rounding step, try streets of the smallest width.
+        # Halve the widening down to one rounding step, then try none at all.
         widening = widening / 2.0 if widening > request.rounding_step else 0.0
-    return widening
 
 
 def _build_block(cell: Cell, widening: float, corner_disc: DiscStart, trim: Trim | None) -> Polygon:
     """Build the block of a cell; return an empty polygon if nothing remains of the cell.
 
     The block is the cell without the streets along its edges, whose widths follow from the widening of the
-    first street. It is outside the square around the start disc. A trim cuts off one of its corners.
+    first street. It is outside the square around the corner disc. A trim cuts off one of its corners.
     """
     block = remove_streets(cell, widening)
     if not block:
@@ -385,12 +388,12 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
     return trimmed if trimmed.is_valid else _to_polygon(block)
 
 
-def _draw_trims(
+def _sample_trims(
     cells: list[Cell], feasible_widening: float, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Trim | None]:
     """Draw a trim for each block; None if the block stays whole or the trimmed block would be too thin."""
     trims: list[Trim | None] = []
-    drawn_trims = [_draw_trim(rng) for _ in cells]
+    drawn_trims = [_sample_trim(rng) for _ in cells]
     for cell, trim in zip(cells, drawn_trims, strict=True):
         largest_block = _build_block(cell, 0.0, corner_disc, trim)
         smallest_block = _build_block(cell, feasible_widening, corner_disc, trim)
@@ -399,7 +402,7 @@ def _draw_trims(
     return trims
 
 
-def _draw_trim(rng: np.random.Generator) -> Trim | None:
+def _sample_trim(rng: np.random.Generator) -> Trim | None:
     """Draw a chamfer or a notch; None for neither."""
     choice = rng.random()
     corner = int(rng.integers(0, _CORNER_CHOICES))

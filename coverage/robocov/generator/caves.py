@@ -27,14 +27,14 @@ _WAVE_COUNT = 48
 """Number of waves whose sum is the random field."""
 _MIN_WAVELENGTH_SPACINGS = 0.7
 _MAX_WAVELENGTH_SPACINGS = 1.7
-"""Smallest and largest length of these waves."""
+"""Minimum and maximum length of these waves."""
 _MIN_MESH_STEPS_PER_SPACING = 6
 _MAX_MESH_STEPS_PER_SPACING = 12
-"""Smallest and largest resolution of the mesh on which the field is evaluated."""
+"""Minimum and maximum resolution of the mesh on which the field is evaluated."""
 _MAX_MESH_STEPS_PER_SIDE = 160
-"""Largest number of steps along the longer side of the map, unless the smallest resolution requires more."""
+"""Maximum number of steps along the longer side of the map, unless the minimum resolution requires more."""
 _MIN_ROCK_SIDES = 0.012
-"""Smallest thickness of the rock along the boundary."""
+"""Minimum thickness of the rock along the boundary."""
 _BORDER_SPACINGS = 0.35
 _BORDER_RISE = 3.0
 """Width of the border along the boundary in which the field is raised, and the height of the rise."""
@@ -43,21 +43,21 @@ _START_DEPTH = 1.5
 """Radius around the start within which the field is lowered, and the depth."""
 _MAX_TOLERANCE_SPACINGS = 0.008
 _MAX_TOLERANCE_SIDES = 0.0027
-"""Largest tolerance with which walls are simplified; the smaller one applies."""
+"""Maximum tolerance with which walls are simplified; the smaller one applies."""
 _MIN_CHAMBER_AREA_RATIO = 0.03
 _MIN_PILLAR_AREA_RATIO = 0.02
-"""Smallest area of a chamber and of a pillar, relative to the area of the map per chamber."""
+"""Minimum area of a chamber and of a pillar, relative to the area of the map per chamber."""
 _SPIKE_SPACINGS = 0.05
 """Half of the maximum thickness of the spikes of rock that are removed."""
 _MAX_BEND_RATIO = 0.25
-"""Largest offset of a tunnel's middle, relative to the length of the tunnel."""
+"""Maximum offset of a tunnel's middle, relative to the length of the tunnel."""
 _MAX_TUNNEL_RADII = 1.5
 """Maximum distance between a narrow gap and the parts of the core that a tunnel connects through it, relative
 to the dilation of the core."""
 _LEVEL_RADIUS_RATIO = 1.2
 """Dilation with which the level of the field is chosen, relative to the smallest dilation."""
 _MAX_RADIUS_RATIO = 2.0
-"""Largest dilation, relative to the smallest one."""
+"""Maximum dilation, relative to the minimum one."""
 _LEVEL_BISECTIONS = 8
 """Number of bisections by which the level of the field is chosen."""
 _RADIUS_BISECTIONS = 12
@@ -141,7 +141,7 @@ class _CaveBuilder:
     tolerance : float, m
         Tolerance with which walls are simplified.
     min_radius : float, m
-        Smallest dilation of the core: half the gap, plus an allowance for simplification and rounding.
+        Minimum dilation of the core: half the gap, plus an allowance for simplification and rounding.
     start_area : geometry
         Area that stays free around the start.
     """

@@ -45,27 +45,27 @@ _MAX_ATTEMPTS = 40
 _CORNER_DISC_SPACINGS = 0.25
 """Radius of the start disc in the corner, as a multiple of `MapRequest.mean_spacing`."""
 _MIN_CORNER_DISC_M = 0.6
-"""Smallest radius of this disc on maps that are large enough; some robots of the default size fit in it."""
+"""Minimum radius of this disc on maps that are large enough; some robots of the default size fit in it."""
 _MAX_CORNER_DISC_SIDES = 0.1
-"""Largest radius of this disc, as a fraction of the shorter side of the map."""
+"""Maximum radius of this disc, as a fraction of the shorter side of the map."""
 _CORNER_DISC_MARGIN_SIDES = 0.02
 """Margin between this disc and the boundary, as a fraction of the shorter side."""
 _DISC_SHRINKAGE = 0.9
 """Factor by which the radius of this disc is repeatedly multiplied until the disc fits between walls."""
 _MIN_DISC_FRACTION = 0.4
-"""Smallest radius of a start disc near walls, as a fraction of its radius without walls."""
+"""Minimum radius of a start disc near walls, as a fraction of its radius without walls."""
 _MAX_CENTER_OFFSET_SIDES = 0.3
-"""Largest offset of the center disc from the middle along x and y, as a fraction of the shorter side."""
+"""Maximum offset of the center disc from the middle along x and y, as a fraction of the shorter side."""
 _CENTER_CANDIDATES = 41
 """Number of points along x, and along y, that are compared as centers of this disc."""
 _CENTER_DISC_FRACTION = 0.8
-"""Largest radius of this disc, as a fraction of the radius of the corner disc."""
+"""Maximum radius of this disc, as a fraction of the radius of the corner disc."""
 _CENTER_OFFSET_WEIGHT = 0.2
 """Clearance, m, that outweighs one meter of distance from the middle."""
 _SCORE_DECIMALS = 9
 """Decimal places to which scores are rounded, so that rounding errors do not decide between equal scores."""
 _GAP_TOLERANCE_M = 1e-6
-"""Largest rounding error of a measured gap."""
+"""Maximum rounding error of a measured gap."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
     area : float or None
         Fraction of the map's area that obstacles block. The default depends on the kind.
     gap : float, m
-        Smallest width of a passage.
+        Minimum width of a passage.
     side : float, m
         Side of a square map.
     width, height : float or None, m

@@ -41,7 +41,7 @@ _MIN_OPENED_FRACTION = 0.04
 _MAX_OPENED_FRACTION = 0.12
 """Range of the fraction of the walls that are removed to create loops; each maze has its own."""
 _MAX_REMOVED_FRACTION = 0.4
-"""Largest fraction of the walls that are removed before a layout is abandoned."""
+"""Maximum fraction of the walls that are removed before a layout is abandoned."""
 _DEAD_END_PROBABILITY = 0.7
 """Probability of removing a wall at a dead end, if there is one."""
 _FRACTION_TOLERANCE = 0.8 * BLOCKED_FRACTION_TOLERANCE

@@ -17,36 +17,36 @@ _MIN_AREA_RATIO = 0.5
 _MAX_AREA_RATIO = 1.5
 """Range of the areas of obstacles, before they are scaled to the requested total."""
 _MAX_FILLED_FRACTION = 0.7
-"""Largest fraction of the map that obstacles fill, together with half of the gap around each of them."""
+"""Maximum fraction of the map that obstacles fill, together with half of the gap around each of them."""
 _MAX_MOVES = 12
-"""Largest number of obstacles that are moved to make space for others before the layout is abandoned."""
+"""Maximum number of obstacles that are moved to make space for others before the layout is abandoned."""
 _MAX_OUTLINES = 8
-"""Largest number of outlines that are tried for one obstacle."""
+"""Maximum number of outlines that are tried for one obstacle."""
 _POSITIONS_PER_OUTLINE = 128
 """Number of random positions that are tested for each of these outlines."""
 _MAX_REDRAWS = 8
-"""Largest number of times that an outline is drawn until it is suitable."""
+"""Maximum number of times that an outline is drawn until it is suitable."""
 _VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
 """Numbers of vertices of a convex polygon, and their probabilities."""
 _MIN_ANGLE_STEP = 0.4
-"""Smallest angle between consecutive vertices, where the largest angle is 1 more. Then all angles are scaled
+"""Minimum angle between consecutive vertices, where the largest angle is 1 more. Then all angles are scaled
 so that they add up to a full turn."""
 _MAX_STRETCH = 1.7
-"""Largest ratio of the axes of the ellipse on which the vertices of a convex polygon lie."""
+"""Maximum ratio of the axes of the ellipse on which the vertices of a convex polygon lie."""
 _L_WIDTHS = (1.0, 1.5)
-"""Smallest and largest width of an L, relative to its height."""
+"""Minimum and maximum width of an L, relative to its height."""
 _L_THICKNESSES = (0.3, 0.5)
-"""Smallest and largest thickness of the arms of an L, relative to its width and its height."""
+"""Minimum and maximum thickness of the arms of an L, relative to its width and its height."""
 _U_WIDTHS = (1.0, 1.6)
 _U_ARM_WIDTHS = (0.2, 0.3)
 _U_BASE_HEIGHTS = (0.22, 0.35)
 _U_RIGHT_HEIGHTS = (0.7, 1.0)
-"""Smallest and largest dimensions of a U, relative to the height of its left arm: its width, the widths of
+"""Minimum and maximum dimensions of a U, relative to the height of its left arm: its width, the widths of
 its arms, the height of the base between the arms, and the height of its right arm."""
 _MIN_ROUNDNESS = 0.52
-"""Smallest area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
+"""Minimum area of a convex polygon, relative to the circle of the same perimeter (regular triangle: 0.6)."""
 _ROUNDING_ERROR_M = 1e-9
-"""Largest rounding error of a distance."""
+"""Maximum rounding error of a distance."""
 
 
 def scatter_polygons(
@@ -235,7 +235,7 @@ def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> F
     area : float, m²
         Area of the U.
     min_opening : float, m
-        Smallest width of the opening between the arms.
+        Minimum width of the opening between the arms.
 
     Returns
     -------

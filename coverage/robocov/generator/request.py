@@ -11,22 +11,22 @@ from robocov.errors import require_number
 from robocov.typing import FloatArray
 
 MIN_GAP_M = 0.21
-"""Smallest gap that may be requested: robots of the default size fit through it."""
+"""Minimum gap that may be requested: robots of the default size fit through it."""
 assert MIN_GAP_M > 2.0 * DEFAULT_RADIUS_M * (1.0 + MIN_START_GAP_RADII)
 BLOCKED_FRACTION_TOLERANCE = 0.005
-"""Largest difference between the blocked fraction of a map's area and the requested fraction."""
+"""Maximum difference between the blocked fraction of a map's area and the requested fraction."""
 MAX_OBSTACLES = 100_000
-"""Largest number of obstacles that may be requested."""
+"""Maximum number of obstacles that may be requested."""
 MIN_SIDE_M = 1.0
 MAX_SIDE_M = 1000.0
-"""Smallest and largest width and height of a map."""
+"""Minimum and maximum width and height of a map."""
 _MIN_BLOCKED_FRACTION = 0.01
 _MAX_BLOCKED_FRACTION = 0.9
-"""Smallest and largest blocked fraction that may be requested."""
+"""Minimum and maximum blocked fraction that may be requested."""
 _MIN_GAPS_PER_SIDE = 3.0
-"""Smallest ratio between the shorter side of a map and the requested gap."""
+"""Minimum ratio between the shorter side of a map and the requested gap."""
 _MIN_CENTIMETER_GAP_M = 0.5
-"""Smallest gap with coordinates in whole centimeters. With narrower gaps, they are in whole millimeters."""
+"""Minimum gap with coordinates in whole centimeters. With narrower gaps, they are in whole millimeters."""
 _ROUNDING_ALLOWANCE_STEPS = 3.0
 """Rounding steps by which gaps are made wider, because rounding may bring corners nearer to each other."""
 _STEP_TOLERANCE = 1e-9
@@ -44,7 +44,7 @@ class MapRequest:
     blocked_fraction : float
         Fraction of the map's area that obstacles block.
     gap : float, m
-        Smallest gap between obstacles.
+        Minimum gap between obstacles.
     width, height : float, m
         Sides of the map.
 

@@ -22,43 +22,43 @@ from robocov.typing import FloatArray
 _CORRIDOR_PROBABILITY = 0.5
 """Probability that a building with enough rooms has a corridor."""
 _MIN_CORRIDOR_ROOMS = 5
-"""Smallest number of rooms of a building with a corridor. The corridor counts as a room."""
+"""Minimum number of rooms of a building with a corridor. The corridor counts as a room."""
 _MIN_CORRIDOR_WIDTH_GAPS = 1.6
 _MAX_CORRIDOR_WIDTH_GAPS = 2.2
-"""Smallest and largest width of a corridor."""
+"""Minimum and maximum width of a corridor."""
 _MIN_CORRIDOR_OFFSET = 0.38
 _MAX_CORRIDOR_OFFSET = 0.62
-"""Smallest and largest fraction of the remaining space that is to the left of a corridor, or below it."""
+"""Minimum and maximum fraction of the remaining space that is to the left of a corridor, or below it."""
 _MIN_CORRIDOR_DEPTH_GAPS = 3.0
-"""Smallest depth of the rooms on either side of a corridor."""
+"""Minimum depth of the rooms on either side of a corridor."""
 _MIN_ROOM_SIDE_GAPS = 1.5
-"""Smallest side of a room."""
+"""Minimum side of a room."""
 _MAX_UNEVENNESS = 0.3
-"""Largest offset of a wall from an even division, relative to the width of one room."""
+"""Maximum offset of a wall from an even division, relative to the width of one room."""
 _MIN_DOOR_WIDTH_GAPS = 1.06
 _MAX_DOOR_WIDTH_GAPS = 1.6
-"""Smallest and largest width of a door."""
+"""Minimum and maximum width of a door."""
 _LOOP_PROBABILITY = 0.3
 """Probability of a door between rooms that are already connected."""
 _MIN_WALL_SECTION_SPACINGS = 0.05
-"""Smallest length of a wall next to a door."""
+"""Minimum length of a wall next to a door."""
 _MIN_WALL_FRACTION = 0.3
-"""Smallest fraction of the blocked area that walls take."""
+"""Minimum fraction of the blocked area that walls take."""
 _LARGE_ROOM_SIDE_GAPS = 6.0
 _MAX_WALL_FRACTION_OF_LARGE_ROOMS = 0.5
 _SMALL_ROOM_SIDE_GAPS = 3.0
 _MAX_WALL_FRACTION_OF_SMALL_ROOMS = 0.9
-"""Largest fraction of the blocked area that walls take if the mean room has the side of a large room or more,
+"""Maximum fraction of the blocked area that walls take if the mean room has the side of a large room or more,
 or that of a small room or less. In between, it is interpolated. Small rooms have less furniture."""
 _WALL_LENGTH_SPACINGS = 1.5
 """Mean length of the walls per room, without doors; a wall between two rooms is counted once."""
 _MAX_THICKNESS_SPACINGS = 0.06
-"""Largest thickness of walls."""
+"""Maximum thickness of walls."""
 _PIECES_PER_ROOM = 2.2
 """Mean number of pieces of furniture per room if no piece shrinks."""
 _MIN_PIECE_AREA_RATIO = 0.5
 _MAX_PIECE_AREA_RATIO = 1.5
-"""Smallest and largest area of a piece of furniture, relative to the mean area."""
+"""Minimum and maximum area of a piece of furniture, relative to the mean area."""
 _CANDIDATES_PER_PIECE = 32
 """Number of random positions that are tested for one piece of furniture."""
 _MAX_FAILURES = 32
@@ -66,18 +66,18 @@ _MAX_FAILURES = 32
 _FAILURE_SHRINKAGE = 0.92
 """Factor by which the area of a piece is multiplied for each of the consecutive failures before it."""
 _MIN_SHRINKAGE = 0.2
-"""Smallest product of these factors."""
+"""Minimum product of these factors."""
 _MAX_FURNITURE_FRACTION = 0.35
-"""Largest fraction of the rooms that furniture may fill; more does not fit."""
+"""Maximum fraction of the rooms that furniture may fill; more does not fit."""
 _FRACTION_TOLERANCE = 0.001
-"""Largest difference between the blocked fraction of the map's area and the requested fraction."""
+"""Maximum difference between the blocked fraction of the map's area and the requested fraction."""
 _PIECE_PROBABILITIES = {"cabinet": 0.5, "table": 0.3, "round table": 0.2}
 """Probabilities of the kinds of furniture."""
 _CABINET_STRETCH = (1.6, 3.5)
 _TABLE_STRETCH = (1.0, 2.0)
-"""Smallest and largest ratio of the longer side of a cabinet or table to the shorter one."""
+"""Minimum and maximum ratio of the longer side of a cabinet or table to the shorter one."""
 _MIN_PIECE_ROUNDING_STEPS = 4.0
-"""Smallest side of a piece of furniture, in rounding steps."""
+"""Minimum side of a piece of furniture, in rounding steps."""
 
 
 class Box(NamedTuple):
@@ -86,9 +86,9 @@ class Box(NamedTuple):
     Attributes
     ----------
     left, right : float, m
-        Smallest and largest x.
+        Minimum and maximum x.
     bottom, top : float, m
-        Smallest and largest y.
+        Minimum and maximum y.
     """
 
     left: float

@@ -85,7 +85,7 @@ class MapReport:
     density : str or None
         Kind of the density; None if the map has no density.
     density_range : pair of float or None
-        Smallest and largest value of the density.
+        Minimum and maximum value of the density.
     mean_density : float
         Mean of the density over the free space.
     environment : Environment
@@ -193,7 +193,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(_find_warnings(environment, gap, radius)),
         density=None if density is None else density.kind,
-        density_range=None if density is None else (density.min_value, _find_maximum(density)),
+        density_range=None if density is None else (density.lower_bound, _find_maximum(density)),
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
         environment=environment,
     )
@@ -233,10 +233,10 @@ def _build_start_report(environment: Environment, name: str, radius: float) -> S
 
 
 def _find_maximum(density: Density) -> float:
-    """Return the largest value of a density."""
+    """Return the maximum of a density."""
     if not isinstance(density, Gaussians) or len(density.peaks) < 2:
-        return density.max_value
-    # If peaks overlap, `max_value` is only an upper bound, and the maximum is found by optimization.
+        return density.upper_bound
+    # If peaks overlap, the upper bound is not reached, and the maximum is found by optimization.
     # Importing the package takes longer than checking most maps.
     from scipy.optimize import minimize
 

@@ -10,7 +10,7 @@ from robocov.errors import InputError, describe_error, to_one_line
 from robocov.typing import FloatArray
 
 MAX_IMAGE_BYTES = 8_000_000
-"""Largest size of an image file."""
+"""Maximum size of an image file."""
 _WHITE_8_BIT = 255.0
 """Gray level of white in images with 8 bits per pixel."""
 _WHITE_16_BIT = 65535.0

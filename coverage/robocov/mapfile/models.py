@@ -21,28 +21,28 @@ HEADER: Mapping[str, Any] = {"format": FORMAT, "version": VERSION}
 """First keys of every map file."""
 MIN_SPEED_M_S = 1e-3
 MAX_SPEED_M_S = 10.0
-"""Smallest and largest speed of an obstacle."""
+"""Minimum and maximum speed of an obstacle."""
 MIN_SIZE_M = 1e-3
 MAX_SIZE_M = 1e4
-"""Smallest and largest length or extent."""
+"""Minimum and maximum length or extent."""
 MAX_COORDINATE_M = 1e7
-"""Largest absolute value of a coordinate: large enough for the coordinates of national grids, and small
+"""Maximum absolute value of a coordinate: large enough for the coordinates of national grids, and small
 enough to distinguish micrometers."""
 MIN_WEIGHT = 1e-9
-"""Smallest weight above 0. Smaller weights are read as 0, because they would be written as 0."""
+"""Minimum weight above 0. Smaller weights are read as 0, because they would be written as 0."""
 MAX_LABEL_CHARACTERS = 100
-"""Largest number of characters of a name."""
+"""Maximum number of characters of a name."""
 MAX_DESCRIPTION_CHARACTERS = 10_000
-"""Largest number of characters of the description of a map."""
+"""Maximum number of characters of the description of a map."""
 _MAX_FILE_NAME_CHARACTERS = 500
-"""Largest number of characters of the path of an image."""
+"""Maximum number of characters of the path of an image."""
 _MAX_VARIANCE_M2 = 1e8
-"""Largest absolute value in a covariance matrix."""
+"""Maximum absolute value in a covariance matrix."""
 _MIN_COORDINATE_M = 1e-100
-"""Smallest absolute value of a coordinate. Smaller coordinates are read as 0, because quotients of such
+"""Minimum absolute value of a coordinate. Smaller coordinates are read as 0, because quotients of such
 numbers overflow."""
 _MAX_FEATURES = 10_000
-"""Largest number of peaks or areas of a density."""
+"""Maximum number of peaks or areas of a density."""
 _MAX_INTEGER_FLOAT = 1e15
 """Value below which whole floats are written as integers. Larger floats would have many digits as
 integers."""

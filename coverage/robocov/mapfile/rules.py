@@ -27,10 +27,10 @@ from robocov.mapfile.structure import NO_WEIGHT
 from robocov.typing import FloatArray
 
 _MIN_HULL_AREA_RATIO = 1e-9
-"""Smallest area of the convex hull of a ring, relative to its squared extent. A ring with a smaller hull
+"""Minimum area of the convex hull of a ring, relative to its squared extent. A ring with a smaller hull
 counts as a line."""
 _MEETING_DISTANCE_M = 1e-6
-"""Largest distance between an edge and a point on it, because of rounding errors."""
+"""Maximum distance between an edge and a point on it, because of rounding errors."""
 _MAX_MEETING_EDGES = 6
 """Number of edges, nearest to a point, among which the two that meet there are searched for."""
 _START_MARGIN_M = 0.01
@@ -166,7 +166,7 @@ def _find_space_issues(environment: Environment) -> Iterator[Issue]:
         return
     density = environment.density
     # Integrate the density only if necessary, because importing the modules for this takes a second.
-    if density is not None and not (density.min_value > 0.0 or environment.free_masses.sum() > 0.0):
+    if density is not None and not (density.lower_bound > 0.0 or environment.free_masses.sum() > 0.0):
         yield Issue.at_path(("density",), f"{NO_WEIGHT} in the free space")
     for name, start in environment.starts.items():
         if isinstance(start, PointsStart):

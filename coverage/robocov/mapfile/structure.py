@@ -38,7 +38,7 @@ NO_WEIGHT = "expected at least one weight above 0, got none"
 _MIN_KIND_SIMILARITY = 0.5
 """Minimum similarity between an unknown kind and a suggested one, as `difflib` measures it."""
 _MIN_RELATIVE_DETERMINANT = 1e-9
-"""Smallest determinant of a covariance matrix, relative to the product of its diagonal."""
+"""Minimum determinant of a covariance matrix, relative to the product of its diagonal."""
 _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
 """Keys of the weight that all points have, by the kind of the density."""
 _EXPECTED = {name: key.expected for name, key in KEYS.items()} | {

@@ -16,7 +16,7 @@ from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
 
 _MAX_LINE_CHARACTERS = 100
-"""Largest length of an object that is written on one line. Each number counts as two characters."""
+"""Maximum length of an object that is written on one line. Each number counts as two characters."""
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _NUMERIC_KEYS = ("boundary", "obstacles", "starts", "density")
 """Keys whose numbers `dump_map` shortens."""
@@ -25,7 +25,7 @@ _EXPANDED_KEYS = ("obstacles", "starts")
 _DECIMALS = 9
 """Decimal places to which numbers may be shortened, because smaller fractions of a meter have no meaning."""
 _MAX_ERROR_ULPS = 16
-"""Largest rounding error after a few sums and a rotation, in units in the last place of the number (or of 1,
+"""Maximum rounding error after a few sums and a rotation, in units in the last place of the number (or of 1,
 if the number is smaller). Shortening a number changes it by no more than this error."""
 
 

@@ -67,7 +67,7 @@ class JsonFile:
         location : JsonPath
             Keys and indices that lead to the list.
         min_count : int
-            Smallest number of points.
+            Minimum number of points.
         min_dimensions, max_dimensions : int
             Range of the number of coordinates of a point.
 

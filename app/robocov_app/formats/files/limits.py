@@ -4,15 +4,15 @@ from robocov.errors import MapError, quote
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 
 MAX_FILE_BYTES = 256_000_000
-"""Largest raster file: enough for `MAX_CELLS` cells written as plain text."""
+"""Maximum size of a raster file: enough for `MAX_CELLS` cells written as plain text."""
 MAX_TEXT_BYTES = 50_000_000
-"""Largest file of a vector format; the limit for robocov's own map files is the same."""
+"""Maximum size of a file of a vector format; the limit for robocov's own map files is the same."""
 MAX_CELLS = 64_000_000
-"""Largest raster: 8000 x 8000 cells."""
+"""Maximum size of a raster: 8000 x 8000 cells."""
 MAX_VERTICES = 500_000
-"""Largest number of vertices of a foreign map."""
+"""Maximum number of vertices of a foreign map."""
 MAX_SHAPES = 20_000
-"""Largest number of shapes in a file. Even a small shape takes a quarter of a millisecond."""
+"""Maximum number of shapes in a file. Even a small shape takes a quarter of a millisecond."""
 MAX_DEPTH = 32
 """Deepest nesting of collections, groups, blocks and lists."""
 

@@ -7,9 +7,9 @@ from robocov.errors import MapError, quote
 from robocov_app.formats.files.reading import require_regular_file
 
 MAX_INCLUDED_FILES = 200
-"""Largest number of files that a map may include. A file that is read twice counts twice."""
+"""Maximum number of files that a map may include. A file that is read twice counts twice."""
 MAX_INCLUDED_BYTES = 20_000_000
-"""Largest total size of all included files."""
+"""Maximum total size of all included files."""
 _MAX_PATH_CHARACTERS = 400
 
 

@@ -15,9 +15,9 @@ from robocov.errors import MapError, quote, to_one_line
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"
 """A value as it is written in the file, before numbers are parsed."""
 MAX_YAML_BYTES = 262_144
-"""Largest text, which takes a second to parse. A map file has 200 bytes, a world a few thousand."""
+"""Maximum size of a file, which takes a second to parse. A map has 200 bytes, a world a few thousand."""
 MAX_YAML_VALUES = 50_000
-"""Largest number of values. A value that aliases repeat counts each time."""
+"""Maximum number of values. A value that aliases repeat counts each time."""
 MAX_YAML_DEPTH = 12
 """Deepest nesting of lists and mappings, including nesting through aliases."""
 

@@ -58,7 +58,7 @@ def read_content(path: Path, maximum: int = MAX_FILE_BYTES) -> bytes:
     ----------
     path : Path
     maximum : int
-        Largest accepted size, bytes.
+        Maximum accepted size, bytes.
 
     Raises
     ------

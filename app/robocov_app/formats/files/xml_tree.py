@@ -18,7 +18,7 @@ from robocov_app.formats.files.numbers import parse_number
 from robocov_app.formats.files.reading import read_content
 
 MAX_ELEMENTS = 100_000
-"""Largest number of elements in a file, and of elements drawn if some are drawn repeatedly."""
+"""Maximum number of elements in a file, and of elements drawn if some are drawn repeatedly."""
 MAX_ATTRIBUTES = 1_000_000
 MAX_NESTING = 100
 """Deepest nesting of elements and of ``use`` references; drawing programs stay below 30."""

@@ -30,7 +30,7 @@ DEFAULT_DOOR_WIDTH_M = 0.9
 OPENING_REACH_M = 0.4
 """Distance to which an opening joins spaces and cuts walls on each side of its line."""
 MAX_FLOORS = 200
-"""Largest number of floors that a range of levels of one element may span."""
+"""Maximum number of floors that a range of levels of one element may span."""
 _MIN_WALL_M = 1e-6
 """Shorter pieces of walls are rounding errors."""
 _INTERIORS_INTERSECT = "T********"

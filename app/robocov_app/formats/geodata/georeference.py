@@ -30,7 +30,7 @@ _DIGITS = 6
 _EARTH_RADIUS_M = 6_371_000.0
 """Mean radius, used only to tell degrees from meters."""
 _MAX_DEGREES = (360.0, 90.0)
-"""Largest longitude and latitude. Longitudes exceed 180 in files that continue beyond the antimeridian."""
+"""Maximum longitude and latitude. Longitudes exceed 180 in files that continue beyond the antimeridian."""
 
 
 def convert_to_meters(

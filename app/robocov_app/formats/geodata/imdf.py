@@ -30,7 +30,7 @@ from robocov_app.formats.options import ReadOptions
 
 MAX_ARCHIVE_FILES = 1000
 MAX_OBJECTS = 200_000
-"""Largest total number of JSON objects in the files. A feature has about four."""
+"""Maximum total number of JSON objects in the files. A feature has about four."""
 _REQUIRED_FILES = ("level", "unit")
 _READ_FILES = (*_REQUIRED_FILES, "opening", "fixture", "kiosk", "venue")
 _ZIP_MAGIC = b"PK\x03\x04"

@@ -25,7 +25,7 @@ from robocov_app.formats.geometry.shapes.collection import Shapes
 from robocov_app.formats.options import ReadOptions
 
 MAX_PLACED_ENTITIES = 4_000
-"""Largest number of entities that a file distributes in a grid or at one position."""
+"""Maximum number of entities that a file distributes in a grid or at one position."""
 _MAX_TILT_DEG = 1e-6
 """Bodies rotated by more than this about an axis other than z are tilted."""
 _MAX_TAG_CHARACTERS = 30

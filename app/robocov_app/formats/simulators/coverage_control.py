@@ -40,9 +40,9 @@ TRUNCATION = 2.0
 """Distance from its center at which a Gaussian ends, in standard deviations."""
 POSITIONS_SUFFIX = ".pos"
 MAX_FEATURES = 1000
-"""Largest number of Gaussians and polygons of a world; each takes up to a millisecond."""
+"""Maximum number of Gaussians and polygons of a world; each takes up to a millisecond."""
 _MAX_POLYGON_PIXELS = 4_000_000
-"""Largest number of pixels in the bounding boxes of all polygons."""
+"""Maximum number of pixels in the bounding boxes of all polygons."""
 _WEIGHT_DIGITS = 6
 _MIN_CORNERS = 3
 _MAX_CORRELATION = 0.999999

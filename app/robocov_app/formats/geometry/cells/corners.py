@@ -8,9 +8,9 @@ from robocov.typing import FloatArray
 from robocov_app.formats.geometry.vectors import intersect_lines
 
 _MAX_SHORT_SIDE = 1.5
-"""Largest length of a side of a cut corner, in tolerances."""
+"""Maximum length of a side of a cut corner, in tolerances."""
 _MAX_CORNER_DISTANCE = 2.0
-"""Largest distance of the vertices of a cut corner from the restored one, in tolerances."""
+"""Maximum distance of the vertices of a cut corner from the restored one, in tolerances."""
 _MIN_SINE = 0.1
 """Two walls are parallel if the sine of the angle between them is smaller."""
 

@@ -88,7 +88,7 @@ class Conversion:
 
     @property
     def clearance(self) -> float:
-        """Smallest distance between a wall and the center of a robot at its start, m.
+        """Minimum distance between a wall and the center of a robot at its start, m.
 
         It is at least the distance that map files require for a robot of the default radius.
         """

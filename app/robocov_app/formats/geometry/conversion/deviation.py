@@ -23,7 +23,7 @@ class Deviation(NamedTuple):
     area : float, m²
         Area that is free in only one of them.
     distance : float, m
-        Largest distance by which walls have moved.
+        Maximum distance by which walls have moved.
     """
 
     area: float

@@ -58,7 +58,7 @@ from robocov_app.formats.geometry.shapes.floors import (
 from robocov_app.formats.geometry.shapes.painting import PaintLayer, uncover
 
 _MAX_EXTENT_M = 10.0 * MAX_SIZE_M
-"""Largest extent of all shapes together. Shapes farther apart cannot be one map."""
+"""Maximum extent of all shapes together. Shapes farther apart cannot be one map."""
 
 
 def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation:

@@ -28,7 +28,7 @@ from robocov_app.formats.geometry.polygons import buffer_with_mitres, to_multipo
 DEFAULT_SNAP_M = 0.01
 """Default snapping tolerance, thinner than any wall of a building."""
 MAX_DEFAULT_SNAP = 1e-3
-"""Largest default tolerance, as a fraction of a drawing's larger side: a table-top arena has thin walls."""
+"""Maximum default tolerance, as a fraction of a drawing's larger side: a table-top arena has thin walls."""
 _OVERLAP_M = 2 * GRID_M
 """Distance by which the filling of a gap overlaps its surroundings."""
 _REACH = 1.01

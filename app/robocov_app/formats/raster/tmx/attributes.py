@@ -27,7 +27,7 @@ def parse_integer(element: Element, name: str, minimum: int, default: str = "") 
     element : Element
     name : str
     minimum : int
-        Smallest valid value.
+        Minimum valid value.
     default : str
         Text to parse if the attribute is missing. By default, a missing attribute is an error.
 

@@ -15,9 +15,9 @@ from robocov_app.formats.raster.tmx.layers import Layer
 from robocov_app.formats.raster.tmx.tile_data import ID_MASK, GlobalIDs, decode_ids
 
 MAX_TILES = 4_000_000
-"""Largest number of tiles of a map."""
+"""Maximum number of tiles of a map."""
 MAX_TILES_READ = 16_000_000
-"""Largest total number of tiles in all layers of a map."""
+"""Maximum total number of tiles in all layers of a map."""
 
 
 class Window(NamedTuple):

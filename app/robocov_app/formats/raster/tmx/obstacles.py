@@ -17,7 +17,7 @@ from robocov_app.formats.raster.tmx.tile_data import ID_MASK, GlobalIDs
 from robocov_app.formats.raster.tmx.tilesets import Tile
 
 MAX_PARTS = 10_000
-"""Largest number of collision objects, counted for each use of their tile, and of tiles off the grid."""
+"""Maximum number of collision objects, counted for each use of their tile, and of tiles off the grid."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from robocov_app.formats.simulators.irsim.obstacle_map import read_obstacle_map
 from robocov_app.formats.simulators.irsim.shape_reader import ShapeReader
 
 MAX_OBJECTS = 4_000
-"""Largest number of robots and obstacles of a world."""
+"""Maximum number of robots and obstacles of a world."""
 _DEFAULT_SIDE_M = 10.0
 """Default width and height of a world."""
 _CIRCLE_MARGIN_M = 0.5

@@ -12,7 +12,7 @@ from robocov_app.formats.geometry.cells.vectorize import outline_free_cells
 from robocov_app.formats.raster.picture import describe_transparency, read_picture
 
 _MAX_DARK_LEVEL = 127 / 255
-"""Largest brightness, from 0 to 1, of dark pixels."""
+"""Maximum brightness, from 0 to 1, of dark pixels."""
 
 
 class Bitmap(NamedTuple):

@@ -21,12 +21,12 @@ from robocov_app.formats.simulators.stage.bitmaps import BitmapReader
 from robocov_app.formats.simulators.stage.entities import Entity, World
 
 MAX_ENTITIES = 10_000
-"""Largest number of models and blocks, including those from macros."""
+"""Maximum number of models and blocks, including those from macros."""
 _METERS_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _DEFAULT_SIDE = 0.4
 """Default length and width of a model, in units of the world."""
 _MIN_EXTENT = 1e-12
-"""Smallest extent that is used to scale blocks, to avoid a division by zero."""
+"""Minimum extent that is used to scale blocks, to avoid a division by zero."""
 _DIGITS = 9
 """Decimals of coordinates in meters."""
 _MAX_TYPE_CHARACTERS = 30

@@ -12,9 +12,9 @@ from robocov.errors import MapError, quote, to_one_line
 from robocov_app.formats import files
 
 MAX_BYTES = 5_000_000
-"""Largest size of a world file, and largest total size of all included files."""
+"""Maximum size of a world file, and maximum total size of all included files."""
 MAX_TOKENS = 200_000
-"""Largest number of tokens."""
+"""Maximum number of tokens."""
 BRACKETS = ("(", ")", "[", "]")
 _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"

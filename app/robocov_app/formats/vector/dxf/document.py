@@ -12,9 +12,9 @@ from robocov.optional_imports import import_optional
 from robocov_app.formats import files
 
 MAX_LINES = 8_000_000
-"""Largest number of lines of text. A LINE entity takes about 24 of them, a vertex 4."""
+"""Maximum number of lines of text. A LINE entity takes about 24 of them, a vertex 4."""
 MAX_ENTITIES = 50_000
-"""Largest number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
+"""Maximum number of entities on all layers: ezdxf takes an eighth of a millisecond and 5 kB for each."""
 BINARY = b"AutoCAD Binary DXF"
 """First bytes of a binary file."""
 TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")

@@ -7,9 +7,9 @@ from robocov.errors import MapError, quote
 from robocov_app.formats import files
 
 MAX_DRAWN_ENTITIES = 200_000
-"""Largest number of entities drawn, including those of inserted blocks."""
+"""Maximum number of entities drawn, including those of inserted blocks."""
 _MAX_PRINTED_COUNT = 10**300
-"""Largest number that is printed: nested blocks may expand to more entities than a float can represent."""
+"""Maximum number that is printed: nested blocks may expand to more entities than a float can represent."""
 
 
 def require_few_entities(document: Any, source_name: str) -> None:

@@ -13,7 +13,7 @@ from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.collection import Shapes, SourceGeometry
 
 MAX_OVERLAPS = 50_000
-"""Largest number of pairs of a hole and a polygon that intersect."""
+"""Maximum number of pairs of a hole and a polygon that intersect."""
 _HOLES_PER_QUERY = 20
 """Number of holes that are compared at once, to limit the memory."""
 
