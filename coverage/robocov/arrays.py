@@ -5,7 +5,7 @@ import numpy as np
 from robocov.typing import FloatArray, IntArray
 
 
-def freeze(values: object) -> FloatArray:
+def copy_read_only(values: object) -> FloatArray:
     """Copy values into a read-only, C-contiguous array of floats.
 
     Parameters
@@ -104,8 +104,8 @@ def concatenate_ranges(starts: IntArray, counts: IntArray) -> IntArray:
     >>> concatenate_ranges(np.array([7, 2]), np.array([3, 2]))
     array([7, 8, 9, 2, 3])
     """
-    offsets = counts.cumsum() - counts
-    return np.asarray(np.arange(counts.sum()) + (starts - offsets).repeat(counts))
+    output_starts = counts.cumsum() - counts
+    return np.asarray(np.arange(counts.sum()) + (starts - output_starts).repeat(counts))
 
 
 def compute_weighted_mean(values: FloatArray, weights: FloatArray | None = None) -> float:

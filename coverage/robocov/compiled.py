@@ -37,27 +37,26 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 IS_COMPILER_ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 """Whether kernels are compiled. The environment variable ``NUMBA_DISABLE_JIT`` disables the compiler."""
-_MAX_KEPT_VERSIONS = 4
-"""Number of versions, the most recently used ones, whose machine code is kept in any case."""
+_MIN_KEPT_VERSIONS = 4
+"""Number of most recently used versions whose machine code is always kept."""
 _MIN_UNUSED_DAYS = 1.0
-"""Time after the last use before which machine code is kept in any case, because a program may still use
-it."""
+"""Machine code used within this time is always kept, because a program may still be running it."""
 
 _CACHE_ERRORS = (OSError, EOFError, pickle.UnpicklingError)
 """Errors that numba raises if its cache cannot be read or written. Kernels themselves raise none of these."""
 
 _compilation_listeners: list[Callable[[str], None]] = []
-"""Functions to call before each compilation; see `notify_compilation`."""
+"""Functions to call before each compilation; see `report_compilation`."""
 _lock = threading.RLock()
 """Lock of the import of numba, and of the dispatchers of kernels."""
 _is_cache_usable = True
-"""Whether the cache has not failed in this process."""
+"""False after the cache has failed in this process."""
 _must_interpret: Callable[[str, tuple[Any, ...]], bool] | None = None
 """Function that selects kernels to run as Python; see `interpret_kernels`."""
 _kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()
 """All kernels of this process."""
 _ADDRESS = re.compile(" at 0x[0-9a-f]+")
-"""Address of a function in the text of a type of numba."""
+"""Address of a function in the text of a numba type."""
 
 
 def kernel(function: _Function) -> _Function:
@@ -196,8 +195,8 @@ def interpret_kernels(must_interpret: Callable[[str, tuple[Any, ...]], bool] | N
     Parameters
     ----------
     must_interpret : callable or None
-        Function of the `Kernel.name` of a kernel and of the positional arguments of a call, which returns
-        whether to run the kernel as Python. If it is None, no kernel is run as Python.
+        Called with the `Kernel.name` of a kernel and the positional arguments of a call. Returns whether to
+        run the kernel as Python. If it is None, no kernel is run as Python.
     """
     global _must_interpret
     _must_interpret = must_interpret
@@ -249,7 +248,7 @@ def describe_argument_types(arguments: tuple[Any, ...]) -> str:
 
 
 def _format_types(types: Iterable[Any]) -> str:
-    """Return a text that names types of numba."""
+    """Return a text that names numba types."""
     # The name of the type of a kernel contains the address of its function, which differs between processes.
     return _ADDRESS.sub("", "; ".join(map(str, types)))
 
@@ -300,7 +299,7 @@ def _import_numba() -> ModuleType:
         return typeof(called.get_dispatcher())
 
     class CompilationListener(event.Listener):
-        """Passes the names of kernels to the functions of `notify_compilation`."""
+        """Passes the names of kernels to the functions of `report_compilation`."""
 
         def on_start(self, started: Any) -> None:
             """Report the kernel that is compiled."""
@@ -315,13 +314,13 @@ def _import_numba() -> ModuleType:
 
 
 @contextmanager
-def notify_compilation(report: Callable[[str], None]) -> Iterator[None]:
+def report_compilation(report: Callable[[str], None]) -> Iterator[None]:
     """Call a function before each compilation of a kernel within a ``with`` block.
 
     Parameters
     ----------
     report : callable
-        Function of the name of the kernel.
+        Called with the name of the kernel.
     """
     _compilation_listeners.append(report)
     try:
@@ -373,12 +372,12 @@ def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
 
 
 def _remove_unused_versions(parent: Path) -> None:
-    """Remove the machine code of versions of robocov that have not been used for some time."""
-    max_removal_time = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
+    """Remove old versions' machine code, except recently used ones."""
+    cutoff_time = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
     versions: list[tuple[float, Path]] = []
     for folder in parent.glob("robocov-*"):
         with suppress(OSError):
             versions.append((folder.stat().st_mtime, folder))
-    for last_use_time, folder in sorted(versions, reverse=True)[_MAX_KEPT_VERSIONS:]:
-        if last_use_time < max_removal_time:
+    for last_use_time, folder in sorted(versions, reverse=True)[_MIN_KEPT_VERSIONS:]:
+        if last_use_time < cutoff_time:
             shutil.rmtree(folder, ignore_errors=True)

@@ -492,7 +492,7 @@ def require_type(name: str, value: object, kind: type, expected: str) -> None:
     Raises
     ------
     ParameterError
-        If the value has another type.
+        If the value has the wrong type.
     """
     if not isinstance(value, kind):
         raise ParameterError(_describe_mismatch(name, value, expected))

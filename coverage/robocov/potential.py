@@ -31,7 +31,7 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 _MIN_DISTANCE = 1e-12
 """Distance that is assumed between robots that are closer together, such as at the same position, m."""
 _MIN_GOAL_DISTANCE = 1e-300
-"""Smallest distance to the goal used as a divisor, which prevents division by zero, m."""
+"""Minimum divisor, m; prevents division by zero."""
 
 
 class PotentialGains(NamedTuple):

@@ -17,7 +17,7 @@ from robocov.world.bodies import build_obstacle_space
 from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
 
 _MAX_RANGE_M = 1e6
-"""Largest range of a query, also if the sensing range is infinite, because bounding boxes in pymunk must be
+"""Maximum range of a query, also if the sensing range is infinite, because bounding boxes in pymunk must be
 finite."""
 _INDEXING_STEP_S = 1e-9
 """Duration of the step in which pymunk builds its spatial index. Nothing moves in this step."""

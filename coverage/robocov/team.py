@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.defaults import (
     DEFAULT_COMMUNICATION_RANGE_M,
     DEFAULT_MASS_KG,
@@ -177,9 +177,9 @@ class Team:
         robot_count = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name in PARAMETERS:
             floats = to_floats(f"team.{name}", getattr(self, name), "a number for each robot")
-            values = freeze(np.atleast_1d(floats))
+            values = copy_read_only(np.atleast_1d(floats))
             if name in _POINT_ROBOT_VALUES and len(values) == 0:
-                values = freeze(np.full(robot_count, _POINT_ROBOT_VALUES[name]))
+                values = copy_read_only(np.full(robot_count, _POINT_ROBOT_VALUES[name]))
             _check_column(name, values, robot_count)
             object.__setattr__(self, name, values)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robocov import compiled
-from robocov.compiled import kernel, notify_compilation
+from robocov.compiled import kernel, report_compilation
 from robocov.controllers import Rapf
 from robocov.cost import CoverageCost
 from robocov.kernel_compilation import compile_kernels
@@ -32,10 +32,10 @@ def double(x):
 """
 KERNEL_SCRIPT = """
 import sys
-from robocov.compiled import notify_compilation
+from robocov.compiled import report_compilation
 from kernel_module import double
 assert "numba" not in sys.modules
-with notify_compilation(print):
+with report_compilation(print):
     print(double(0.5))
 """
 
@@ -141,7 +141,7 @@ def test_versions_unused_for_long_are_removed(tmp_path: Path) -> None:
 def test_kernels_of_a_run_are_compiled_beforehand() -> None:
     compile_kernels()
     newly_compiled: list[str] = []
-    with notify_compilation(newly_compiled.append):
+    with report_compilation(newly_compiled.append):
         rooms = load_map("rooms")
         simulation = Simulation(rooms, Rapf(), rooms.start().sample(6))
         recorder = Recorder(rooms, simulation.team, Rapf(), simulation.dt)
@@ -194,7 +194,7 @@ def test_compilation_is_reported_once() -> None:
     namespace: dict[str, Any] = {}
     exec("def halve(x): return 0.5 * x", namespace)
     halve = kernel(namespace["halve"])
-    with notify_compilation(reported.append):
+    with report_compilation(reported.append):
         assert halve(3.0) == 1.5
         assert halve(5.0) == 2.5
     assert reported == ["halve"]

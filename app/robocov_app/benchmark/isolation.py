@@ -256,7 +256,7 @@ class IsolatedTeam:
         """Compare the decisions of the latest step. Those of failed robots have no effect and are ignored."""
         assert self._team_decision is not None
         for robot, own_decision in self._own_decisions.items():
-            if snapshot.working is not None and not snapshot.working[robot]:
+            if snapshot.is_working is not None and not snapshot.is_working[robot]:
                 continue
             if not _is_same_decision(self._team_decision, own_decision, robot):
                 self._stop_checking(

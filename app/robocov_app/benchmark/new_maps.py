@@ -70,7 +70,7 @@ class NewMapComparison:
     p_value : float
         Probability of ranks at least as extreme if the controller is not fitted to the suite.
     min_p_value : float
-        Smallest p-value that is possible with these runs. With few runs, it is too large to show a
+        Minimum possible p-value with these runs. With few runs, it is too large to show a
         difference.
     """
 

@@ -43,7 +43,7 @@ def _find_nearest_point(record: Record, step: int, robot: int) -> FloatArray:
     """Return the point of a wall or of a failed robot that is nearest to a robot at a step, (2,) m."""
     environment = record.environment.at(float(record.time[step]))
     bodies = [environment.free.boundary]
-    for failed in np.flatnonzero(record.present[step] & ~record.working[step]).tolist():
+    for failed in np.flatnonzero(record.is_present[step] & ~record.is_working[step]).tolist():
         disc = shapely.Point(record.positions[step, failed]).buffer(record.team.radius[failed])
         bodies.append(disc.exterior)
     center = shapely.Point(record.positions[step, robot])
@@ -69,7 +69,7 @@ def _find_points_between_robots(record: Record) -> list[FloatArray]:
 
 def _list_touching_pairs(record: Record, step: int) -> set[tuple[int, int]]:
     """Return the pairs of working robots that are in contact at a step, by their rows in the team."""
-    working = np.flatnonzero(record.working[step])
+    working = np.flatnonzero(record.is_working[step])
     positions = record.positions[step, working]
     radius = record.team.radius[working]
     reach = 2.0 * float(radius.max()) + MAX_CONTACT_GAP_M

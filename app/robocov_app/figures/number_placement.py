@@ -13,7 +13,7 @@ _DIRECTIONS = 16
 _RINGS = (1.0, 1.7, 2.5)
 """Distances of a number from the edge of its mark, as multiples of the least distance."""
 _LEAST_DISTANCE = 0.6
-"""Least distance of the center of a number from the edge of its mark, in text sizes."""
+"""Minimum distance of the center of a number from the edge of its mark, in text sizes."""
 _CLEARANCE = 0.6
 """Distance from the center of a number to lines at which they do not touch it, in text sizes."""
 _MAX_REACH = _LEAST_DISTANCE * max(_RINGS) + 2.0 * _CLEARANCE

@@ -166,7 +166,7 @@ def draw_run(
     run_colors = _choose_colors(record, theme, colors, cells.adjacency)
     _draw_cells(axes, cells.outlines, run_colors.cells, theme)
     _draw_trajectories(axes, record, run_colors.trails)
-    present = np.flatnonzero(record.present[-1])
+    present = np.flatnonzero(record.is_present[-1])
     starts = _draw_starts(axes, record, present, run_colors.starts)
     discs = draw_discs(
         axes,
@@ -190,7 +190,7 @@ def draw_run(
 def _choose_colors(record: Record, theme: Theme, scheme: ColorScheme, adjacency: IntArray) -> _RunColors:
     """Choose the colors of a run; `adjacency`, (m, 2), contains the pairs of adjacent cells."""
     robots = len(record.team)
-    working = np.flatnonzero(record.working[-1])
+    working = np.flatnonzero(record.is_working[-1])
     hues = choose_robot_hues(robots, working[adjacency])
     trails = choose_trail_colors(theme, hues.tolist(), scheme)
     if scheme == "paper":
@@ -198,7 +198,7 @@ def _choose_colors(record: Record, theme: Theme, scheme: ColorScheme, adjacency:
     else:
         final_colors = [choose_trail_color(theme, hue) for hue in hues.tolist()]
     has_own_colors = has_color_per_robot(robots, scheme)
-    failed = record.present[-1] & ~record.working[-1]
+    failed = record.is_present[-1] & ~record.is_working[-1]
     for robot in np.flatnonzero(failed).tolist():
         final_colors[robot] = theme.failed_robot
     cells = None
@@ -254,7 +254,7 @@ def _draw_cells(
 def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> None:
     """Draw the trajectory of each robot while it is present."""
     robots = len(record.team)
-    trajectories = [record.positions[record.present[:, robot], robot] for robot in range(robots)]
+    trajectories = [record.positions[record.is_present[:, robot], robot] for robot in range(robots)]
     enlargement = np.sqrt(_compute_median_diameter(axes, record) / _LARGE_ROBOT_PT)
     size_factor = float(np.clip(enlargement, 1.0, _MAX_TRAJECTORY_FACTOR))
     collection = LineCollection(
@@ -273,7 +273,7 @@ def _draw_starts(axes: Axes, record: Record, present: IntArray, colors: Sequence
 
     `colors` are those of all robots. Returned are the rings, in points.
     """
-    first_rows = np.argmax(record.present, axis=0)[present]
+    first_rows = np.argmax(record.is_present, axis=0)[present]
     starts = record.positions[first_rows, present]
     points = to_points(axes, starts)
     max_size = _choose_max_mark_size(axes, record, _START_PT, _START_DIAMETERS)
@@ -289,7 +289,7 @@ def _draw_headings(axes: Axes, record: Record, steering: FloatArray, radii: Floa
     The first column of `steering`, (n, ...), is the heading, rad. `radii`, (n,), are those of discs, points.
     """
     inches_to_pixels = get_figure(axes).dpi_scale_trans
-    is_working_unicycle = record.working[-1] & record.team.is_unicycle
+    is_working_unicycle = record.is_working[-1] & record.team.is_unicycle
     for robot in np.flatnonzero(is_working_unicycle).tolist():
         heading = steering[robot, 0]
         distance_in = _HEADING_DISTANCE_RADII * radii[robot] / POINTS_PER_INCH
@@ -315,7 +315,7 @@ def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, radii: FloatA
 
     `radii`, (n,), are those of the discs of all robots, points. Returned are the marks, in points.
     """
-    working = np.flatnonzero(record.working[-1])
+    working = np.flatnonzero(record.is_working[-1])
     goals = record.goals[-1][working]
     is_centroid = are_centroids(goals, centroids)
     if is_centroid:
@@ -498,10 +498,10 @@ def build_run_handles(
         Line2D([], [], color=to_plot_color(trail_color), linewidth=LINE_WIDTH_PT, label=legend.TRAJECTORY),
         build_robot_handle(legend.FINAL_POSITION, final_color, theme),
     ]
-    if (record.present[-1] & ~record.working[-1]).any():
+    if (record.is_present[-1] & ~record.is_working[-1]).any():
         handles.append(build_robot_handle(legend.FAILED_ROBOT, theme.failed_robot, theme))
     if has_goals(record):
-        is_centroid = are_centroids(record.goals[-1][record.working[-1]], record.cells().centroids)
+        is_centroid = are_centroids(record.goals[-1][record.is_working[-1]], record.cells().centroids)
         handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
     if contacts is not None and len(contacts):
         handles.append(Line2D([], [], **_build_contact_style(theme)))

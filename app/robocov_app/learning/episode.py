@@ -219,12 +219,12 @@ class Episode:
             self.simulation = self.shared.start_episode(shared_run.run, scenario.starts)
         else:
             self.simulation = scenario.build_simulation(ExternalController.from_task(task))
-        self.working = self.simulation.working[self._index]
+        self.is_working = self.simulation.is_working[self._index]
         self.cost = cost
         self._cost_over_time = TimeVaryingCost(cost)
         self._has_constant_team = scenario.conditions is None and not self.environment.has_moving_obstacles
-        self._available = self._cost_over_time.find_available_robots(0.0, self.positions, self.working)
-        coverage = self._cost_over_time(0.0, self.positions, self.working)
+        self._available = self._cost_over_time.find_available_robots(0.0, self.positions, self.is_working)
+        coverage = self._cost_over_time(0.0, self.positions, self.is_working)
         if coverage is None or not coverage.mean_distance > 0.0:
             raise ParameterError(
                 f"lattice: expected a finer lattice for map {self.environment.name!r}, got {task.lattice}"
@@ -303,7 +303,7 @@ class Episode:
         snapshots = self._snapshots if self.task.recording else None
         checked = check_actions(actions, len(self.team))
         contact_time = execute_actions(self.task, self.simulation, checked, snapshots)
-        self.working = self.simulation.working[self._index]
+        self.is_working = self.simulation.is_working[self._index]
         self._scans = self.simulation.observe().scans
         return self.finish_action(contact_time, is_rewarded=is_last or self.is_reward_due())
 
@@ -361,7 +361,7 @@ class Episode:
         """Determine the robots that count in the cost now."""
         if not self._has_constant_team:
             self._available = self._cost_over_time.find_available_robots(
-                self.time, self.positions, self.working
+                self.time, self.positions, self.is_working
             )
 
     def _evaluate_cost(self, time: float, cycle: int, robots: BoolArray) -> CoverageResult:

@@ -132,7 +132,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         outcome = self.next_outcome or episode.advance(action)
         self.next_outcome = None
         self._update_window()
-        is_terminated = not episode.working.any()
+        is_terminated = not episode.is_working.any()
         is_truncated = episode.cycle >= self.task.cycles
         reward = float(outcome.rewards.sum()) / len(episode.team)
         info = self._build_info(outcome.contact_time)
@@ -141,7 +141,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
     def _build_rows(self) -> Float32Array:
         episode = self.get_episode()
         rows = episode.build_rows()
-        rows[~episode.working] = 0.0
+        rows[~episode.is_working] = 0.0
         return rows
 
     def _build_info(self, contact_time: FloatArray) -> dict[str, Any]:
@@ -149,7 +149,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         return {
             **episode.summarize(),
             "contact_s": contact_time.copy(),
-            "working": episode.working.copy(),
+            "working": episode.is_working.copy(),
         }
 
 

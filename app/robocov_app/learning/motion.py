@@ -40,7 +40,7 @@ def execute_actions(
     contact_time = np.zeros(actions.shape[:-1])
     for _ in range(task.repeat):
         forces = compute_driving_forces(task.action, actions, simulation.velocities, simulation.team)
-        forces = np.where(simulation.working[..., None], forces, 0.0)
+        forces = np.where(simulation.is_working[..., None], forces, 0.0)
         if snapshots is not None and isinstance(simulation, Simulation):
             snapshots.append(replace(simulation.observe_and_decide(), decision=Decision(forces)))
         simulation.step(forces=forces)
@@ -50,9 +50,9 @@ def execute_actions(
 
 def _find_contacts(simulation: Simulation | SimulationBatch) -> BoolArray:
     """Return a mask of the working robots that touch a wall or a robot, (n,) or (runs, n)."""
-    shape = simulation.working.shape
+    shape = simulation.is_working.shape
     positions = simulation.positions.reshape(-1, 2)
-    working = simulation.working.ravel()
+    working = simulation.is_working.ravel()
     radius = np.broadcast_to(simulation.team.radius, shape).ravel()
     nearest = simulation.sensor.find_nearest_points(positions, radius + MAX_CONTACT_GAP_M)
     has_contact = working & ~np.isnan(nearest[:, 0])

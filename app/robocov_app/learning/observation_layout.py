@@ -116,7 +116,7 @@ class ObservationLayout:
 
     @property
     def bounds(self) -> tuple[Float32Array, Float32Array]:
-        """Lowest and highest possible values of a row, (size,) each."""
+        """Minimum and maximum possible values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
         first_ray = _FIXED_SIZE + _NEIGHBOR_SIZE * self.neighbors
         # The presences of the obstacle and of each neighbor.
@@ -170,7 +170,7 @@ class ObservationLayout:
         n = len(seen.positions)
         unit = seen.region.diameter
         # Noisy positions may be farther apart than the diameter, but not by much.
-        pairs = seen.find_near_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
+        pairs = seen.find_neighbors(_MAX_NEIGHBOR_DIAMETERS * unit)
         nearest = np.zeros((n, self.neighbors, _NEIGHBOR_SIZE))
         distances = np.full((n, self.neighbors), np.inf)
         # The offsets point from the neighbor to the robot; the layout needs the opposite direction.

@@ -140,7 +140,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
         self.episode = draw_episode(self.task, self._sampler, self._rng, options)
-        self.agents = list(compress(self.possible_agents, self.episode.working))
+        self.agents = list(compress(self.possible_agents, self.episode.is_working))
         self._update_window()
         info = {**self.episode.summarize(), "contact_s": 0.0, "map": self.episode.environment.name}
         infos = {agent: dict(info) for agent in self.possible_agents}
@@ -164,7 +164,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         acting = self.agents
         is_truncated = episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(checked, is_last=is_truncated)
-        self.agents = list(compress(self.possible_agents, episode.working))
+        self.agents = list(compress(self.possible_agents, episode.is_working))
         reported = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
         # A robot that has failed never works again, so its episode has terminated.
         terminations = {agent: agent not in self.agents for agent in reported}

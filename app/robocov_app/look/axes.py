@@ -64,7 +64,7 @@ def choose_value_limits(
     Parameters
     ----------
     low, high : float
-        Lowest and highest value, finite.
+        Minimum and maximum value, finite.
     margin : float
         Free space on both sides as a fraction of the range.
     origin : float
@@ -133,7 +133,7 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
     Parameters
     ----------
     low, high : float
-        Lowest and highest value so far; nan without values.
+        Minimum and maximum value so far; nan without values.
     max_intervals : float
         Maximum number of intervals between ticks.
 

@@ -74,7 +74,7 @@ def fit_mark_size(points: FloatArray, low: float, high: float) -> float:
     ----------
     points : (n, 2) array
     low, high : float
-        Smallest and largest size.
+        Minimum and maximum size.
 
     Returns
     -------

@@ -45,9 +45,9 @@ def build_record_scene(
     trail = record.positions[: row + 1]
     attributes: dict[str, Any] = {"label": record.label, "cost": cost}
     # Numbers of robots start at 1, rows at 0.
-    if snapshot.working is not None:
-        robots = np.flatnonzero(snapshot.working)
-        failed = np.flatnonzero(record.present[row] & ~record.working[row]).tolist()
+    if snapshot.is_working is not None:
+        robots = np.flatnonzero(snapshot.is_working)
+        failed = np.flatnonzero(record.is_present[row] & ~record.is_working[row]).tolist()
         attributes["numbers"] = tuple((robots + 1).tolist())
         attributes["failed"] = {robot + 1: tuple(snapshot.positions[robot].tolist()) for robot in failed}
         if not len(robots):
@@ -55,10 +55,10 @@ def build_record_scene(
             return Scene(environment.at(time), team, moving=moving, **attributes)
         snapshot = select_robots(snapshot, robots)
         team = team[robots]
-        first_rows = np.argmax(record.present, axis=0)
+        first_rows = np.argmax(record.is_present, axis=0)
         starts = record.positions[first_rows, np.arange(len(first_rows))][robots]
         # Before a robot joins, its trail stays at its start.
-        is_present = record.present[: row + 1, robots, None]
+        is_present = record.is_present[: row + 1, robots, None]
         trail = np.where(is_present, trail[:, robots], starts)
     if fields is not None:
         attributes["field"] = fields.compute_at(snapshot.positions, snapshot.time)

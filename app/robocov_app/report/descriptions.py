@@ -25,7 +25,7 @@ def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
     """
     times = record.time - record.time[0]
     lifetimes: list[tuple[float, float | None]] = []
-    for present, working in zip(record.present.T, record.working.T, strict=True):
+    for present, working in zip(record.is_present.T, record.is_working.T, strict=True):
         joins = float(times[-1]) + 1.0
         present_rows = np.flatnonzero(present)
         if len(present_rows):

@@ -16,7 +16,7 @@ MAX_CELLS = 400
 """Maximum number of robots for which a replay draws cells. More would take too long in each frame."""
 
 
-def embed_hues(record: Record, positions: FloatArray, working: BoolArray) -> dict[str, Any]:
+def embed_hues(record: Record, positions: FloatArray, is_working: BoolArray) -> dict[str, Any]:
     """Build the hues of the cells of a run as JSON content.
 
     Parameters
@@ -37,7 +37,7 @@ def embed_hues(record: Record, positions: FloatArray, working: BoolArray) -> dic
     robots = positions.shape[1]
     if not MAX_OWN_HUES < robots <= MAX_CELLS:
         return {"first": choose_robot_hues(robots).tolist(), "changes": []}
-    adjacencies = [_find_adjacency(record, *frame) for frame in zip(positions, working, strict=True)]
+    adjacencies = [_find_adjacency(record, *frame) for frame in zip(positions, is_working, strict=True)]
     first_hues: list[int] = []
     changes: list[list[int]] = []
     previous_hues: IntArray | None = None
@@ -54,9 +54,9 @@ def embed_hues(record: Record, positions: FloatArray, working: BoolArray) -> dic
     return {"first": first_hues, "changes": changes}
 
 
-def _find_adjacency(record: Record, positions: FloatArray, working: BoolArray) -> IntArray:
+def _find_adjacency(record: Record, positions: FloatArray, is_working: BoolArray) -> IntArray:
     """Return the pairs of robots whose cells share an edge, as an (m, 2) array with the lower index first."""
-    robots = np.flatnonzero(working & np.isfinite(positions).all(axis=1))
+    robots = np.flatnonzero(is_working & np.isfinite(positions).all(axis=1))
     if len(robots) < 2:
         return np.empty((0, 2), dtype=np.intp)
     region = record.environment.region

@@ -265,14 +265,14 @@ def _embed_team(record: Record) -> dict[str, Any]:
 
 def _find_working(record: Record, times: FloatArray) -> BoolArray:
     """Return a mask, (T, n), of the robots that work at given times, s since the start."""
-    working = np.ones((len(times), len(record.team)), dtype=bool)
+    is_working = np.ones((len(times), len(record.team)), dtype=bool)
     if record.conditions is None:
-        return working
+        return is_working
     for robot, (joins, fails) in enumerate(list_lifetimes(record)):
-        working[:, robot] = times >= joins - _TIME_TOLERANCE_S
+        is_working[:, robot] = times >= joins - _TIME_TOLERANCE_S
         if fails is not None:
-            working[times >= fails - _TIME_TOLERANCE_S, robot] = False
-    return working
+            is_working[times >= fails - _TIME_TOLERANCE_S, robot] = False
+    return is_working
 
 
 def _embed_headings(record: Record, steering: FloatArray, times: FloatArray) -> str:

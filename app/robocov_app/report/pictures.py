@@ -184,7 +184,7 @@ def _draw_cells(record: Record, frame: PictureFrame) -> str:
     if robots > MAX_ROBOTS:
         return ""
     cells = record.cells()
-    working = np.flatnonzero(record.working[-1])
+    working = np.flatnonzero(record.is_working[-1])
     adjacency = None
     if robots > MAX_OWN_HUES:
         adjacency = working[cells.adjacency]
@@ -202,7 +202,7 @@ def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
     """Draw the trajectories as one path; each starts where its robot joined."""
     if not has_path(record) or len(record.team) > MAX_ROBOTS:
         return ""
-    first_rows = np.argmax(record.present, axis=0)
+    first_rows = np.argmax(record.is_present, axis=0)
     tracks = np.moveaxis(frame.to_pixels(record.positions), 1, 0)
     lines = []
     for track, first_row in zip(tracks, first_rows, strict=True):
@@ -215,8 +215,8 @@ def _draw_trajectories(record: Record, frame: PictureFrame) -> str:
 
 def _draw_starts(record: Record, frame: PictureFrame) -> str:
     """Draw a ring where each robot started."""
-    first_rows = np.argmax(record.present, axis=0)
-    joined = np.flatnonzero(record.present.any(axis=0))
+    first_rows = np.argmax(record.is_present, axis=0)
+    joined = np.flatnonzero(record.is_present.any(axis=0))
     starts = frame.to_pixels(record.positions[first_rows[joined], joined])
     radius = fit_mark_size(starts, _MIN_START_PX, _MAX_START_PX) / 2
     return "".join(_draw_circle("start", x, y, radius) for x, y in starts)
@@ -229,10 +229,10 @@ def _draw_robots(record: Record, frame: PictureFrame, *, has_numbers: bool) -> s
     radii = fit_radii(centers, record.team.radius * frame.zoom, _MIN_RADIUS_PX, max_radius)
     numbers = build_roster(record).numbers
     shapes = []
-    for robot in np.flatnonzero(record.present[-1]).tolist():
+    for robot in np.flatnonzero(record.is_present[-1]).tolist():
         x, y = centers[robot].tolist()
         radius = float(radii[robot])
-        if not record.working[-1, robot]:
+        if not record.is_working[-1, robot]:
             shapes.append(_draw_circle("failed", x, y, radius))
             shapes.append(_draw_cross(x, y, radius))
             continue

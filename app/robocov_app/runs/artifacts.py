@@ -354,7 +354,7 @@ def build_final_snapshots(runs: Sequence[Run], cost: CoverageCost) -> list[Dista
         varying_cost = TimeVaryingCost(cost)
         time = float(record.time[-1])
         positions = record.positions[-1]
-        is_available = varying_cost.find_available_robots(time, positions, record.working[-1])
+        is_available = varying_cost.find_available_robots(time, positions, record.is_working[-1])
         if not is_available.any():
             continue
         final_cost = varying_cost.get_cost(time)

@@ -152,7 +152,7 @@ def _build_fields(
     largest_distance = 0.0
     for run in runs:
         record = run.record
-        result = varying_cost(float(record.time[-1]), record.positions[-1], record.working[-1])
+        result = varying_cost(float(record.time[-1]), record.positions[-1], record.is_working[-1])
         if result is not None:
             finite_distances = result.distances[np.isfinite(result.distances)]
             largest_distance = max(largest_distance, float(finite_distances.max(initial=0.0)))

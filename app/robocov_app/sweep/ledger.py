@@ -1,7 +1,7 @@
 """The folder of a sweep: each run has its own folder, which is complete or absent, with checksums.
 
 There is no database in addition to the folders. An SQLite index of 2000 runs saved 0.1 ms per run when a
-sweep was resumed (0.07 instead of 0.17 ms, since checksums must be verified in any case), but each
+sweep was resumed (0.07 instead of 0.17 ms, since checksums must always be verified), but each
 transaction took 4 ms in addition to the 6 ms for the folder of the run. The index would be a second
 description of the runs, which may contradict the first one after a crash or after a user has removed a
 folder. Moreover, its write-ahead log does not work on network file systems, to which sweeps on clusters are

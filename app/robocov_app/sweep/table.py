@@ -158,7 +158,7 @@ class Table:
     study : bytes, optional
         Content of ``study.json``.
     parquet : bool
-        Whether to write a Parquet file as well. An existing Parquet file is replaced in any case.
+        Whether to write a Parquet file as well. An existing Parquet file is always replaced.
 
     Attributes
     ----------

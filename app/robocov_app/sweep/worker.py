@@ -248,7 +248,7 @@ class CommunicationMeter:
 
     def count_positions(self) -> None:
         """Count the positions that the robots sent in the latest step."""
-        sender_count = int(self._simulation.working.sum())
+        sender_count = int(self._simulation.is_working.sum())
         self._position_bytes += self._positions_per_step * POSITION_BYTES * sender_count
 
     @property

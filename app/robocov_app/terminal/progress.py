@@ -112,7 +112,7 @@ def make_counter(update: Callable[[int], None]) -> Callable[[], None]:
 @contextmanager
 def report_compilation() -> Iterator[None]:
     """Print a line when a kernel is compiled within the context, which makes the first command slow."""
-    from robocov.compiled import notify_compilation
+    from robocov.compiled import report_compilation
 
     has_reported = False
 
@@ -122,7 +122,7 @@ def report_compilation() -> Iterator[None]:
             has_reported = True
             _print_compilation_notice()
 
-    with notify_compilation(report):
+    with report_compilation(report):
         yield
 
 

@@ -54,7 +54,7 @@ class Perception:
         return Inbox.create_empty(self._robot_count) if self._conditions.uses_messages else None
 
     def perceive(
-        self, ideal: Observations, inbox: Inbox | None, working: BoolArray
+        self, ideal: Observations, inbox: Inbox | None, is_working: BoolArray
     ) -> tuple[Observations, Inbox | None]:
         """Compute the observations of the robots in a step.
 
@@ -64,7 +64,7 @@ class Perception:
             The observations under ideal conditions, which contain the true positions.
         inbox : Inbox or None
             Messages before the step; None if communication is ideal and no messages are in flight.
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the working robots.
 
         Returns
@@ -77,8 +77,8 @@ class Perception:
         step = round(ideal.time / self._dt)
         positions = self._add_position_noise(step, ideal.positions)
         obstacle_points = self._add_sensing_noise(step, ideal, positions)
-        if not working.all():
-            obstacle_points = np.where(working[:, None], obstacle_points, np.nan)
+        if not is_working.all():
+            obstacle_points = np.where(is_working[:, None], obstacle_points, np.nan)
         obstacle_points.setflags(write=False)
         observations = replace(
             ideal,
@@ -95,10 +95,10 @@ class Perception:
                 sensing_ranges=self._sensing_ranges,
             )
         if inbox is None or not self._conditions.uses_messages:
-            neighbors = ideal.neighbors.restrict_to_working(working)
+            neighbors = ideal.neighbors.restrict_to_working(is_working)
             return replace(observations, neighbors=neighbors), inbox
-        inbox = self._radio.exchange_positions(inbox, step, positions, ideal.positions, working)
-        neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, working)
+        inbox = self._radio.exchange_positions(inbox, step, positions, ideal.positions, is_working)
+        neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, is_working)
         observations = replace(
             observations,
             neighbors=neighbors,
@@ -151,14 +151,14 @@ class Perception:
         return replace(scans, distances=distances)
 
 
-def restrict_decision_to_working(decision: Decision, working: BoolArray) -> Decision:
+def restrict_decision_to_working(decision: Decision, is_working: BoolArray) -> Decision:
     """Return a decision without the forces and goals of robots that have failed or have not joined yet.
 
     Parameters
     ----------
     decision : Decision
         The decision of the controller, for all robots.
-    working : (n,) bool array
+    is_working : (n,) bool array
         Mask of the working robots.
 
     Returns
@@ -166,15 +166,16 @@ def restrict_decision_to_working(decision: Decision, working: BoolArray) -> Deci
     Decision
         The forces of the other robots are 0, and their goals nan. The same object if all robots work.
     """
-    if working.all():
+    if is_working.all():
         return decision
-    is_working = working[:, None]
+    # One column, so that the mask applies to both coordinates.
+    column = is_working[:, None]
     goals = decision.goals
     if goals is not None:
-        goals = np.where(is_working, goals, np.nan)
+        goals = np.where(column, goals, np.nan)
     return replace(
         decision,
-        forces=np.where(is_working, decision.forces, 0.0),
+        forces=np.where(column, decision.forces, 0.0),
         goals=goals,
-        terms={name: np.where(is_working, term, 0.0) for name, term in decision.terms.items()},
+        terms={name: np.where(column, term, 0.0) for name, term in decision.terms.items()},
     )

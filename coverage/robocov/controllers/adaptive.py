@@ -187,7 +187,7 @@ class Adaptive(BaseController):
     def _plan(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory with new estimates, and with the centroids of the cells as goals."""
         samples = memory.lattice.samples
-        pairs = seen.find_near_neighbors(np.inf)
+        pairs = seen.find_neighbors()
         neighbor_positions = seen.positions[pairs.robots] - pairs.offsets
         is_own = find_own_samples(samples, seen.positions, pairs.robots, neighbor_positions)
         if self.estimate == "gp":

@@ -16,7 +16,7 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.controllers.known_cells import cells_choice, compute_known_cells
-from robocov.observation import Decision, NearNeighbors, Observations, Scanning
+from robocov.observation import Decision, NeighborPairs, Observations, Scanning
 from robocov.potential import compute_separations
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
@@ -24,11 +24,11 @@ from robocov.typing import FloatArray, IntArray
 _ROUNDING_M = 1e-3
 """Length over which the square root in h, which is vertical at the safe distance, is rounded."""
 _MIN_DISTANCE_M = 1e-9
-"""Lower limit of distances between robots in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_PASSING_CLEARANCE_M = 1e-3
-"""Margin added to the safe gap in the lower limit of the distance to a robot that moves past sideways."""
+"""Margin added to the safe gap in the minimum distance to a robot that moves past sideways."""
 _MIN_NORM = 1e-300
-"""Lower limit of norms in divisions."""
+"""Minimum divisor; prevents division by zero."""
 
 
 class NeighborReports(NamedTuple):
@@ -158,7 +158,7 @@ class Barrier(BaseController):
         accelerations = np.where(is_feasible[:, None], nearest, seen.velocities * rate[:, None])
         return accelerations, replace(memory, reports=reports, returns=returns)
 
-    def _find_near_neighbors(self, seen: Observations, team: Team) -> NearNeighbors:
+    def _find_near_neighbors(self, seen: Observations, team: Team) -> NeighborPairs:
         """Find the neighbors that are close enough to constrain a robot."""
         min_distance = 2.0 * float(team.radius.max()) + self.safe_gap
         # Upper bound on the distance that two robots need to stop if they meet at full speed.
@@ -166,14 +166,14 @@ class Barrier(BaseController):
             2.0 * float(team.max_speed.max()) ** 2 / float(self._compute_braking_limits(team).min())
         )
         # At twice that distance, gamma h³ is so large that the constraint has no effect.
-        return seen.find_near_neighbors(min_distance + 2.0 * stopping_distance)
+        return seen.find_neighbors(min_distance + 2.0 * stopping_distance)
 
     def _compute_braking_limits(self, team: Team) -> FloatArray:
         """Return alpha, the deceleration that each robot is assumed to be capable of, (n,) m/s²."""
         return np.asarray(self.braking * team.max_acceleration)
 
     def _build_robot_planes(
-        self, seen: Observations, team: Team, near: NearNeighbors, neighbor_velocities: FloatArray
+        self, seen: Observations, team: Team, near: NeighborPairs, neighbor_velocities: FloatArray
     ) -> HalfPlanes:
         """Return the half planes that keep robots apart.
 
@@ -245,7 +245,7 @@ class Barrier(BaseController):
         return np.asarray(np.maximum(self.gamma * h**3 + 0.5 * root / rounded * speed_away, -alpha))
 
 
-def _collect_reports(near: NearNeighbors, seen: Observations) -> NeighborReports:
+def _collect_reports(near: NeighborPairs, seen: Observations) -> NeighborReports:
     """Return the reported positions of near neighbors."""
     pairs = near.robots * len(seen.positions) + near.neighbors
     return NeighborReports(seen.time, pairs, seen.positions[near.robots] - near.offsets)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -22,15 +22,15 @@ from robocov.controllers.driving import (
     update_returns,
 )
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.observation import Decision, NearNeighbors, Observations, Scanning, compute_ray_directions
+from robocov.observation import Decision, NeighborPairs, Observations, Scanning, compute_ray_directions
 from robocov.observation.scanned_view import (
+    OcclusionEdges,
     View,
-    Windows,
     compute_speed_fractions,
     compute_view,
     evaluate_density,
-    find_windows,
-    integrate_over_windows,
+    find_occlusion_edges,
+    integrate_over_edges,
     is_behind_wall,
     is_path_clear,
 )
@@ -49,9 +49,9 @@ _TRAIL_SPACING_M = 0.2
 _RETURN_GAIN = 2.0
 """Speed per meter of distance to the next point of the trail, 1/s."""
 _MIN_DISTANCE_M = 1e-3
-"""Lower limit of distances in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_DETECTION = 1e-3
-"""Lower limit of the probability of detection in divisions."""
+"""Minimum probability of detection used as a divisor; prevents division by zero."""
 
 
 class Mode(Enum):
@@ -110,11 +110,11 @@ class Ascent:
         """
         ascent = self
         if math.dist(position, self.rest_position) > _REST_RADIUS_M:
-            ascent = replace(ascent, rest_position=freeze(position), rest_start=time)
+            ascent = replace(ascent, rest_position=copy_read_only(position), rest_start=time)
         if ascent.mode is Mode.RETURN:
             return ascent._follow_trail(position)
         if ascent.trail and math.dist(position, ascent.trail[-1]) > _TRAIL_SPACING_M:
-            ascent = replace(ascent, trail=(*ascent.trail, freeze(position)))
+            ascent = replace(ascent, trail=(*ascent.trail, copy_read_only(position)))
         is_settled = time - ascent.rest_start >= _SETTLE_TIME_S
         if ascent.mode is Mode.BOOSTED:
             if is_settled or time - ascent.boost_start >= limits.max_duration:
@@ -148,7 +148,7 @@ class Ascent:
             rest_start=time,
             boost_start=time,
             best_value=value,
-            trail=(freeze(position),),
+            trail=(copy_read_only(position),),
         )
 
 
@@ -214,7 +214,7 @@ class Boosting(BaseController):
     robot detects x. The gradient of the contribution is the sum of three terms:
 
     - w λ p_i toward each point in view,
-    - the integral of w p_i (s - ρ)/ρ along the edge of the view behind each corner (see `Windows`), and
+    - the integral of w p_i (s - ρ)/ρ along each edge behind a corner (see `OcclusionEdges`), and
     - w p_i along the arcs where the view ends at the sensing range.
 
     The gain `boost` selects the boosted gradient:
@@ -310,7 +310,7 @@ class Boosting(BaseController):
     ) -> tuple[Ascent, ...]:
         """Return the ascents after a scan."""
         if not ascents:
-            ascents = tuple(Ascent(freeze(position), seen.time) for position in seen.positions)
+            ascents = tuple(Ascent(copy_read_only(position), seen.time) for position in seen.positions)
         limits = BoostLimits(int(self.boosts), self.patience)
         return tuple(
             ascent.update(position, seen.time, value, limits)
@@ -334,11 +334,11 @@ class Boosting(BaseController):
         Contributions
         """
         directions = compute_ray_directions(view.distances.shape[1])
-        pairs = seen.find_near_neighbors(2.0 * float(max_distances.max()))
+        pairs = seen.find_neighbors(2.0 * float(max_distances.max()))
         samples = self._sample_views(seen, view, pairs, directions, max_distances)
-        windows = find_windows(view, directions, max_distances, self.jump)
+        edges = find_occlusion_edges(view, directions, max_distances, self.jump)
         boosted_weight = self._compute_boosted_weight(samples)
-        boosted_gradient = self._compute_gradient(boosted_weight, samples, view, windows, max_distances)
+        boosted_gradient = self._compute_gradient(boosted_weight, samples, view, edges, max_distances)
         if self.boost == "neighbors":
             repulsion = self.kappa / np.maximum(pairs.distances, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
@@ -346,7 +346,7 @@ class Boosting(BaseController):
             )
         return Contributions(
             value=(samples.weight * samples.detection * samples.areas).sum(axis=(1, 2)),
-            gradient=self._compute_gradient(samples.weight, samples, view, windows, max_distances),
+            gradient=self._compute_gradient(samples.weight, samples, view, edges, max_distances),
             boosted_gradient=boosted_gradient,
         )
 
@@ -354,7 +354,7 @@ class Boosting(BaseController):
         self,
         seen: Observations,
         view: View,
-        pairs: NearNeighbors,
+        pairs: NeighborPairs,
         directions: FloatArray,
         max_distances: FloatArray,
     ) -> _ViewSamples:
@@ -397,7 +397,7 @@ class Boosting(BaseController):
         weight: FloatArray,
         samples: _ViewSamples,
         view: View,
-        windows: Windows,
+        edges: OcclusionEdges,
         max_distances: FloatArray,
     ) -> FloatArray:
         """Return the gradient of the integral of a weight times p over the views, (n, 2) m.
@@ -411,9 +411,9 @@ class Boosting(BaseController):
         range_detection = np.exp(-self.decay * max_distances)[:, None]
         arcs = ~view.is_hit * range_detection * max_distances[:, None] * sector_angle
         ray_terms = self.decay * (integrand * samples.areas).sum(axis=2) + weight[..., -1] * arcs
-        growth = integrate_over_windows(windows, view, samples.depths, integrand)
-        window_terms = sum_by_robot(windows.robots, growth, len(max_distances))
-        return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + window_terms)
+        growth = integrate_over_edges(edges, view, samples.depths, integrand)
+        edge_terms = sum_by_robot(edges.robots, growth, len(max_distances))
+        return np.asarray((ray_terms[..., None] * directions).sum(axis=1) + edge_terms)
 
 
 @kernel
@@ -421,7 +421,7 @@ def compute_undetected(
     depths: FloatArray,
     wall_distances: FloatArray,
     directions: FloatArray,
-    pairs: NearNeighbors,
+    pairs: NeighborPairs,
     max_distances: FloatArray,
     decay: float,
 ) -> FloatArray:
@@ -435,7 +435,7 @@ def compute_undetected(
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
-    pairs : NearNeighbors
+    pairs : NeighborPairs
         Pairs of a robot and a neighbor. The neighbor detects points within its own distance, unless a wall in
         the robot's view blocks the line of sight from the neighbor to the point.
     max_distances : (n,) array, m

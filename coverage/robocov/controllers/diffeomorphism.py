@@ -24,7 +24,7 @@ from robocov.typing import FloatArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _MIN_DETERMINANT = 1e-300
-"""Lower limit of determinants in divisions."""
+"""Minimum divisor; prevents division by zero."""
 
 # Charts take long to build, and must not be copied with the memories of robots.
 _build_cached_chart = lru_cache(maxsize=8)(ConvexChart)
@@ -67,9 +67,9 @@ class Diffeomorphism(WholeMapController):
     positions of the robots within communication range. The chart includes unreachable rooms, but no moving
     obstacles.
 
-    The implementation is based on general knowledge, not on the full texts of the two papers ("A coverage
-    algorithm for a class of non-convex regions", CDC 2008; "Performing coverage on nonconvex domains", CCA
-    2008). Here F is piecewise linear, and obstacles become small areas instead of points.
+    We did not have the full text of the two papers ("A coverage algorithm for a class of non-convex regions",
+    CDC 2008; "Performing coverage on nonconvex domains", CCA 2008); details may differ. Here F is
+    piecewise linear, and obstacles become small areas instead of points.
     """
 
     name = "diffeomorphism"
@@ -110,7 +110,7 @@ class Diffeomorphism(WholeMapController):
         velocities = compute_approach_velocities(offsets, self.k_prop, team.max_speed)
         # Each robot avoids one obstacle point, the nearest one in view.
         obstacle_points = seen.obstacle_points[:, None]
-        # The motion in the chart keeps the full clearance from walls. A robot that does so need not brake.
+        # Braking starts only at half the clearance, because paths in the chart already keep all of it.
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
@@ -129,7 +129,7 @@ def _compute_chart_centroids(
 
     `chart_positions`, (n, 2) m, are the positions F(p_i) of the robots in the chart.
     """
-    pairs = seen.find_near_neighbors(np.inf)
+    pairs = seen.find_neighbors()
     if seen.reported_positions is None:
         neighbor_chart_positions = chart_positions[pairs.neighbors]
     else:

@@ -21,9 +21,9 @@ _DEFAULT_APPROACH_RATE = 4.0
 _DEFAULT_BRAKING_FRACTION = 0.5
 """Fraction of the maximum acceleration that is assumed to be available for braking."""
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_RATE = 1e-9
-"""Lower limit in 1/s of the rate of approach in divisions."""
+"""Minimum rate of approach used as a divisor, 1/s; prevents division by zero."""
 _RELATIVE_SLACK = 1e-12
 """Tolerance of constraints for rounding errors, relative to the radius of the disc."""
 _MIN_SLOPE = 1e-12
@@ -365,7 +365,7 @@ def list_neighbor_offsets(seen: Observations, max_distance: float) -> FloatArray
     (n, k, 2) array, m
         Row i belongs to robot i; nan at the end of rows with fewer neighbors.
     """
-    pairs = seen.find_near_neighbors(max_distance)
+    pairs = seen.find_neighbors(max_distance)
     return arrange_in_rows(pairs.robots, len(seen.positions), pairs.offsets, np.nan)
 
 

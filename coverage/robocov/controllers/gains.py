@@ -28,8 +28,8 @@ def update_name(name: str, known: Collection[str]) -> str:
     >>> update_name("neighbours", {"neighbors", "eta"}), update_name("eta", {"neighbors", "eta"})
     ('neighbors', 'eta')
     """
-    present_name = _FORMER_NAMES.get(name, name)
-    return present_name if name not in known and present_name in known else name
+    current_name = _FORMER_NAMES.get(name, name)
+    return current_name if name not in known and current_name in known else name
 
 
 def format_value(value: Value, *, digits: int = 6, none: str = "none") -> str:
@@ -161,9 +161,9 @@ def gain(
     meaning : str
         Description on one line.
     low : float
-        Smallest allowed value.
+        Minimum allowed value.
     high : float
-        Largest allowed value.
+        Maximum allowed value.
     optional : bool
         Whether None is allowed, which means no limit.
     whole : bool

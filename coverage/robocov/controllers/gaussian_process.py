@@ -21,7 +21,7 @@ SAMPLES_PER_SQUARE = 2
 class ProcessGrid:
     """Squares in which robots measure a density, and finer samples of the Voronoi cells."""
 
-    squares: FloatArray
+    centers: FloatArray
     """(s, 2) m, centers of the squares, row by row from the lowest."""
     prior_correlations: FloatArray
     """(s, s) Correlations of φ at the centers of the squares, before any measurement."""
@@ -33,18 +33,18 @@ class ProcessGrid:
     """(k, 4) Weights of these squares in the bilinear interpolation."""
 
     @classmethod
-    def build(cls, region: Region, squares: int, correlation: float) -> ProcessGrid:
+    def build(cls, region: Region, squares_per_side: int, correlation: float) -> ProcessGrid:
         """Build the grid of a region.
 
         Parameters
         ----------
         region : Region
-        squares : int
+        squares_per_side : int
             Number of squares along the longer side of the bounding box.
         correlation : float
             Correlation length of the process, relative to this side.
         """
-        grid = SquareGrid.build(region, squares)
+        grid = SquareGrid.build(region, squares_per_side)
         rows, columns = grid.shape
         low, high = np.reshape(region.bounds, (2, 2))
         length = correlation * float((high - low).max())
@@ -56,7 +56,7 @@ class ProcessGrid:
         corners, corner_weights = _find_corners(coordinates[is_inside], rows, columns)
         squared_distances = ((grid.centers[:, None] - grid.centers) ** 2).sum(axis=2)
         return cls(
-            squares=grid.centers,
+            centers=grid.centers,
             prior_correlations=np.exp(-squared_distances / (2.0 * length**2)),
             samples=samples[is_inside],
             corners=corners,
@@ -65,7 +65,7 @@ class ProcessGrid:
 
     def find_square(self, position: FloatArray) -> int:
         """Return the index of the square whose center is nearest to a position, (2,) m."""
-        return int(((self.squares - position) ** 2).sum(axis=1).argmin())
+        return int(((self.centers - position) ** 2).sum(axis=1).argmin())
 
     def interpolate(self, values: FloatArray) -> FloatArray:
         """Interpolate values of the squares, (s,), to the samples, (k,)."""
@@ -80,40 +80,40 @@ class Posterior:
 
     Attributes
     ----------
-    correlations : (s, s) array
-        Covariances of φ in the squares, relative to the variance of the prior.
+    covariances : (s, s) array
+        Posterior covariances of φ in the squares, divided by the prior variance.
     is_measured : (s,) bool array
         The squares with a measurement.
 
     Examples
     --------
     >>> region = Region(np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]))
-    >>> grid = ProcessGrid.build(region, squares=4, correlation=0.1)
+    >>> grid = ProcessGrid.build(region, squares_per_side=4, correlation=0.1)
     >>> measurements = np.full(16, np.nan)
     >>> measurements[0] = 3.0
-    >>> posterior = Posterior.build_prior(grid).add_squares(~np.isnan(measurements))
+    >>> posterior = Posterior.build_prior(grid).condition_on(~np.isnan(measurements))
     >>> mean = posterior.compute_mean(measurements, prior_mean=1.0)
     >>> deviations = posterior.compute_deviations()
     >>> mean[[0, 15]].round(2), deviations[[0, 15]].round(2)
     (array([2.98, 1.  ]), array([0.1, 1. ]))
     """
 
-    correlations: FloatArray
+    covariances: FloatArray
     is_measured: BoolArray
 
     @classmethod
     def build_prior(cls, grid: ProcessGrid) -> Posterior:
         """Build the posterior without any measurement."""
-        square_count = len(grid.squares)
+        square_count = len(grid.centers)
         return cls(grid.prior_correlations, np.zeros(square_count, dtype=bool))
 
-    def add_squares(self, is_measured: BoolArray) -> Posterior:
-        """Return the posterior after further squares have been measured.
+    def condition_on(self, is_measured: BoolArray) -> Posterior:
+        """Return the posterior given measurements in these squares.
 
         Parameters
         ----------
         is_measured : (s,) bool array
-            All squares with a measurement, including the previous ones.
+            All squares with a measurement. They include those of this posterior.
 
         Returns
         -------
@@ -122,8 +122,8 @@ class Posterior:
         new_squares = np.flatnonzero(is_measured & ~self.is_measured)
         if not len(new_squares):
             return self
-        correlations = _add_squares(self.correlations, new_squares, NOISE_VARIANCE)
-        return Posterior(correlations, is_measured.copy())
+        covariances = _add_measurements(self.covariances, new_squares, NOISE_VARIANCE)
+        return Posterior(covariances, is_measured.copy())
 
     def compute_mean(self, measurements: FloatArray, prior_mean: float) -> FloatArray:
         """Compute the posterior mean of φ in each square.
@@ -141,11 +141,11 @@ class Posterior:
         """
         known = np.flatnonzero(self.is_measured)
         residuals = (measurements[known] - prior_mean) / NOISE_VARIANCE
-        return prior_mean + _multiply_columns(self.correlations, known, residuals)
+        return prior_mean + _multiply_columns(self.covariances, known, residuals)
 
     def compute_deviations(self) -> FloatArray:
         """Compute the standard deviation of φ in each square, (s,), relative to that of the prior."""
-        return np.sqrt(np.maximum(np.diagonal(self.correlations), 0.0))
+        return np.sqrt(np.maximum(np.diagonal(self.covariances), 0.0))
 
 
 def _list_cells(rows: int, columns: int) -> FloatArray:
@@ -185,23 +185,26 @@ def _find_corners(coordinates: FloatArray, rows: int, columns: int) -> tuple[Int
 
 
 @kernel
-def _add_squares(correlations: FloatArray, new_squares: IntArray, noise_variance: float) -> FloatArray:
-    """Return the correlations after the new squares have been measured, one after another.
+def _add_measurements(covariances: FloatArray, new_squares: IntArray, noise_variance: float) -> FloatArray:
+    """Return the posterior covariances after the new squares have been measured, one after another.
+
+    Rank-one update per square s: K - k kᵀ / (k_ss + σ²), where k is the column of K for s, and σ² is the
+    variance of a measurement. All variances and covariances are divided by the prior variance.
 
     The results have the same bits on all processors, unlike those of a factorization by LAPACK.
     """
-    correlations = correlations.copy()
-    count = len(correlations)
+    covariances = covariances.copy()
+    count = len(covariances)
     for square in new_squares:
-        row = correlations[square].copy()
+        row = covariances[square].copy()
         variance = row[square] + noise_variance
         for i in range(count):
             factor = row[i] / variance
-            # The correlation of distant squares underflows to 0.
+            # Skip distant squares, whose correlation has underflowed to 0.
             if factor != 0.0:
                 for j in range(count):
-                    correlations[i, j] -= factor * row[j]
-    return correlations
+                    covariances[i, j] -= factor * row[j]
+    return covariances
 
 
 @kernel

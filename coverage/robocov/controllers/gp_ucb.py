@@ -24,7 +24,7 @@ from robocov.typing import FloatArray
 from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_samples
 
 _MIN_RELATIVE_DENSITY = 1e-3
-"""Lower limit of the density in plans, relative to the root mean square of the measurements.
+"""Minimum density in plans, relative to the root mean square of the measurements.
 
 The posterior mean can be negative, but a mass must not be.
 """
@@ -141,7 +141,7 @@ class GpUcb(BaseController):
         """Return the memory of robots that have not measured anything."""
         robot_count = len(team)
         grid = ProcessGrid.build(region, int(self.squares), self.correlation)
-        square_count = len(grid.squares)
+        square_count = len(grid.centers)
         return GpUcbMemory(
             team=team,
             grid=grid,
@@ -181,7 +181,7 @@ class GpUcb(BaseController):
             for robot, posterior in enumerate(memory.posteriors):
                 bound = compute_bound(posterior, memory.measurements[robot], beta)
                 bounds[robot] = memory.grid.interpolate(bound)
-        pairs = seen.find_near_neighbors(np.inf)
+        pairs = seen.find_neighbors()
         neighbor_positions = seen.positions[pairs.robots] - pairs.offsets
         is_own = find_own_samples(samples, seen.positions, pairs.robots, neighbor_positions)
         goals = compute_sample_centroids(is_own, samples, bounds, seen.positions)
@@ -222,7 +222,7 @@ def _add_own_measurements(seen: Observations, memory: GpUcbMemory) -> GpUcbMemor
     posteriors = []
     for robot, posterior in enumerate(memory.posteriors):
         measurements[robot, memory.grid.find_square(seen.positions[robot])] = values[robot]
-        posteriors.append(posterior.add_squares(~np.isnan(measurements[robot])))
+        posteriors.append(posterior.condition_on(~np.isnan(measurements[robot])))
     return replace(
         memory,
         measurements=measurements,

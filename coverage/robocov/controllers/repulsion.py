@@ -23,7 +23,7 @@ from robocov.controllers.known_cells import cells_choice, compute_known_cells
 from robocov.locational_cost.best_points import HEIGHT_HELP, TARGET_HELP, TARGETS, find_targets
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.neighbors import NeighborPositions
-from robocov.observation.observations import NearNeighbors
+from robocov.observation.observations import NeighborPairs
 from robocov.observation.region import Region
 from robocov.potential import (
     CONTACT_DISTANCE,
@@ -37,9 +37,9 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov.voronoi.delaunay import Mesh
 
 _MIN_DISTANCE_M = 1e-9
-"""Lower limit of distances between robots in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_CHARGE_DISTANCE_M = 0.05
 """Distance below which the forces of `Howard` are constant; robots in contact are farther apart."""
 _WALL_FACTOR = 2.0 / (3.0 * math.pi)
@@ -67,9 +67,9 @@ def _compute_potential_forces(
     return compute_potential_forces(seen.positions, neighbors, seen.obstacle_points, goals, gains)
 
 
-def _find_separated_neighbors(seen: Observations, max_distance: float) -> NearNeighbors:
+def _find_separated_neighbors(seen: Observations, max_distance: float) -> NeighborPairs:
     """Find near neighbors, and give robots at the same position a small offset from each other."""
-    pairs = seen.find_near_neighbors(max_distance)
+    pairs = seen.find_neighbors(max_distance)
     is_same = pairs.distances < _MIN_DISTANCE_M
     directions = compute_separations(pairs.robots[is_same], pairs.neighbors[is_same])
     pairs.offsets[is_same] = _MIN_DISTANCE_M * directions
@@ -388,13 +388,13 @@ class Poduri(BaseController):
         }
         return Decision(forces=repulsion + attraction + potential.obstacle, terms=terms, memory=memory)
 
-    def _find_links(self, seen: Observations, team: Team) -> tuple[NearNeighbors, FloatArray]:
+    def _find_links(self, seen: Observations, team: Team) -> tuple[NeighborPairs, FloatArray]:
         """Return the links of all robots, and the range R_c of each, (m,) m."""
         max_ranges = np.minimum(team.communication_range, self.link_range)
         pairs = _find_separated_neighbors(seen, float(max_ranges.max()))
         link_ranges = np.minimum(max_ranges[pairs.robots], max_ranges[pairs.neighbors])
         is_linked = pairs.distances <= link_ranges
-        links = NearNeighbors(
+        links = NeighborPairs(
             robots=pairs.robots[is_linked],
             neighbors=pairs.neighbors[is_linked],
             offsets=pairs.offsets[is_linked],
@@ -403,7 +403,7 @@ class Poduri(BaseController):
         return links, link_ranges[is_linked]
 
     def _find_critical_links(
-        self, seen: Observations, links: NearNeighbors, link_ranges: FloatArray
+        self, seen: Observations, links: NeighborPairs, link_ranges: FloatArray
     ) -> BoolArray:
         """Return a mask of the links that are critical for the robot or, as far as it knows, the neighbor."""
         n = len(seen.positions)
@@ -420,7 +420,7 @@ class Poduri(BaseController):
         return is_critical
 
     def _is_critical_for_neighbor(
-        self, seen: Observations, links: NearNeighbors, is_near: BoolArray, selected: IntArray
+        self, seen: Observations, links: NeighborPairs, is_near: BoolArray, selected: IntArray
     ) -> BoolArray:
         """Return whether the selected links are critical for the neighbor, as far as the robot can tell.
 
@@ -447,7 +447,7 @@ class Poduri(BaseController):
         return is_critical
 
     def _is_critical_by_reports(
-        self, seen: Observations, links: NearNeighbors, link_ranges: FloatArray, selected: IntArray
+        self, seen: Observations, links: NeighborPairs, link_ranges: FloatArray, selected: IntArray
     ) -> BoolArray:
         """Return whether links are critical for the neighbor, according to the received positions.
 

@@ -1,4 +1,4 @@
-"""Squares in which robots measure a density."""
+"""A grid of squares over a region."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class SquareGrid:
     centers: FloatArray
     """(s, 2) m, row by row from the lowest."""
     is_inside: BoolArray
-    """(s,) Whether the center of each square lies in the region."""
+    """(s,) Whether the center of each square is in the region."""
     shape: tuple[int, int]
     """Number of rows and columns."""
     side: float
-    """m"""
+    """Side of a square, m."""
 
     @classmethod
-    def build(cls, region: Region, squares: int) -> SquareGrid:
+    def build(cls, region: Region, squares_per_side: int) -> SquareGrid:
         """Build a grid with a given number of squares along the longer side of the bounding box."""
         low_x, low_y, high_x, high_y = region.bounds
-        side = max(high_x - low_x, high_y - low_y) / squares
+        side = max(high_x - low_x, high_y - low_y) / squares_per_side
         columns = int(np.ceil((high_x - low_x) / side - _ROUNDING_TOLERANCE))
         rows = int(np.ceil((high_y - low_y) / side - _ROUNDING_TOLERANCE))
         x, y = np.meshgrid(
@@ -49,13 +49,14 @@ class SquareGrid:
         is_counted : (s,) bool array
             Which squares are counted.
         half_width : float, m
-            Half the width of the box.
+            Half the width of the box, which is rounded down to whole squares on either side.
 
         Returns
         -------
         (s,) array
         """
-        width = 2 * int(half_width / self.side) + 1
+        squares_across = 2 * int(half_width / self.side) + 1
         # The number is the mean over the box times the number of squares in the box.
-        mean = uniform_filter(is_counted.reshape(self.shape).astype(np.float64), width, mode="constant")
-        return np.asarray(np.rint(mean * width**2).ravel())
+        values = is_counted.reshape(self.shape).astype(np.float64)
+        mean = uniform_filter(values, squares_across, mode="constant")
+        return np.asarray(np.rint(mean * squares_across**2).ravel())

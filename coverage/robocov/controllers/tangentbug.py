@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.compiled import kernel
 from robocov.controllers.base import BaseController, Memory
 from robocov.controllers.driving import (
@@ -39,9 +39,9 @@ _MIN_BOUNDARY_LENGTH_M = 1.0
 _MAX_LENGTH_DECAY = 0.9
 """Factor by which the maximum length of a followed boundary shrinks with each fixed goal."""
 _CONTACT_FRACTION = 0.95
-"""Fraction of the present distance to which a robot within the clearance may approach a point."""
+"""Fraction of the current distance to which a robot within the clearance may approach a point."""
 _MIN_LENGTH = 1e-300
-"""Lower limit of lengths in divisions: only the length of a zero vector is smaller."""
+"""Minimum divisor; prevents division by zero."""
 _ROUNDING_M = 1e-9
 """Tolerance of free distances for rounding errors."""
 _MAX_RETURN_FACTOR = 3.0
@@ -62,7 +62,7 @@ class Mode(Enum):
     BOUNDARY = "boundary following"
     LEAVING = "leaving the boundary"
     RETURN = "return along the boundary to its point nearest to the goal"
-    BEST_POINT = "motion straight to that point, and rest there"
+    BEST_POINT = "motion straight to the best point, and rest there"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ class FollowedBoundary:
         length = self.length + math.dist(position, self.last_position)
         return replace(self, length=length, last_position=position)
 
-    def is_around(self) -> bool:
+    def is_complete(self) -> bool:
         """Return whether the robot has followed the whole boundary, back to its entry point."""
         if self.length <= 2.0 * math.pi * _RETURN_RADIUS_M:
             return False
@@ -142,7 +142,7 @@ class NavigationState:
         if self.mode is Mode.BEST_POINT:
             if goal.resting_centroid is None:
                 if math.dist(position, self.waypoint) < _ARRIVAL_RADIUS_M:
-                    return replace(self, fixed_goal=replace(goal, resting_centroid=freeze(centroid)))
+                    return replace(self, fixed_goal=replace(goal, resting_centroid=copy_read_only(centroid)))
             elif math.dist(centroid, goal.resting_centroid) > min_move * self.attempts:
                 is_done = True
         if not is_done:
@@ -433,7 +433,11 @@ class Navigator:
     ) -> NavigationState:
         """Return the state of a robot that moves straight to a waypoint through free space."""
         return replace(
-            state, mode=mode, waypoint=freeze(waypoint), passes_waypoint=passes_waypoint, boundary=None
+            state,
+            mode=mode,
+            waypoint=copy_read_only(waypoint),
+            passes_waypoint=passes_waypoint,
+            boundary=None,
         )
 
     def _move_to_goal(self, state: NavigationState) -> NavigationState:
@@ -465,17 +469,17 @@ class Navigator:
         else:
             best_point = state.fixed_goal.best_point
         max_length = self._compute_max_boundary_length(attempts)
-        position = freeze(self.position)
+        position = copy_read_only(self.position)
         state = replace(
             state,
             mode=Mode.BOUNDARY,
             passes_waypoint=True,
             attempts=attempts,
-            fixed_goal=FixedGoal(freeze(self.position + self.goal_offset), best_point),
+            fixed_goal=FixedGoal(copy_read_only(self.position + self.goal_offset), best_point),
             boundary=FollowedBoundary(position, position, length=0.0, max_length=max_length),
         )
         if self._is_goal_blocked() or max_length < _MIN_BOUNDARY_LENGTH_M:
-            return self._move_to_best_point(state, self._find_best_point(state, ends))
+            return self._plan_move_to_best_point(state, self._find_best_point(state, ends))
         return self._follow_boundary(state)
 
     def _compute_max_boundary_length(self, attempts: int) -> float:
@@ -506,23 +510,23 @@ class Navigator:
         best_point = self._find_best_point(state, ends)
         state = replace(
             state,
-            waypoint=freeze(self.position + offset),
+            waypoint=copy_read_only(self.position + offset),
             fixed_goal=replace(state.fixed_goal, best_point=best_point),
             boundary=boundary,
         )
         if state.mode is Mode.RETURN:
             if boundary.length > _MAX_RETURN_FACTOR * boundary.max_length:
                 # The robot has lost its best point, and stays where it is.
-                best_point = freeze(self.position)
-            return self._move_to_best_point(state, best_point)
+                best_point = copy_read_only(self.position)
+            return self._plan_move_to_best_point(state, best_point)
         leaving_point = self._find_leaving_point(best_point)
         if leaving_point is not None:
             return self._head_for(state, Mode.LEAVING, leaving_point, passes_waypoint=True)
-        is_around = boundary.is_around()
-        if is_around or not ends or boundary.length > boundary.max_length:
+        is_complete = boundary.is_complete()
+        if is_complete or not ends or boundary.length > boundary.max_length:
             # After a full turn, the robot keeps its direction. Otherwise, it turns and goes back on its path.
-            turn = state.turn if is_around else -state.turn
-            return self._move_to_best_point(replace(state, mode=Mode.RETURN, turn=turn), best_point)
+            turn = state.turn if is_complete else -state.turn
+            return self._plan_move_to_best_point(replace(state, mode=Mode.RETURN, turn=turn), best_point)
         return state
 
     def _find_leaving_point(self, best_point: FloatArray) -> FloatArray | None:
@@ -551,23 +555,26 @@ class Navigator:
         contour = self.view.free_distances[rays, None] * self.view.directions[rays]
         points = np.vstack([best_so_far, contour])
         nearest = np.hypot(*(self.goal_offset - points).T).argmin()
-        return freeze(self.position + points[nearest])
+        return copy_read_only(self.position + points[nearest])
 
-    def _move_to_best_point(self, state: NavigationState, best_point: FloatArray) -> NavigationState:
-        """Return the state of a robot that heads for its best point if that is in view, or returns to it."""
+    def _plan_move_to_best_point(self, state: NavigationState, best_point: FloatArray) -> NavigationState:
+        """Return the state of a robot on its way to the best point.
+
+        It moves straight to the point if it is in view, or else back along the boundary.
+        """
         assert state.fixed_goal is not None
         goal = replace(state.fixed_goal, best_point=best_point, resting_centroid=None)
         offset = best_point - self.position
         distance = math.hypot(*offset)
         free_distance = self.view.compute_free_distance(offset)
-        # Seen from here, the boundary may be a little closer to the point than it was before.
+        # Allow a tolerance of one clearance: from here, the view may end slightly short of the point.
         if distance >= _ARRIVAL_RADIUS_M and free_distance < distance - self.view.clearance:
             return replace(state, mode=Mode.RETURN, fixed_goal=goal)
         fraction = min(1.0, free_distance / max(distance, _MIN_LENGTH))
         return replace(
             state,
             mode=Mode.BEST_POINT,
-            waypoint=freeze(self.position + offset * fraction),
+            waypoint=copy_read_only(self.position + offset * fraction),
             passes_waypoint=False,
             fixed_goal=goal,
             boundary=None,

@@ -1,4 +1,4 @@
-"""Controllers in users' own files: their classes, the modules that they import, and errors in their code.
+"""Load controllers from users' files, find the modules they import, and explain their errors.
 
 A file and the modules that it imports can also be loaded from stored texts, for example on another machine.
 """
@@ -15,7 +15,6 @@ import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib.machinery import ModuleSpec, PathFinder
-from itertools import accumulate
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -219,7 +218,7 @@ def find_own_modules(text: str) -> dict[str, ModuleText]:
     """Find the author's own modules that source code imports, directly or indirectly.
 
     Modules are looked up on ``sys.path`` without being executed. The standard library, installed packages and
-    robocov are left out, and so are files that cannot be read. Imports by a computed name are not found.
+    robocov are left out, and so are files that cannot be read. Dynamic imports are not found.
 
     Parameters
     ----------
@@ -251,8 +250,10 @@ class _ModuleCollector:
         """Add a module, and the packages that contain it; return the names that they import."""
         imports: list[str] = []
         locations: Sequence[str] | None = None  # The first name is looked up on ``sys.path``.
-        # The packages of a.b.c are a and a.b.
-        for module in accumulate(name.split("."), "{}.{}".format):
+        # For a.b.c: a, then a.b, then a.b.c.
+        parts = name.split(".")
+        for depth in range(1, len(parts) + 1):
+            module = ".".join(parts[:depth])
             if module not in self._locations:
                 imports += self._add_module(module, locations)
             locations = self._locations[module]

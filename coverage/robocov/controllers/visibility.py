@@ -17,14 +17,14 @@ from robocov.controllers.driving import (
 )
 from robocov.controllers.gains import gain, response_time_gain
 from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
-from robocov.observation.observations import NearNeighbors
+from robocov.observation.observations import NeighborPairs
 from robocov.observation.scanned_view import (
     View,
     compute_speed_fractions,
     compute_view,
     evaluate_density,
-    find_windows,
-    integrate_over_windows,
+    find_occlusion_edges,
+    integrate_over_edges,
     is_behind_wall,
     is_path_clear,
 )
@@ -61,15 +61,15 @@ class Visibility(BaseController):
     power |q - p_i|² - R_i², where R_i is the sensing range. With equal ranges, the nearest robot has the
     lowest power. The motion is
 
-        u_i = k ( ∫ φ n ds over the free arcs of W_i + sum over the windows of ∫ φ (s - ρ)/ρ ds t )
+        u_i = k ( ∫ φ n ds over the free arcs of W_i + sum over the occlusion edges of ∫ φ (s - ρ)/ρ ds t )
 
-    A free arc is a piece of the circle of radius R_i on the border of W_i, and n is its outward normal. A
-    window is a free edge of the view that begins at a reflex corner of an obstacle, at the distance ρ; s is
-    the distance along the edge, and t is normal to it, away from the obstacle (see `Windows`). Walls do not
-    move, and the gradients of two cells along their common border cancel.
+    A free arc is a piece of the circle of radius R_i on the border of W_i, and n is its outward normal. An
+    occlusion edge is a free edge of the view that begins at a reflex corner of an obstacle, at the distance
+    ρ; s is the distance along the edge, and t is normal to it, away from the obstacle (see
+    `OcclusionEdges`). Walls do not move, and the gradients of two cells along their common border cancel.
 
-    Arcs and windows are found in the robot's own scan; between scans, robots keep their velocities. The cell
-    of a robot without neighbors in communication range is its whole view.
+    Arcs and occlusion edges are found in the robot's own scan; between scans, robots keep their velocities.
+    The cell of a robot without neighbors in communication range is its whole view.
 
     The implementation is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not
     on the full text. In the paper, robots send each other their views. Here they send positions, and a robot
@@ -136,17 +136,17 @@ class Visibility(BaseController):
         directions = compute_ray_directions(ray_count)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         wall_distances = np.where(view.is_hit, view.distances, np.inf)
-        pairs = seen.find_near_neighbors(2.0 * float(max_distances.max()))
+        pairs = seen.find_neighbors(2.0 * float(max_distances.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
         weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, max_distances)
         # The weight at the sensing range, times the length of the arc there, for rays that hit no obstacle.
         arcs = ~view.is_hit * weight[..., -1] * max_distances[:, None] * (2.0 * np.pi / ray_count)
-        windows = find_windows(view, directions, max_distances, self.jump)
+        edges = find_occlusion_edges(view, directions, max_distances, self.jump)
         # The last sample is the end of the ray, which only the arcs need.
-        growth = integrate_over_windows(windows, view, depths[..., :-1], weight[..., :-1])
-        window_terms = sum_by_robot(windows.robots, growth, robot_count)
-        return np.asarray((arcs[..., None] * directions).sum(axis=1) + window_terms)
+        growth = integrate_over_edges(edges, view, depths[..., :-1], weight[..., :-1])
+        edge_terms = sum_by_robot(edges.robots, growth, robot_count)
+        return np.asarray((arcs[..., None] * directions).sum(axis=1) + edge_terms)
 
 
 @kernel
@@ -154,7 +154,7 @@ def find_cells_in_view(
     depths: FloatArray,
     wall_distances: FloatArray,
     directions: FloatArray,
-    pairs: NearNeighbors,
+    pairs: NeighborPairs,
     max_distances: FloatArray,
 ) -> BoolArray:
     """Find the points of each robot's view that belong to its cell.
@@ -167,7 +167,7 @@ def find_cells_in_view(
         Distances of the walls in view; infinite where there is none.
     directions : (rays, 2) array
         Unit vectors along the rays.
-    pairs : NearNeighbors
+    pairs : NeighborPairs
         The neighbors that may see points of the view.
     max_distances : (n,) array, m
         Maximum distance of each robot's view.

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from robocov.arrays import compute_weighted_mean, freeze
+from robocov.arrays import compute_weighted_mean, copy_read_only
 from robocov.cost.corner_views import (
     INDEX_COLUMNS,
     LENGTH_COLUMNS,
@@ -131,7 +131,7 @@ class CoverageCost:
             heartbeat = None if progress is None else partial(progress, 0.0)
             geodesics = Geodesics(self.closed_environment, heartbeat)
         self.geodesics = geodesics
-        self.corners = freeze(geodesics.corners)
+        self.corners = copy_read_only(geodesics.corners)
         self.sites, tiles = build_lattice(geodesics, self.lattice)
         self.points = self.sites.points
         self.cells = self.sites.cells
@@ -180,7 +180,7 @@ class CoverageCost:
         self.weights: FloatArray | None = None
         density = environment.density
         if density is not None and not density.is_uniform:
-            self.weights = freeze(compute_square_means(density, self.points, self.spacing))
+            self.weights = copy_read_only(compute_square_means(density, self.points, self.spacing))
 
     def __call__(self, positions: FloatArray, speeds: FloatArray | None = None) -> CoverageResult:
         """Compute the coverage cost of a team.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import find_run_starts, freeze
+from robocov.arrays import copy_read_only, find_run_starts
 from robocov.errors import ParameterError
 from robocov.geodesic import Geodesics
 from robocov.geodesic.box_tree import build_box_tree, compute_z_order
@@ -138,7 +138,7 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
             "side; choose a finer lattice"
         )
     cells.setflags(write=False)
-    points = freeze(_compute_centers(cells, side, spacing, geodesics.grid.origin))
+    points = copy_read_only(_compute_centers(cells, side, spacing, geodesics.grid.origin))
     sites = Sites(side, spacing, points, cells)
     return sites, _build_tiles(sites, geodesics.grid.snap(points), np.concatenate(all_components))
 

@@ -18,7 +18,7 @@ MAX_WEIGHT = 1e6
 """Maximum value of a weight."""
 
 _MIN_MEAN_DENSITY = 1e-9
-"""Smallest mean density for which the centroid of a cell is computed, as a fraction of the maximum
+"""Minimum mean density for which the centroid of a cell is computed, as a fraction of the maximum
 density."""
 
 
@@ -37,8 +37,8 @@ class Density(ABC):
 
     Notes
     -----
-    φ weights points in the locational cost (4), in the masses and centroids (2) of cells, and in the coverage
-    cost (22). The paper names it as future work.
+    φ is the weight of a point in the locational cost (4), in the masses and centroids (2) of cells, and in
+    the coverage cost (22). The paper names it as future work.
 
     Examples
     --------
@@ -47,7 +47,7 @@ class Density(ABC):
     >>> hall = rc.Environment("hall", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)))
     >>> peak = rc.Gaussian((8.0, 3.0), weight=4.0, sigma=1.0)
     >>> weighted = hall.with_density(rc.Gaussians((peak,), floor=0.2))
-    >>> isinstance(weighted.density, rc.Density), weighted.density.max_value >= 4.0
+    >>> isinstance(weighted.density, rc.Density), weighted.density.upper_bound >= 4.0
     (True, True)
     """
 
@@ -56,12 +56,12 @@ class Density(ABC):
 
     @property
     @abstractmethod
-    def min_value(self) -> float:
+    def lower_bound(self) -> float:
         """A lower bound on the density."""
 
     @property
     @abstractmethod
-    def max_value(self) -> float:
+    def upper_bound(self) -> float:
         """An upper bound on the density."""
 
     @abstractmethod
@@ -100,8 +100,8 @@ class Density(ABC):
 
     @property
     def is_uniform(self) -> bool:
-        """Whether the density is the same everywhere."""
-        return self.min_value == self.max_value
+        """Whether the density is certainly the same everywhere. True only if the bounds coincide."""
+        return self.lower_bound == self.upper_bound
 
     def compute_masses_and_centroids(
         self, edges: CellEdges, origins: FloatArray, areas: FloatArray, area_centroids: FloatArray
@@ -133,7 +133,7 @@ class Density(ABC):
         moments = self.compute_moments(edges, origins)
         # Rounding can make the mass of a cell with hardly any density negative.
         masses = np.maximum(moments[:, MASS], 0.0)
-        added_masses = np.maximum(_MIN_MEAN_DENSITY * self.max_value * areas - masses, 0.0)
+        added_masses = np.maximum(_MIN_MEAN_DENSITY * self.upper_bound * areas - masses, 0.0)
         weights = masses + added_masses
         added_moments = added_masses[:, None] * (area_centroids - origins)
         first_moments = moments[:, [MOMENT_X, MOMENT_Y]] + added_moments
@@ -200,12 +200,12 @@ class Uniform(Density):
         require_weight("weight", self.weight, above_zero=True)
 
     @property
-    def min_value(self) -> float:
+    def lower_bound(self) -> float:
         """The weight."""
         return self.weight
 
     @property
-    def max_value(self) -> float:
+    def upper_bound(self) -> float:
         """The weight."""
         return self.weight
 

@@ -94,7 +94,7 @@ class Gaussian:
     >>> import robocov as rc
     >>> round_peak = rc.Gaussian((2.0, 0.0), weight=3.0, sigma=1.0)
     >>> long_peak = rc.Gaussian((2.0, 0.0), weight=3.0, covariance=((4.0, 0.0), (0.0, 0.25)))
-    >>> rc.Gaussians((round_peak, long_peak)).max_value
+    >>> rc.Gaussians((round_peak, long_peak)).upper_bound
     6.0
     """
 
@@ -242,17 +242,17 @@ class Gaussians(Density):
 
     def __post_init__(self) -> None:
         require_weight("floor", self.floor)
-        if not self.max_value > 0.0:
+        if not self.upper_bound > 0.0:
             raise ParameterError("floor: expected a number above 0 or a peak with a weight above 0, got 0")
 
     @property
-    def min_value(self) -> float:
+    def lower_bound(self) -> float:
         """The constant, which is a lower bound on the density."""
         return self.floor
 
     @property
-    def max_value(self) -> float:
-        """The sum of the constant and all weights, an upper bound that is reached if all centers coincide."""
+    def upper_bound(self) -> float:
+        """The sum of the constant and all weights, which the density reaches only if all centers coincide."""
         return self.floor + sum(peak.weight for peak in self.peaks)
 
     def evaluate(self, points: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def compute_square_means(density: Density, centers: FloatArray, side: float) -> 
         edges = _build_edges(starts, ends, np.repeat(np.arange(len(batch)), 4))
         masses[first : first + len(batch)] = density.compute_moments(edges, batch)[:, MASS]
     # Rounding must not produce values outside the range of the density, such as negative ones.
-    return np.clip(masses / (side * side), density.min_value, density.max_value)
+    return np.clip(masses / (side * side), density.lower_bound, density.upper_bound)
 
 
 def _build_edges(starts: FloatArray, ends: FloatArray, polygons: IntArray) -> CellEdges:

@@ -129,19 +129,19 @@ class WeightedPolygons(Density):
 
     def __post_init__(self) -> None:
         require_weight("background", self.background)
-        if not self.max_value > 0.0:
+        if not self.upper_bound > 0.0:
             raise ParameterError(
                 "background: expected a number above 0 or an area with a weight above 0, got 0"
             )
 
     @property
-    def min_value(self) -> float:
-        """The smallest of the weights and the background."""
+    def lower_bound(self) -> float:
+        """The minimum of the weights and the background."""
         return min([self.background, *(area.weight for area in self.areas)])
 
     @property
-    def max_value(self) -> float:
-        """The largest of the weights and the background."""
+    def upper_bound(self) -> float:
+        """The maximum of the weights and the background."""
         return max([self.background, *(area.weight for area in self.areas)])
 
     @cached_property
@@ -237,9 +237,9 @@ class _Strip(NamedTuple):
     """
 
     bottom: float
-    """The smallest common height."""
+    """The minimum common height."""
     top: float
-    """The largest common height."""
+    """The maximum common height."""
     left_bottom: float
     """x of the jump at the bottom."""
     left_top: float

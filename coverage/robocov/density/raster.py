@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import MAX_WEIGHT, Density
 from robocov.density.cell_edges import CellEdges
@@ -106,7 +106,7 @@ class Raster(Density):
     interpolation: Interpolation = "bilinear"
 
     def __post_init__(self) -> None:
-        values = freeze(self.values)
+        values = copy_read_only(self.values)
         shape = values.shape
         if values.ndim != 2 or not 1 <= min(shape) <= max(shape) <= MAX_RASTER_SIZE:
             raise ParameterError(
@@ -148,13 +148,13 @@ class Raster(Density):
         return hash((self.extent, self.interpolation, self.values.shape, self.values.tobytes()))
 
     @property
-    def min_value(self) -> float:
-        """The smallest value of a pixel."""
+    def lower_bound(self) -> float:
+        """The minimum value of a pixel."""
         return float(self.values.min())
 
     @property
-    def max_value(self) -> float:
-        """The largest value of a pixel."""
+    def upper_bound(self) -> float:
+        """The maximum value of a pixel."""
         return float(self.values.max())
 
     def evaluate(self, points: FloatArray) -> FloatArray:

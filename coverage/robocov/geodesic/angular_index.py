@@ -75,7 +75,7 @@ _FULL_TURN = 4.0
 """Pseudo-angle of a full turn; see `compute_pseudo_angle`."""
 
 _MIN_LENGTH = 1e-300
-"""Smallest length used as a divisor, which prevents division by zero."""
+"""Minimum divisor; prevents division by zero."""
 
 _SOURCE_AT_VERTEX = -1.0
 """Used in place of the squared clear distances of a source at a vertex. No squared distance is below it."""
@@ -138,8 +138,8 @@ class AngularWallIndex(NamedTuple):
 class _SpannedBins(NamedTuple):
     """The angular bins in which a wall lies, seen from a source.
 
-    The wall covers a bin if it lies in every direction of the bin. Bins beyond a full turn continue the
-    count.
+    The wall covers a bin if it lies in every direction of the bin. Bin numbers are not wrapped; they continue
+    past a full turn.
     """
 
     first: int
@@ -154,7 +154,9 @@ class _SpannedBins(NamedTuple):
 
 @kernel
 def compute_pseudo_angle(dx: float, dy: float) -> float:
-    """Compute a number from 0 to 4 that grows with the angle of a direction, without trigonometry.
+    """Compute a number from 0 to 4 that grows with the angle, counter-clockwise from straight down.
+
+    It needs no trigonometry.
 
     Parameters
     ----------
@@ -350,17 +352,17 @@ def _reset_source(index: AngularWallIndex, source: int, x: float, y: float, squa
 
 @kernel
 def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, entry_count: int) -> int:
-    """Add a wall to the bins in which it lies if it faces the source; return the new number of entries.
+    """If a wall faces the source, add it to its bins; return the new number of entries.
 
     The clear distance of a bin is at most the distance of the nearest point of each wall in the bin. The
     horizon of a bin is at most the distance of the farthest point of each wall that covers the bin. A wall
     beyond the horizon of a bin is not added to the bin. Distances and angles are padded to allow for
-    rounding.
+    rounding. The caller makes sure that there is space for an entry in every bin.
     """
     x = index.positions[source, 0]
     y = index.positions[source, 1]
     ax, ay, bx, by = get_relative_ends(walls.ends, wall, x, y)
-    # A wall that does not face the source hides nothing that the walls in front of it do not hide.
+    # Whatever a back-facing wall hides is already hidden by the walls in front of it.
     if not _faces(walls.ends, wall, x, y):
         return entry_count
     min_squared_distance = _compute_squared_segment_distance(ax, ay, bx, by) * (1.0 - _DISTANCE_PADDING)
@@ -382,17 +384,38 @@ def _add_wall(walls: Walls, wall: int, index: AngularWallIndex, source: int, ent
         entry_count += 1
         if bins.first_covered <= unwrapped_bin < bins.end_covered:
             index.squared_horizons[source, k] = min(index.squared_horizons[source, k], max_squared_distance)
-    # The wall covers only the beginning of the bin in which it ends. If the walls after it cover the rest,
-    # the chain of these walls covers the bin, and the farthest point of the chain limits the horizon.
-    k = _wrap_bin(bins.end_covered, bin_count)
+    _limit_horizon_of_last_bin(walls, wall, index, source, bins, end_angle, max_squared_distance)
+    return entry_count
+
+
+@inlined_kernel
+def _limit_horizon_of_last_bin(
+    walls: Walls,
+    wall: int,
+    index: AngularWallIndex,
+    source: int,
+    bins: _SpannedBins,
+    end_angle: float,
+    max_squared_distance: float,
+) -> None:
+    """Limit the horizon of the bin in which a wall ends, if the walls after it cover the rest of the bin.
+
+    The wall itself covers only the beginning of the bin. The chain of these walls covers the whole bin, and
+    its farthest point limits the horizon. `end_angle` is the pseudo-angle of the end of the wall, and
+    `max_squared_distance` the squared distance of the farthest point of the wall.
+    """
+    bin_count = index.heads.shape[1]
+    # Holds unless the wall starts and ends in the same bin or has already covered a full turn.
     has_partial_bin = bins.first_covered <= bins.end_covered < bins.first + bin_count
+    k = _wrap_bin(bins.end_covered, bin_count)
     if has_partial_bin and max_squared_distance < index.squared_horizons[source, k]:
-        bin_end_angle = (bins.end_covered + 1) / (bin_count / _FULL_TURN)
+        bin_end_angle = (bins.end_covered + 1) * _FULL_TURN / bin_count
+        x = index.positions[source, 0]
+        y = index.positions[source, 1]
         max_squared_chain_distance = _compute_max_squared_chain_distance(
             walls, wall, x, y, end_angle, bin_end_angle, max_squared_distance
         )
         index.squared_horizons[source, k] = min(index.squared_horizons[source, k], max_squared_chain_distance)
-    return entry_count
 
 
 @kernel

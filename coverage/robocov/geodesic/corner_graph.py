@@ -79,17 +79,17 @@ class CornerPaths(NamedTuple):
 
 
 class CornerQueue(NamedTuple):
-    """A queue of the corners from which the paths to neighboring corners may be shortened."""
+    """A queue of corners whose outgoing links must be relaxed."""
 
     corners: IntArray
-    """(k + 1,) The corners in the queue: a ring buffer with one unused slot, which shows where the queue
-    ends."""
+    """(k + 1,) The corners in the queue: a ring buffer. One slot stays unused, so that a full queue differs
+    from an empty one."""
     is_waiting: BoolArray
     """(k,) Whether each corner is in the queue."""
 
     @classmethod
     def allocate(cls, corner_count: int) -> CornerQueue:
-        """Allocate a queue with space for all corners.
+        """Allocate an uninitialized queue with space for all corners.
 
         Parameters
         ----------

@@ -303,7 +303,7 @@ class Geodesics:
         around = foot + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         free_points = around[(self.count_windings(around) > 0).any(axis=1)]
         if len(free_points) == 0:
-            # The vertices of the walls are grid points of the closed free space in any case.
+            # The vertices of the walls are always grid points of the closed free space.
             free_points = self.walls.vertices
         distances = compute_lengths(free_points - grid_position)
         return np.asarray(free_points[distances.argmin()])

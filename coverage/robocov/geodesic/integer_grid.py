@@ -1,4 +1,4 @@
-"""Integer coordinates, with which one can decide exactly on which side of a line a point lies."""
+"""Integer coordinates for exact side-of-line tests."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_CROSS_ERROR = 2.0**48
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """A fine square grid over one map, whose points have whole coordinates.
+    """A fine square grid over one map, whose points have integer coordinates.
 
     Grid coordinates are numbers of grid steps from the origin, stored as floats.
 
@@ -132,7 +132,7 @@ def compute_crosses(u: FloatArray, v: FloatArray) -> FloatArray:
         Positive where v points to the left of u.
     """
     value = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    whole_u = u.astype(np.int64)
-    whole_v = v.astype(np.int64)
-    exact = whole_u[:, 0] * whole_v[:, 1] - whole_u[:, 1] * whole_v[:, 0]
+    integer_u = u.astype(np.int64)
+    integer_v = v.astype(np.int64)
+    exact = integer_u[:, 0] * integer_v[:, 1] - integer_u[:, 1] * integer_v[:, 0]
     return np.where(np.abs(value) < _MAX_CROSS_ERROR, exact, value)

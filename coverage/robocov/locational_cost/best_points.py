@@ -54,13 +54,13 @@ _MAX_RISE = 0.5
 """A step is accepted if the cost rises at its end at most this fraction as steeply as it falls at its
 start."""
 _MIN_SHORTENING = 0.1
-"""Smallest factor by which a step that is not accepted is multiplied."""
+"""Minimum factor by which a step that is not accepted is multiplied."""
 _MAX_SHORTENING = 0.5
-"""Largest such factor."""
+"""Maximum such factor."""
 _MIN_SLOPE_CHANGE = 1e-300
-"""Smallest difference of two slopes used as a divisor, which prevents division by zero."""
+"""Minimum difference of two slopes used as a divisor; prevents division by zero."""
 _MIN_LENGTH_M = 1e-300
-"""Smallest length used as a divisor, for the same reason."""
+"""Minimum length used as a divisor; prevents division by zero."""
 
 
 class _Search(NamedTuple):
@@ -209,7 +209,7 @@ def _search_weighted(
     convex, or almost without mass, keep their centroids.
     """
     is_convex = shapes.clearances > _MIN_WEIGHTED_CLEARANCE * shapes.half_perimeters
-    has_mass = cells.masses > _MIN_MEAN_DENSITY * density.max_value * shapes.areas
+    has_mass = cells.masses > _MIN_MEAN_DENSITY * density.upper_bound * shapes.areas
     search = _start_search(centroids, is_convex & has_mass)
     for _ in range(_MAX_WEIGHTED_ITERATIONS + 1):
         if not search.is_active.any():

@@ -43,7 +43,7 @@ _PANEL_LENGTH = 2.0
 _MIN_RELATIVE_LENGTH = 1e-12
 """Lengths of edges up to this fraction of half the perimeter of the cell may be rounding errors."""
 _MIN_LENGTH_M = 1e-300
-"""Smallest length used as a divisor, which prevents division by zero."""
+"""Minimum divisor; prevents division by zero."""
 _MAX_SERIES_SQUARE = 0.0625
 """Square of x below which x - atan x is computed from a series."""
 _SERIES_TERMS = 15

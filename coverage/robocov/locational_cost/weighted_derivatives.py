@@ -20,9 +20,9 @@ _NODES_ALONG = 16
 _NODES_OUTWARD = 12
 """Number of nodes from the point to an edge."""
 _MIN_SQUARED_DISTANCE = 1e-300
-"""Smallest squared distance used as a divisor, which prevents division by zero, m²."""
+"""Minimum divisor, m²; prevents division by zero."""
 _MIN_RELATIVE_SIZE = 1e-3
-"""Lower limit of the diameter of a cell in heights of the sensor. In smaller cells, f is nearly constant, so
+"""Minimum diameter of a cell in heights of the sensor. In smaller cells, f is nearly constant, so
 that the choice of the nodes does not matter."""
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from scipy.optimize import Bounds, minimize
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.cost import CoverageCost
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import GRID_M, Environment, compute_center_areas
@@ -35,7 +35,7 @@ from robocov.lower_bound.site_distances import SiteDistances
 from robocov.typing import BoolArray, FloatArray, IntArray
 
 MIN_PRECISION = 1e-5
-"""The smallest precision that may be requested."""
+"""The minimum precision that may be requested."""
 
 _ROUGH_SMOOTHINGS = (0.02, 0.007)
 """Smoothing of the maximum profit in the first searches for prices, as fractions of the cost per robot."""
@@ -50,7 +50,7 @@ _RELATIVE_TOLERANCE = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
 
 _MIN_SCALE = 1e-9
-"""Smallest cost by which a search divides the dual, because the cost of a placement may be zero. It is a
+"""Minimum cost by which a search divides the dual, because the cost of a placement may be zero. It is a
 fraction of the cost that would result if the distance of every site were the size of the map."""
 
 _MAX_ITERATIONS = 100
@@ -212,7 +212,7 @@ def compute_lower_bound(
         mean_distance=mean_distance,
         value=mean_distance * mass,
         placement_mean_distance=dual.placement_cost / dual.total_weight,
-        prices=freeze(all_prices),
+        prices=copy_read_only(all_prices),
     )
 
 
@@ -435,9 +435,9 @@ class _Dual:
             # In the gradient, the n robots are divided among the positions in proportion to their shares. If
             # the price of a site is raised by 1, the dual changes by the weight of the site times one minus
             # the number of robots that the site pays for, which are those nearer than its price.
-            robot_shares = shares * (self.robot_count / shares.sum())
-            paid_shares = self.table.sum_paid_shares(prices, robot_shares)
-            return -dual / scale, weights * (paid_shares - 1.0) / scale
+            robot_counts = shares * (self.robot_count / shares.sum())
+            paid_robot_counts = self.table.count_paid_robots(prices, robot_counts)
+            return -dual / scale, weights * (paid_robot_counts - 1.0) / scale
 
         solution = minimize(
             compute_negative_dual,

@@ -1,4 +1,7 @@
-"""Distances from some positions to the sites, used to search for prices of the sites."""
+"""Distances from candidate positions to the sites, used to search for prices of the sites.
+
+Prices are the variables of the Lagrangian dual; see `lower_bound`.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ import numpy as np
 from robocov.compiled import kernel
 from robocov.typing import Float32Array, FloatArray, Int32Array, IntArray
 
-_MIN_SHARE = 1e-9
-"""Smaller shares of a robot at a position are ignored, which saves most of the work."""
+_MIN_ROBOT_COUNT = 1e-9
+"""Positions with a smaller number of robots are ignored, which saves most of the work."""
 
 
 class SiteDistances(NamedTuple):
@@ -83,25 +86,26 @@ class SiteDistances(NamedTuple):
         _write_profits(self, prices, weights, profits)
         return profits
 
-    def sum_paid_shares(self, prices: FloatArray, shares: FloatArray) -> FloatArray:
-        """Compute the number of robots that each site pays for, if robots are divided among the positions.
+    def count_paid_robots(self, prices: FloatArray, robot_counts: FloatArray) -> FloatArray:
+        """Count the robots that each site pays for, for a fractional number of robots at each position.
 
         A site pays for a robot if the price of the site is higher than its distance to the robot.
+        Positions with at most 1e-9 robots are ignored.
 
         Parameters
         ----------
         prices : (m,) array, m
             Prices of the sites, limited as in `compute_profits`.
-        shares : (p,) array
-            Number of robots at each position of the table, in general a fraction.
+        robot_counts : (p,) array
+            Number of robots at each position of the table, which need not be an integer.
 
         Returns
         -------
         (m,) array
         """
-        paid_shares = np.zeros(len(prices))
-        _add_paid_shares(self, prices, shares, paid_shares)
-        return paid_shares
+        paid_robot_counts = np.zeros(len(prices))
+        _add_paid_robots(self, prices, robot_counts, paid_robot_counts)
+        return paid_robot_counts
 
 
 @kernel
@@ -118,13 +122,13 @@ def _write_profits(
 
 
 @kernel
-def _add_paid_shares(
-    table: SiteDistances, prices: FloatArray, shares: FloatArray, paid_shares: FloatArray
+def _add_paid_robots(
+    table: SiteDistances, prices: FloatArray, robot_counts: FloatArray, paid_robot_counts: FloatArray
 ) -> None:
-    """Add the share at each position to the paid shares of all sites that pay for a robot there."""
-    for position in range(len(shares)):
-        if shares[position] > _MIN_SHARE:
+    """Add the number of robots at each position to the counts of all sites that pay for a robot there."""
+    for position in range(len(robot_counts)):
+        if robot_counts[position] > _MIN_ROBOT_COUNT:
             for entry in range(table.entry_starts[position], table.entry_starts[position + 1]):
                 site = table.sites[entry]
                 if prices[site] > table.distances[entry]:
-                    paid_shares[site] += shares[position]
+                    paid_robot_counts[site] += robot_counts[position]

@@ -27,7 +27,7 @@ MIN_ZIGZAGS = 5
 """Minimum number of zigzags of a robot that are reported."""
 
 _MIN_DISTANCE_M = 1e-12
-"""Lower limit of distances in divisions."""
+"""Minimum divisor; prevents division by zero."""
 
 
 def advise(record: Record, clearances: FloatArray) -> list[str]:
@@ -103,7 +103,7 @@ def find_trembling_robots(record: Record) -> IntArray:
     is_trembling = step_lengths.mean(axis=0) >= MIN_TREMBLE_STEP_M
     is_trembling &= turning_angles.mean(axis=0) >= MIN_TREMBLE_TURN_RAD
     is_trembling &= step_lengths.sum(axis=0) >= MIN_TREMBLE_DETOUR * net_displacements
-    is_trembling &= record.traveled[-step_count:].all(axis=0) & record.working[-step_count:].all(axis=0)
+    is_trembling &= record.traveled[-step_count:].all(axis=0) & record.is_working[-step_count:].all(axis=0)
     return np.flatnonzero(is_trembling)
 
 

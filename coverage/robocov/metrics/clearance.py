@@ -19,7 +19,7 @@ from robocov.typing import FloatArray, IntArray
 from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
 
 MAX_CONTACT_GAP_M = 1e-3
-"""Largest gap at which two bodies count as in contact."""
+"""Maximum gap at which two bodies count as in contact."""
 
 _FIRST_RANGE_M = 1.0
 """Range of the first query for a nearest wall. A query with a larger range takes longer."""
@@ -90,18 +90,18 @@ def _compute_clearances_by_queries(record: Record) -> FloatArray:
     Unlike the sensed points, queries are also valid for noisy sensing, moving obstacles and failed robots.
     """
     environment = record.environment
-    working = record.working
+    is_working = record.is_working
     radius = record.team.radius
     sensor = RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
-    has_failed = record.present & ~working
+    has_failed = record.is_present & ~is_working
     # No wall is farther away than the diagonal of the region.
     width, height = np.ptp(environment.region.vertices, axis=0)
     ranges = np.full(len(radius), float(np.hypot(width, height)))
-    clearances = np.full(working.shape, np.inf)
+    clearances = np.full(is_working.shape, np.inf)
     for step, positions in enumerate(record.positions):
         failed_robots = np.column_stack([positions, radius])[has_failed[step]]
         sensor.set_time(float(record.time[step]), failed_robots)
-        rows = np.flatnonzero(working[step])
+        rows = np.flatnonzero(is_working[step])
         nearest_points = sensor.find_nearest_points(positions[rows], ranges[rows])
         distances = compute_point_distances(positions[rows], nearest_points)
         clearances[step, rows] = distances - radius[rows]
@@ -140,9 +140,9 @@ def measure_robot_gaps(record: Record) -> RobotGaps:
     Returns
     -------
     RobotGaps
-        Smallest gaps and number of contacts.
+        Minimum gaps and number of contacts.
     """
-    positions = np.where(record.working[:, :, None], record.positions, np.nan)
+    positions = np.where(record.is_working[:, :, None], record.positions, np.nan)
     min_gaps = np.full(len(positions), np.inf)
     contact_count = _measure_gaps(
         positions=positions,

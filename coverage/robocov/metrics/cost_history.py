@@ -91,7 +91,7 @@ def compute_cost_history(
     Raises
     ------
     ParameterError
-        If `record` or `cost` is of another type.
+        If `record` or `cost` has the wrong type.
 
     See Also
     --------
@@ -121,13 +121,13 @@ def compute_cost_history(
     for sample, step in enumerate(steps):
         time = float(record.time[step])
         positions = record.positions[step]
-        working = None if record.conditions is None else record.working[step]
-        summary = cost_at_time.compute_summary(time, positions, working)
+        is_working = None if record.conditions is None else record.is_working[step]
+        summary = cost_at_time.compute_summary(time, positions, is_working)
         mean_distance[sample] = summary.mean_distance
         cost_values[sample] = summary.value
         uncovered_area[sample] = summary.uncovered_area
         if has_mixed_speeds:
-            speed_cost = cost_at_time(time, positions, working, record.team.max_speed)
+            speed_cost = cost_at_time(time, positions, is_working, record.team.max_speed)
             if speed_cost is not None:
                 mean_time[sample] = speed_cost.mean_time
         if on_sample is not None:

@@ -42,7 +42,7 @@ _COLUMN_KINDS = {
 """Kinds of the columns that any study may have, except for columns of floats."""
 
 _MAX_SHOWN_ROWS = 10
-"""Largest number of rows that notebooks show."""
+"""Maximum number of rows that notebooks show."""
 
 
 class Results:

@@ -66,9 +66,9 @@ class RunMetrics:
     algebraic_connectivity : (K,) array
         Second smallest eigenvalue of the Laplacian of this graph; 0 if the graph has several components.
     wall_clearance : (K,) array, m
-        Smallest gap between a robot and a wall since the previous sample; inf if no robot works.
+        Minimum gap between a robot and a wall since the previous sample; inf if no robot works.
     robot_clearance : (K,) array, m
-        Smallest gap between two robots since the previous sample; inf if fewer than two robots work.
+        Minimum gap between two robots since the previous sample; inf if fewer than two robots work.
     free_area : float, m²
         Free area of the map.
 
@@ -215,13 +215,13 @@ def compute_run_metrics(
 def _compute_areas_at(record: Record, step: int) -> CoveredAreas:
     """Compute the areas that the working robots cover at a time step."""
     free = record.environment.at(float(record.time[step])).free
-    robots = np.flatnonzero(record.working[step])
+    robots = np.flatnonzero(record.is_working[step])
     return compute_covered_areas(free, record.positions[step, robots], record.team.sensing_range[robots])
 
 
 def _measure_connectivity_at(record: Record, step: int) -> Connectivity:
     """Measure the connectivity of the working robots at a time step."""
-    robots = np.flatnonzero(record.working[step])
+    robots = np.flatnonzero(record.is_working[step])
     return measure_connectivity(record.positions[step, robots], record.team.communication_range[robots])
 
 
@@ -233,7 +233,7 @@ def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOL
     history : CostHistory
         Coverage cost over the run.
     tolerance : float
-        Largest relative deviation from the final value, in both directions.
+        Maximum relative deviation from the final value, in both directions.
 
     Returns
     -------
@@ -276,7 +276,7 @@ def _integrate(record: Record) -> _Integrals:
     Forces are constant during a time step, while velocities change. The power is therefore integrated by the
     trapezoidal rule.
     """
-    forces = np.where(record.working[:, :, None], record.forces, 0.0)
+    forces = np.where(record.is_working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)
     squared_force = (forces**2).sum(axis=(1, 2))
     step_durations = np.diff(record.time)

@@ -13,7 +13,7 @@ from robocov.metrics.settling import find_settling_time
 from robocov.record import Record
 
 MIN_REPORTED_OFFSET_M = 5e-4
-"""Smallest distance between the requested and the actual position of a robot that joined, if it is
+"""Minimum distance between the requested and the actual position of a robot that joined, if it is
 reported."""
 
 

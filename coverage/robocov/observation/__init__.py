@@ -19,7 +19,7 @@ from robocov.observation.cells import Cells
 from robocov.observation.decisions import Decision, check_decision, check_forces, copy_decision, to_numbers
 from robocov.observation.density_sensor import DensitySensor, RecordedDensitySensor
 from robocov.observation.messages import Message, ReceivedMessage
-from robocov.observation.observations import NearNeighbors, Observations
+from robocov.observation.observations import NeighborPairs, Observations
 from robocov.observation.scans import MAX_RAYS, Scanning, Scans, compute_ray_directions
 from robocov.observation.snapshot import Snapshot
 
@@ -29,7 +29,7 @@ __all__ = [
     "Decision",
     "DensitySensor",
     "Message",
-    "NearNeighbors",
+    "NeighborPairs",
     "Observations",
     "ReceivedMessage",
     "RecordedDensitySensor",

@@ -163,22 +163,22 @@ class Neighbors:
             return robot, neighbor
         return np.repeat(np.arange(self.robot_count), np.diff(self.indptr)), self.indices
 
-    def restrict_to_working(self, working: BoolArray) -> Neighbors:
+    def restrict_to_working(self, is_working: BoolArray) -> Neighbors:
         """Return the graph without the links of robots that have failed or have not joined yet.
 
         Parameters
         ----------
-        working : (n,) bool array
+        is_working : (n,) bool array
             Mask of the robots that work.
 
         Returns
         -------
         Neighbors
         """
-        if working.all():
+        if is_working.all():
             return self
         robot, neighbor = self.list_pairs()
-        both_work = working[robot] & working[neighbor]
+        both_work = is_working[robot] & is_working[neighbor]
         return Neighbors.from_pairs(self.robot_count, robot[both_work], neighbor[both_work], self.ranges)
 
 

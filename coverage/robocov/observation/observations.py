@@ -19,8 +19,8 @@ from robocov.observation.scans import Scans
 from robocov.typing import FloatArray, IntArray
 
 
-class NearNeighbors(NamedTuple):
-    """Directed pairs of a robot and a near neighbor, sorted by robot, then neighbor."""
+class NeighborPairs(NamedTuple):
+    """Directed pairs of a robot and one of its neighbors, sorted by robot, then neighbor."""
 
     robots: IntArray
     """(m,) Index of the robot of each pair."""
@@ -184,24 +184,24 @@ class Observations:
         start, stop = self.neighbors.indptr[robot : robot + 2]
         return self.reported_positions[start:stop]
 
-    def find_near_neighbors(self, max_distance: float) -> NearNeighbors:
-        """Find the neighbors whose known positions are near the robot.
+    def find_neighbors(self, max_distance: float = np.inf) -> NeighborPairs:
+        """Find the neighbors of each robot, within a distance of their known positions.
 
         Parameters
         ----------
         max_distance : float, m
-            Maximum distance of a neighbor; may be infinite.
+            Maximum distance of a neighbor. By default, all neighbors are found.
 
         Returns
         -------
-        NearNeighbors
+        NeighborPairs
             Sorted. A sum over the neighbors of a robot therefore has the same rounding errors whatever the
             other robots do.
         """
         if self.reported_positions is None and self.neighbors.is_complete:
             pairs = find_close_pairs(self.positions, max_distance)
             offsets = self.positions[pairs.first] - self.positions[pairs.second]
-            return NearNeighbors(pairs.first, pairs.second, offsets, pairs.distances)
+            return NeighborPairs(pairs.first, pairs.second, offsets, pairs.distances)
         robots, neighbors = self.neighbors.list_pairs()
         if self.reported_positions is None:
             known_positions = self.positions[neighbors]
@@ -210,4 +210,4 @@ class Observations:
         offsets = self.positions[robots] - known_positions
         distances = compute_point_distances(self.positions[robots], known_positions)
         is_near = distances <= max_distance
-        return NearNeighbors(robots[is_near], neighbors[is_near], offsets[is_near], distances[is_near])
+        return NeighborPairs(robots[is_near], neighbors[is_near], offsets[is_near], distances[is_near])

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from robocov.arrays import compute_lengths, freeze
+from robocov.arrays import compute_lengths, copy_read_only
 from robocov.errors import InputError
 from robocov.typing import BoolArray, FloatArray
 
@@ -89,13 +89,13 @@ class Region:
         normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths[:, None]
         offsets = np.einsum("ed,ed->e", normals, ring)
         derived = {
-            "vertices": freeze(ring),
-            "edges": freeze(edges),
-            "normals": freeze(normals),
-            "offsets": freeze(offsets),
-            "sides": freeze(np.column_stack([ring, normals, offsets])),
+            "vertices": copy_read_only(ring),
+            "edges": copy_read_only(edges),
+            "normals": copy_read_only(normals),
+            "offsets": copy_read_only(offsets),
+            "sides": copy_read_only(np.column_stack([ring, normals, offsets])),
             "area": float(hull.area),
-            "centroid": freeze(hull.centroid.coords[0]),
+            "centroid": copy_read_only(hull.centroid.coords[0]),
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)  # Attributes of a frozen object cannot be assigned.

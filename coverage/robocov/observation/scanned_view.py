@@ -14,9 +14,9 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 _PATH_INTERVALS = 4
 """Number of equal intervals into which a path is divided. The points between them are tested for walls."""
 _MIN_DISTANCE_M = 1e-9
-"""Lower limit of distances in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_CORNER_DISTANCE_M = 1e-3
-"""Lower limit of the distances of corners in divisions."""
+"""Minimum distance of a corner used as a divisor; limits the growth of the view at very close corners."""
 _DECELERATION_FACTOR = 0.5
 """Factor of the fraction of full speed after the gradient has turned by more than a right angle."""
 _ACCELERATION_FACTOR = 1.2
@@ -32,7 +32,7 @@ class View(NamedTuple):
     """(n, rays) Whether the ray ends at an obstacle."""
 
 
-class Windows(NamedTuple):
+class OcclusionEdges(NamedTuple):
     """Edges of views that begin at a corner and turn about it when the robot moves; sorted by robot.
 
     Seen from a position p, a corner v at distance ρ hides the space behind it. When p moves by d, the point
@@ -44,7 +44,7 @@ class Windows(NamedTuple):
     """(w,) Index of the robot."""
     rays: IntArray
     """(w,) Index of the first ray that passes the corner."""
-    directions: FloatArray
+    motion_directions: FloatArray
     """(w, 2) t, the direction in which the robot has to move to see more."""
     corner_distances: FloatArray
     """(w,) m, ρ."""
@@ -78,60 +78,62 @@ def compute_view(
     return View(distances=np.broadcast_to(max_distances[:, None], shape), is_hit=np.zeros(shape, dtype=bool))
 
 
-def find_windows(view: View, directions: FloatArray, max_distances: FloatArray, min_jump: float) -> Windows:
-    """Find the rays at which views become abruptly deeper than at the ray before.
+def find_occlusion_edges(
+    view: View, ray_directions: FloatArray, max_distances: FloatArray, min_jump: float
+) -> OcclusionEdges:
+    """Find the rays that reach abruptly farther than the adjacent ray on either side.
 
     Seen at a low angle, a wall also becomes deeper from ray to ray. Along a straight wall, 1/distance is a
     sinusoid of the angle, so two rays predict where the next one meets the wall. Only a ray that goes
-    farther than predicted is a window.
+    farther than predicted passes a corner.
 
     Parameters
     ----------
     view : View
-    directions : (rays, 2) array
+    ray_directions : (rays, 2) array
         Unit vectors along the rays.
     max_distances : (n,) array, m
         Range of each robot's view.
     min_jump : float, m
-        Minimum distance by which the ray of a window exceeds the predicted depth.
+        Minimum distance by which a ray past a corner exceeds the predicted depth.
 
     Returns
     -------
-    Windows
+    OcclusionEdges
     """
-    robots_by_side = []
-    rays_by_side = []
+    robots_by_rotation = []
+    rays_by_rotation = []
     motion_directions = []
     corner_distances = []
     # Compare each ray with the one before it, counter-clockwise and clockwise.
-    for side in (1, -1):
-        previous_depths = np.roll(view.distances, side, axis=1)
-        is_previous_hit = np.roll(view.is_hit, side, axis=1)
-        is_deeper = view.distances > _predict_depth(view, max_distances, side) + min_jump
+    for rotation in (1, -1):
+        previous_depths = np.roll(view.distances, rotation, axis=1)
+        is_previous_hit = np.roll(view.is_hit, rotation, axis=1)
+        is_deeper = view.distances > _predict_depth(view, max_distances, rotation) + min_jump
         robots, rays = np.nonzero(is_previous_hit & is_deeper)
-        robots_by_side.append(robots)
-        rays_by_side.append(rays)
+        robots_by_rotation.append(robots)
+        rays_by_rotation.append(rays)
         # The direction of the ray, turned by a right angle.
-        motion_directions.append(side * directions[rays][:, ::-1] * [-1.0, 1.0])
+        motion_directions.append(rotation * ray_directions[rays][:, ::-1] * [-1.0, 1.0])
         corner_distances.append(previous_depths[robots, rays])
-    all_robots = np.concatenate(robots_by_side)
+    all_robots = np.concatenate(robots_by_rotation)
     order = np.argsort(all_robots, kind="stable")
-    return Windows(
+    return OcclusionEdges(
         robots=all_robots[order],
-        rays=np.concatenate(rays_by_side)[order],
-        directions=np.concatenate(motion_directions)[order],
+        rays=np.concatenate(rays_by_rotation)[order],
+        motion_directions=np.concatenate(motion_directions)[order],
         corner_distances=np.concatenate(corner_distances)[order],
     )
 
 
-def integrate_over_windows(
-    windows: Windows, view: View, depths: FloatArray, weight: FloatArray
+def integrate_over_edges(
+    edges: OcclusionEdges, view: View, depths: FloatArray, weight: FloatArray
 ) -> FloatArray:
-    """Compute the growth rate of the weighted area of a view at each of its windows.
+    """Compute the growth rate of the weighted area of a view at each of its edges.
 
     Parameters
     ----------
-    windows : Windows
+    edges : OcclusionEdges
     view : View
     depths : (n, rays, k) array, m
         Distances of the midpoints of k equal parts of each ray.
@@ -142,31 +144,32 @@ def integrate_over_windows(
     -------
     (w, 2) array, m
         The growth of the weighted area per meter of the robot's motion: the integral of weight * (s - ρ)/ρ
-        along the edge beyond the corner, times t. For the symbols, see `Windows`.
+        along the edge beyond the corner, times t. For the symbols, see `OcclusionEdges`.
     """
     part_count = depths.shape[2]
-    edge_depths = depths[windows.robots, windows.rays]
-    beyond_corner = np.maximum(edge_depths - windows.corner_distances[:, None], 0.0)
-    integral = (weight[windows.robots, windows.rays] * beyond_corner).sum(axis=1)
-    integral /= np.maximum(windows.corner_distances, _MIN_CORNER_DISTANCE_M)
-    integral *= view.distances[windows.robots, windows.rays] / part_count
-    return np.asarray(integral[:, None] * windows.directions)
+    edge_depths = depths[edges.robots, edges.rays]
+    beyond_corner = np.maximum(edge_depths - edges.corner_distances[:, None], 0.0)
+    integral = (weight[edges.robots, edges.rays] * beyond_corner).sum(axis=1)
+    integral /= np.maximum(edges.corner_distances, _MIN_CORNER_DISTANCE_M)
+    integral *= view.distances[edges.robots, edges.rays] / part_count
+    return np.asarray(integral[:, None] * edges.motion_directions)
 
 
-def _predict_depth(view: View, max_distances: FloatArray, side: int) -> FloatArray:
+def _predict_depth(view: View, max_distances: FloatArray, rotation: int) -> FloatArray:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
 
-    The rays are in counter-clockwise order if `side` is 1, and in clockwise order if it is -1.
+    The rays are in counter-clockwise order if `rotation` is 1, and in clockwise order if it is -1. If the
+    second ray before hits nothing, the depth of the previous ray is used.
     """
     inverse_distances = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.
     factor = 2.0 * np.cos(2.0 * np.pi / view.distances.shape[1])
-    first_before = np.roll(inverse_distances, side, axis=1)
-    second_before = np.roll(inverse_distances, 2 * side, axis=1)
+    first_before = np.roll(inverse_distances, rotation, axis=1)
+    second_before = np.roll(inverse_distances, 2 * rotation, axis=1)
     predicted_inverse = factor * first_before - second_before
     wall_depth = 1.0 / np.maximum(predicted_inverse, 1.0 / max_distances[:, None])
-    previous_depth = np.roll(view.distances, side, axis=1)
-    has_second_hit = np.roll(view.is_hit, 2 * side, axis=1)
+    previous_depth = np.roll(view.distances, rotation, axis=1)
+    has_second_hit = np.roll(view.is_hit, 2 * rotation, axis=1)
     return np.where(has_second_hit, np.maximum(wall_depth, previous_depth), previous_depth)
 
 

@@ -23,7 +23,7 @@ class Snapshot:
         Decision of the controller for these observations.
     true_positions : (n, 2) array or None, m
         The true positions, if the robots may observe others. None: the observed positions are exact.
-    working : (n,) bool array or None
+    is_working : (n,) bool array or None
         Mask of the robots that have joined and have not failed. None: all.
     inbox : object
         The messages that the robots have received so far; None if communication is ideal.
@@ -52,7 +52,7 @@ class Snapshot:
     seen: Observations
     decision: Decision
     true_positions: FloatArray | None = None
-    working: BoolArray | None = None
+    is_working: BoolArray | None = None
     inbox: Any = None
     sent_bytes: int = 0
 

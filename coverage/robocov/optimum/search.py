@@ -18,7 +18,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import compute_lengths, freeze
+from robocov.arrays import compute_lengths, copy_read_only
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Environment
@@ -224,12 +224,12 @@ def find_optimum(
     best = outcomes[best_restart]
     from_left_to_right = np.lexsort((best.positions[:, 1], best.positions[:, 0]))
     return Optimum(
-        positions=freeze(best.positions[from_left_to_right]),
+        positions=copy_read_only(best.positions[from_left_to_right]),
         mean_distance=best.mean_distance,
         value=best.value,
         uncovered_area=best.uncovered_area,
-        costs=freeze([outcome.mean_distance for outcome in outcomes]),
-        costs_before_descent=freeze([outcome.mean_distance_before_descent for outcome in outcomes]),
+        costs=copy_read_only([outcome.mean_distance for outcome in outcomes]),
+        costs_before_descent=copy_read_only([outcome.mean_distance_before_descent for outcome in outcomes]),
         restart=best_restart,
     )
 

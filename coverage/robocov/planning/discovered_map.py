@@ -29,7 +29,7 @@ CERTAIN_WALL = 6
 """States of a cell. All values from `WALL` to `CERTAIN_WALL` are walls; higher ones are more certain."""
 
 MAX_BRIDGED_GAP_M = 0.5
-"""Longest gap between the ends of neighboring rays that is presumed to be wall.
+"""Maximum gap between the ends of neighboring rays that is presumed to be wall.
 
 It must not exceed the width of the passages that a robot should find. Otherwise, doors seen from afar would
 be closed.

@@ -49,8 +49,8 @@ class Edges(NamedTuple):
     """(e,) m"""
     ends: IntArray
     """(e,) The node that each edge leads to."""
-    first_edge: IntArray
-    """(m + 1,) The edges of node k are those from ``first_edge[k]`` up to ``first_edge[k + 1]``."""
+    edge_starts: IntArray
+    """(m + 1,) The edges of node k are those from ``edge_starts[k]`` up to ``edge_starts[k + 1]``."""
 
 
 class Frame(NamedTuple):
@@ -214,7 +214,7 @@ def _compress_edges(lengths: FloatArray, columns: int) -> Edges:
     count = 0
     edge_lengths = np.empty(lengths.size)
     ends = np.empty(lengths.size, dtype=np.intp)
-    first_edge = np.zeros(len(lengths) + 1, dtype=np.intp)
+    edge_starts = np.zeros(len(lengths) + 1, dtype=np.intp)
     for node in range(len(lengths)):
         for up in range(-_MAX_MOVE, _MAX_MOVE + 1):
             for right in range(-_MAX_MOVE, _MAX_MOVE + 1):
@@ -223,8 +223,8 @@ def _compress_edges(lengths: FloatArray, columns: int) -> Edges:
                     edge_lengths[count] = length
                     ends[count] = node + up * columns + right
                     count += 1
-        first_edge[node + 1] = count
-    return Edges(edge_lengths[:count].copy(), ends[:count].copy(), first_edge)
+        edge_starts[node + 1] = count
+    return Edges(edge_lengths[:count].copy(), ends[:count].copy(), edge_starts)
 
 
 @kernel
@@ -258,7 +258,7 @@ def compute_distances(
     path from one of these nodes to another would be longer than the path already known. The *front* contains
     the nodes that a path has reached, but whose distance is not final yet.
     """
-    node_count = len(edges.first_edge) - 1
+    node_count = len(edges.edge_starts) - 1
     distances = np.full(node_count, np.inf)
     # The first `front_size` entries of `front` are the nodes of the front, in any order.
     front = np.empty(node_count, dtype=np.intp)
@@ -274,7 +274,7 @@ def compute_distances(
         # Update the distances of the neighbors of settled nodes.
         for k in range(settled_count):
             node = settled[k]
-            for edge in range(edges.first_edge[node], edges.first_edge[node + 1]):
+            for edge in range(edges.edge_starts[node], edges.edge_starts[node + 1]):
                 end = edges.ends[edge]
                 length = distances[node] + edges.lengths[edge]
                 if length < distances[end] and length <= limit:

@@ -31,10 +31,10 @@ class LatticeGraph:
     """
 
     map_window: MapWindow
-    _distances_of_node: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    _distances_by_node: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
-    def moves(self) -> Edges:
+    def straight_edges(self) -> Edges:
         """Straight edges between neighboring nodes; those through unknown cells are longer."""
         map_window = self.map_window
         return build_edges(
@@ -57,12 +57,12 @@ class LatticeGraph:
         return find_portals(
             is_passable=map_window.is_free & ~map_window.is_near_wall,
             node_cells=map_window.window.compute_node_cells(),
-            graph=build_matrix(self.moves),
+            graph=build_matrix(self.straight_edges),
         )
 
     @cached_property
     def portal_cells(self) -> dict[tuple[int, int], IntArray]:
-        """Cells along each portal, (k, 2) rows and columns, by its first and last node."""
+        """Cells along each portal in both directions, (k, 2) rows and columns, by its first and last node."""
         cells = {}
         for first, last, path in zip(
             self.portals.first_nodes.tolist(),
@@ -78,12 +78,12 @@ class LatticeGraph:
     def edges(self) -> Edges:
         """All edges between nodes: the straight ones, and the portals."""
         if not len(self.portals.paths):
-            return self.moves
-        return add_portals(self.moves, self.portals, self.map_window.known_map.raster.cell_size)
+            return self.straight_edges
+        return add_portals(self.straight_edges, self.portals, self.map_window.known_map.raster.cell_size)
 
     @cached_property
     def matrix(self) -> csr_array:
-        """The lengths of all edges as a sparse matrix, (m, m) m."""
+        """The lengths of all edges as a sparse matrix, (m, m), in m."""
         return build_matrix(self.edges)
 
     def compute_nearest_distances(
@@ -125,9 +125,9 @@ class LatticeGraph:
         (m,) array, m
             Infinite for nodes that no path leads to.
         """
-        if node not in self._distances_of_node:
-            self._distances_of_node[node] = self.compute_nearest_distances([node], [0.0])
-        return self._distances_of_node[node]
+        if node not in self._distances_by_node:
+            self._distances_by_node[node] = self.compute_nearest_distances([node], [0.0])
+        return self._distances_by_node[node]
 
     def compute_distance_table(self, nodes: Sequence[int] | IntArray, limit: float = math.inf) -> FloatArray:
         """Compute the distances from each of the given nodes to all nodes.
@@ -147,7 +147,7 @@ class LatticeGraph:
         """
         table = np.empty((len(nodes), len(self.map_window.nodes)))
         for row, node in enumerate(nodes):
-            stored = self._distances_of_node.get(int(node))
+            stored = self._distances_by_node.get(int(node))
             table[row] = self.compute_nearest_distances([node], [0.0], limit) if stored is None else stored
         return table
 
@@ -182,5 +182,5 @@ def build_matrix(edges: Edges) -> csr_array:
     -------
     (m, m) csr_array, m
     """
-    node_count = len(edges.first_edge) - 1
-    return csr_array((edges.lengths, edges.ends, edges.first_edge), shape=(node_count, node_count))
+    node_count = len(edges.edge_starts) - 1
+    return csr_array((edges.lengths, edges.ends, edges.edge_starts), shape=(node_count, node_count))

@@ -210,12 +210,12 @@ def add_portals(edges: Edges, portals: Portals, cell_size: float) -> Edges:
     -------
     Edges
     """
-    node_count = len(edges.first_edge) - 1
-    starts = np.repeat(np.arange(node_count), np.diff(edges.first_edge))
+    node_count = len(edges.edge_starts) - 1
+    starts = np.repeat(np.arange(node_count), np.diff(edges.edge_starts))
     starts = np.concatenate([starts, portals.first_nodes, portals.last_nodes])
     ends = np.concatenate([edges.ends, portals.last_nodes, portals.first_nodes])
     portal_lengths = portals.lengths * cell_size
     lengths = np.concatenate([edges.lengths, portal_lengths, portal_lengths])
     order = np.argsort(starts, kind="stable")
-    first_edge = np.concatenate([[0], np.cumsum(np.bincount(starts, minlength=node_count))])
-    return Edges(lengths[order], ends[order], first_edge.astype(np.intp))
+    edge_starts = np.concatenate([[0], np.cumsum(np.bincount(starts, minlength=node_count))])
+    return Edges(lengths[order], ends[order], edge_starts.astype(np.intp))

@@ -128,6 +128,7 @@ class SimulationBatch:
         self._world = World(obstacles, self._joint_team, positions.reshape(-1, 2), runs=run_count)
         self.sensor = RangeSensor(obstacles.walls)
         self._complete_graphs: list[Neighbors] | None = None
+        self._complete_joint_graph: Neighbors | None = None
         if np.isinf(self.team.communication_range).all():
             self._complete_graphs = [Neighbors(robot_count)] * run_count
             self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
@@ -141,9 +142,9 @@ class SimulationBatch:
         self._radio = Radio(Conditions(), self.team.communication_range, dt)
         self._inboxes: list[Inbox | None] = [None] * run_count
         self._sent_bytes = np.zeros(run_count)
-        self._start_step()
+        self._clear_step_cache()
 
-    def _start_step(self) -> None:
+    def _clear_step_cache(self) -> None:
         """Discard the observations and the decision of the previous step."""
         self._graphs: list[Neighbors] | None = None
         self._observations: Observations | None = None
@@ -186,9 +187,9 @@ class SimulationBatch:
         return self._world.velocities.reshape(len(self), -1, 2)
 
     @property
-    def working(self) -> BoolArray:
+    def is_working(self) -> BoolArray:
         """Mask of the robots that have not failed, (runs, n) bool; in a batch, none fails."""
-        return self._world.working.reshape(len(self), -1)
+        return self._world.is_working.reshape(len(self), -1)
 
     def step(self, *, forces: FloatArray | None = None) -> None:
         """Advance all runs by one control step: observe, decide, move.
@@ -214,11 +215,12 @@ class SimulationBatch:
         else:
             joint_forces = self._check_forces(forces)
         next_inboxes = self._send_messages(messages)
+        # Change the state only after everything that can fail.
         self._world.step(joint_forces, self.dt)
         self._memories = next_memories
         self._inboxes = next_inboxes
         self._steps += 1
-        self._start_step()
+        self._clear_step_cache()
 
     def observe(self) -> Observations:
         """Return the current observations of the robots of all runs.
@@ -287,7 +289,7 @@ class SimulationBatch:
 
     def _get_joint_graph(self) -> Neighbors:
         """Return the communication graph of all robots, which links only those of the same run."""
-        if self._complete_graphs is not None:
+        if self._complete_joint_graph is not None:
             return self._complete_joint_graph
         return Neighbors.combine(self._get_graphs())
 
@@ -318,11 +320,11 @@ class SimulationBatch:
     def _send_messages(self, messages: list[Sequence[Sequence[Message]]]) -> list[Inbox | None]:
         """Send the messages of each run, which arrive in the next step, and return the new inboxes."""
         inboxes: list[Inbox | None] = [None] * len(self)
-        working = np.ones(len(self.team), dtype=bool)
+        is_working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
             positions = self._world.positions[self._rows[run]]
             inboxes[run], sent_bytes = self._radio.send_messages(
-                None, self._steps, run_messages, positions, working
+                None, self._steps, run_messages, positions, is_working
             )
             self._sent_bytes[run] += sent_bytes
         return inboxes
@@ -347,7 +349,7 @@ class SimulationBatch:
         if not self._decides_jointly:
             self._memories = [*self._memories[:run], self._begin_run(), *self._memories[run + 1 :]]
             self._inboxes = [*self._inboxes[:run], None, *self._inboxes[run + 1 :]]
-        self._start_step()
+        self._clear_step_cache()
 
     def run(
         self, duration: float, *, start: str | None = None, seeds: Sequence[int] | None = None

@@ -1,4 +1,4 @@
-"""Checks of the arguments of simulations."""
+"""Validation of simulation arguments."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def check_team(team: Any, robot_count: int) -> Team:
     Raises
     ------
     ParameterError
-        If `team` is not a team, or has another number of robots.
+        If `team` is not a team, or has a different number of robots.
     """
     if team is None:
         return Team.homogeneous(robot_count)
@@ -106,7 +106,7 @@ def check_conditions(conditions: Any, robot_count: int) -> Conditions | None:
     Raises
     ------
     ParameterError
-        If `conditions` has another type, or refers to robots that the team does not have.
+        If `conditions` is not a `Conditions` object, or refers to robots that the team does not have.
     """
     if conditions is None:
         return None

@@ -210,9 +210,9 @@ class Simulation:
         return self._world.steering
 
     @property
-    def working(self) -> BoolArray:
+    def is_working(self) -> BoolArray:
         """Mask of the robots that are present and have not failed, (n,) bool."""
-        return self._world.working
+        return self._world.is_working
 
     def step(self, external_forces: FloatArray | None = None, *, forces: FloatArray | None = None) -> None:
         """Advance by one control step: observe, decide, move.
@@ -249,7 +249,7 @@ class Simulation:
         if self._perception is not None or inbox is not None:
             inbox = self._get_knowledge().inbox
         next_inbox, sent_bytes = self._radio.send_messages(
-            inbox, self._steps, messages, self.positions, self.working
+            inbox, self._steps, messages, self.positions, self.is_working
         )
         # The physics may raise an error, so everything else that belongs to the state changes after it.
         positions_before = self.positions
@@ -295,9 +295,9 @@ class Simulation:
             else:
                 self._snapshot = Snapshot(
                     knowledge.observations,
-                    restrict_decision_to_working(decision, self.working),
+                    restrict_decision_to_working(decision, self.is_working),
                     true_positions=self.positions,
-                    working=self.working,
+                    is_working=self.is_working,
                     inbox=knowledge.inbox,
                     sent_bytes=self.sent_bytes,
                 )
@@ -309,7 +309,7 @@ class Simulation:
             observations = self._sense()
             inbox = self.inbox
             if self._perception is not None:
-                observations, inbox = self._perception.perceive(observations, inbox, self.working)
+                observations, inbox = self._perception.perceive(observations, inbox, self.is_working)
             inbox, observations = self._radio.receive_messages(inbox, self._steps, observations)
             self._knowledge = _Knowledge(observations, inbox)
         return self._knowledge
@@ -339,7 +339,7 @@ class Simulation:
             return ()
         times = np.array([self.time - self.dt, self.time])
         was_present, is_present = self.conditions.find_present_robots(times, len(self.team))
-        robots = np.flatnonzero(is_present & ~was_present & self.working)
+        robots = np.flatnonzero(is_present & ~was_present & self.is_working)
         return tuple(
             JoinedRobot(
                 robot=robot + 1,
@@ -576,5 +576,5 @@ def _check_robots_fit(
     if state.velocities is not None:
         # Bodies in contact overlap a little, and a moving robot may be in contact.
         max_overlap = 2.0 * MAX_PENETRATION_M
-    working = None if conditions is None else conditions.find_working_robots(time, len(state))
-    require_free_starts(environment.at(time), state.positions, team, max_overlap, working)
+    is_working = None if conditions is None else conditions.find_working_robots(time, len(state))
+    require_free_starts(environment.at(time), state.positions, team, max_overlap, is_working)

@@ -45,7 +45,7 @@ _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(_
 first."""
 
 _MIN_DIVISOR = 1e-300
-"""Smallest sine or radius used as a divisor, which prevents division by zero."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_CHORD_HALF_ANGLE = 1e-3
 """Half angle of the shortest chords that replace an arc, rad."""
 

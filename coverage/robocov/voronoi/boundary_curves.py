@@ -89,7 +89,7 @@ _SPARE_PIECES = 64
 """Initial space for pieces, in addition to one for each edge."""
 
 _MIN_SQUARED_SINE = 1e-29
-"""Smallest sin² of the angle between two curves for which their intersections are computed.
+"""Minimum sin² of the angle between two curves for which their intersections are computed.
 
 At smaller angles, only rounding errors would decide whether and where the curves meet. They are then treated
 as if they did not intersect, which moves no boundary by more than a rounding error.

@@ -251,7 +251,7 @@ def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
     """
     cells.density = density
     if density is not None and density.is_uniform:
-        cells.masses = cells.masses * density.max_value
+        cells.masses = cells.masses * density.upper_bound
     elif density is not None:
         cells.masses, cells.centroids = density.compute_masses_and_centroids(
             cells.edges, cells.generators, cells.masses, cells.centroids

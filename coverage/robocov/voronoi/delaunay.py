@@ -35,7 +35,7 @@ NOT_TRIANGULATED = -1
 ENTRIES_PER_TRIANGLE = 4
 """Number of entries of a mesh per triangle: three half-edges and an unused entry."""
 
-_POSITION_BITS = 3
+_POSITION_MASK = 0b11
 """Bit mask for the position of a half-edge within its triangle."""
 _FAILED = -1
 """Returned instead of a triangle or of a number of flips if rounding makes the triangulation fail."""
@@ -49,7 +49,7 @@ _MAX_FLIPS_PER_POINT = 16
 """Maximum number of flips divided by the number of points. With more flips, the triangulation fails: they may
 be endless because of rounding."""
 _MIN_CROSS = 1e-300
-"""Smallest cross product used as a divisor, which prevents division by zero, m²."""
+"""Minimum divisor, m²; prevents division by zero."""
 
 
 @kernel
@@ -91,7 +91,7 @@ def is_half_edge(h: int) -> bool:
     -------
     bool
     """
-    return (h & _POSITION_BITS) < 3
+    return (h & _POSITION_MASK) < 3
 
 
 @inlined_kernel
@@ -107,7 +107,7 @@ def get_next_half_edge(h: int) -> int:
     -------
     int
     """
-    return h + 1 if (h & _POSITION_BITS) < 2 else h - 2
+    return h + 1 if (h & _POSITION_MASK) < 2 else h - 2
 
 
 @inlined_kernel
@@ -123,7 +123,7 @@ def get_first_half_edge(h: int) -> int:
     -------
     int
     """
-    return h & ~_POSITION_BITS
+    return h & ~_POSITION_MASK
 
 
 @inlined_kernel
@@ -139,7 +139,7 @@ def get_previous_half_edge(h: int) -> int:
     -------
     int
     """
-    return h - 1 if (h & _POSITION_BITS) > 0 else h + 2
+    return h - 1 if (h & _POSITION_MASK) > 0 else h + 2
 
 
 @kernel
@@ -268,7 +268,7 @@ def _compute_cotangents(mesh: Mesh, points: FloatArray, cotangents: FloatArray, 
 
 @inlined_kernel
 def _must_flip(mesh: Mesh, cotangents: FloatArray, h: int) -> bool:
-    """Return whether the edge of a half-edge with a twin is not Delaunay, or if its angles are undefined."""
+    """Return whether the edge of a half-edge with a twin is not Delaunay, or has undefined angles."""
     cotangent = cotangents[h]
     twin_cotangent = cotangents[mesh[TWIN, h]]
     # Because of the `not`, this is also true if a cotangent is nan.

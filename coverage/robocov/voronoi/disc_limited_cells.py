@@ -15,7 +15,7 @@ _MIN_AREA = 1e-14
 """Areas of limited cells up to this fraction of the squared radius may be rounding errors."""
 
 _MIN_SQUARED_LENGTH = 1e-300
-"""Smallest squared length used as a divisor, which prevents division by zero, m²."""
+"""Minimum divisor, m²; prevents division by zero."""
 
 
 class _Arcs(NamedTuple):

@@ -32,13 +32,13 @@ from robocov.voronoi.delaunay import (
 FAILED = -1
 """Returned instead of a number of edges if the triangulation failed."""
 _MAX_OFFSET_SIZES = 2.0
-"""Largest offset of a robot from the center of the region in x and y, as a multiple of the region's size.
+"""Maximum offset of a robot from the center of the region in x and y, as a multiple of the region's size.
 
 The sentinels are at least 9 sizes away from the center. Robots within these offsets lie in the triangle of
 the sentinels, and are nearer than any sentinel to every point of the region, so that no sentinel cuts a cell.
 """
 _AREA_TOLERANCE = 1e-12
-"""Largest difference between the total area of the cells and the area of the region that may be due to
+"""Maximum difference between the total area of the cells and the area of the region that may be due to
 rounding, as a fraction of the area of the region."""
 
 

@@ -131,7 +131,7 @@ class WeightedCells(Cells):
         """Polar moment of each cell about its generator, (n,) m⁴; exact if the density is uniform."""
         if self.density is not None and not self.density.is_uniform:
             return super().polar_moments
-        weight = 1.0 if self.density is None else self.density.max_value
+        weight = 1.0 if self.density is None else self.density.upper_bound
         moments = compute_moments(self.pieces, cell_count=len(self.generators))
         return np.where(self.masses > 0.0, weight * moments[:, POLAR_MOMENT], 0.0)
 

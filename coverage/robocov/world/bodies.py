@@ -24,7 +24,7 @@ WALL_CATEGORY = 0b1
 WALLS_ONLY = pymunk.ShapeFilter(mask=WALL_CATEGORY)
 """Filter of queries that find only walls and failed robots."""
 MAX_TEAMS_PER_SPACE = 31
-"""Largest number of teams in one space. A filter has 32 categories: one for walls, and one for each team."""
+"""Maximum number of teams in one space. A filter has 32 categories: one for walls, and one for each team."""
 
 _ALL_BUT_WALLS = pymunk.ShapeFilter.ALL_CATEGORIES() & ~WALL_CATEGORY
 """Filter categories of moving obstacles, and of robots that collide with all others."""
@@ -114,7 +114,7 @@ class BodyArrays:
     space : pymunk.Space
         The space whose bodies are read and written.
     capacity : int
-        Largest number of bodies that the space will contain.
+        Maximum number of bodies that the space will contain.
 
     Attributes
     ----------

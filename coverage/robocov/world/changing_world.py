@@ -54,7 +54,7 @@ class ChangingWorld:
         Velocities of the robots. Read-only.
     steering : (n, 2) array or None, rad and rad/s
         Heading and turning rate of unicycles; None for a team without unicycles. Read-only.
-    working : (n,) bool array
+    is_working : (n,) bool array
         Whether each robot is present and has not failed. Read-only.
     """
 
@@ -76,9 +76,9 @@ class ChangingWorld:
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
         self.steering = initialize_steering(team, self.velocities, steering)
-        self.working = conditions.find_working_robots(time, len(team))
+        self.is_working = conditions.find_working_robots(time, len(team))
         self._failed = conditions.find_failed_robots(time, len(team))
-        is_absent = ~(self.working | self._failed)
+        is_absent = ~(self.is_working | self._failed)
         for join in conditions.joins:
             if join.position is not None and is_absent[join.robot - 1]:
                 self.positions[join.robot - 1] = join.position
@@ -103,7 +103,7 @@ class ChangingWorld:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._protect_state()  # Pickles do not contain the flags of arrays.
+        self._make_state_read_only()  # Pickles do not contain the flags of arrays.
 
     def step(
         self, forces: FloatArray, dt: float, external_forces: FloatArray | None = None, *, time: float = 0.0
@@ -128,7 +128,7 @@ class ChangingWorld:
         """
         self._move_working_robots(forces, dt, external_forces, time)
         self._change_team(time + dt)
-        self._protect_state()
+        self._make_state_read_only()
 
     def _move_working_robots(
         self, forces: FloatArray, dt: float, external_forces: FloatArray | None, time: float
@@ -149,21 +149,21 @@ class ChangingWorld:
 
     def _change_team(self, time: float) -> None:
         """Apply the changes of the team up to a time: stop robots that fail, and place robots that join."""
-        working = self._conditions.find_working_robots(time, len(self.team))
+        is_working = self._conditions.find_working_robots(time, len(self.team))
         failed = self._conditions.find_failed_robots(time, len(self.team))
-        if (working == self.working).all() and (failed == self._failed).all():
+        if (is_working == self.is_working).all() and (failed == self._failed).all():
             return
-        is_present = self.working | self._failed
+        is_present = self.is_working | self._failed
         self._failed = failed & is_present
-        for robot in np.flatnonzero(working & ~is_present).tolist():
+        for robot in np.flatnonzero(is_working & ~is_present).tolist():
             self.positions[robot] = self._find_joining_position(robot, is_present, time)
             is_present[robot] = True
-        self.working = working
-        self.velocities[~working] = 0.0
+        self.is_working = is_working
+        self.velocities[~is_working] = 0.0
         if self.steering is not None:
             # Robots that do not work do not turn.
             self.steering = self.steering.copy()
-            self.steering[:, _TURNING_RATE] *= working
+            self.steering[:, _TURNING_RATE] *= is_working
         self._build_world()
 
     def _find_joining_position(self, robot: int, is_present: BoolArray, time: float) -> tuple[float, float]:
@@ -185,8 +185,8 @@ class ChangingWorld:
 
     def _build_world(self) -> None:
         """Build the world of the working robots, or set it to None if there are none."""
-        self._protect_state()
-        self._working_rows = np.flatnonzero(self.working)
+        self._make_state_read_only()
+        self._working_rows = np.flatnonzero(self.is_working)
         self._world: World | None = None
         if len(self._working_rows) > 0:
             rows = self._working_rows
@@ -198,8 +198,8 @@ class ChangingWorld:
                 steering=None if self.steering is None else self.steering[rows],
             )
 
-    def _protect_state(self) -> None:
+    def _make_state_read_only(self) -> None:
         """Make the arrays of the state read-only."""
-        for array in (self.positions, self.velocities, self.working, self.steering):
+        for array in (self.positions, self.velocities, self.is_working, self.steering):
             if array is not None:
                 array.setflags(write=False)

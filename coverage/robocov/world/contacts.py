@@ -24,7 +24,7 @@ MAX_PENETRATION_M = 1e-3
 this in one substep."""
 
 _MAX_TRAVEL_RADII = 0.1
-"""Largest distance that a robot in contact moves in one substep, as a fraction of the smallest radius."""
+"""Maximum distance that a robot in contact moves in one substep, as a fraction of the smallest radius."""
 _MAX_SUBSTEPS = 64
 """Maximum number of substeps of a step. Very fast robots may then sink in deeper than `MAX_PENETRATION_M`."""
 _COLLISION_SLOP_M = 1e-4

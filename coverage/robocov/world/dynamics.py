@@ -31,9 +31,9 @@ class MotionResponse(NamedTuple):
     force_per_velocity: FloatArray
     """Net force needed per change of velocity, m / dt, N/(m/s)."""
     max_velocity_change: FloatArray
-    """Largest change of velocity, max_acceleration * dt, m/s."""
+    """Maximum change of velocity, max_acceleration * dt, m/s."""
     max_speed: FloatArray
-    """Largest speed after the substep, m/s."""
+    """Maximum speed after the substep, m/s."""
 
 
 def compute_response(team: Team, dt: float) -> MotionResponse:

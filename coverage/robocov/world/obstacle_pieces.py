@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.environment import Environment, ObstaclePath, Point
 from robocov.typing import FloatArray
 
@@ -62,7 +62,7 @@ class Obstacles:
 
     @property
     def max_speed(self) -> float:
-        """Largest speed of a moving obstacle, m/s."""
+        """Maximum speed of a moving obstacle, m/s."""
         return max((obstacle.path.speed for obstacle in self.moving_obstacles), default=0.0)
 
 
@@ -149,7 +149,7 @@ def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
     shapes = shapely.get_parts(geometry)
     polygons = [shape for shape in shapes if shape.geom_type == "Polygon" and shape.area > 0.0]
     rings = chain.from_iterable(_merge_rings(_triangulate(polygon)) for polygon in polygons)
-    return tuple(freeze(ring) for ring in rings)
+    return tuple(copy_read_only(ring) for ring in rings)
 
 
 def _triangulate(polygon: BaseGeometry) -> list[Ring]:

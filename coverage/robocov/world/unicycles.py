@@ -40,7 +40,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.arrays import freeze
+from robocov.arrays import copy_read_only
 from robocov.compiled import kernel
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray
@@ -103,7 +103,7 @@ def initialize_steering(team: Team, velocities: FloatArray, steering: FloatArray
     if steering is None:
         # `math.atan2` is used, because its results are the same on every processor, unlike those of numpy.
         steering = np.array([(math.atan2(vy, vx), 0.0) for vx, vy in velocities.tolist()])
-    return freeze(steering)
+    return copy_read_only(steering)
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""The world of a team that stays the same: robots under forces, among obstacles.
+"""The world of a fixed team: robots under forces, among obstacles.
 
 Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
 Non-Convex Environment".
@@ -31,27 +31,27 @@ from robocov.world.unicycles import (
 )
 
 MAX_SUBSTEP_S = 0.02
-"""Longest duration of a substep."""
+"""Maximum duration of a substep."""
 MAX_MASS_RATIO = 1000.0
-"""Largest ratio of the masses of two robots. With larger ratios, contacts cannot be resolved."""
+"""Maximum ratio of the masses of two robots. With larger ratios, contacts cannot be resolved."""
 
 _NO_FORCES = np.zeros((0, 2))
 """External forces of a step without external forces."""
 _SUBSTEP_COUNT_TOLERANCE = 1e-9
-"""Largest rounding error of a number of substeps."""
+"""Maximum rounding error of a number of substeps."""
 
 
 @dataclass(frozen=True, eq=False)
 class _SpeedLimits:
-    """Largest speeds of robots at the end of a substep, (n,) m/s each.
+    """Maximum speeds of robots at the end of a substep, (n,) m/s each.
 
     A robot that is faster than its maximum speed brakes as hard as it can.
     """
 
-    driven: FloatArray
-    """Without external forces."""
-    pushed: FloatArray
-    """With external forces."""
+    without_external_forces: FloatArray
+    """Maximum speeds if no external forces act."""
+    with_external_forces: FloatArray
+    """Maximum speeds if external forces act, which are the same or higher."""
 
 
 class World:
@@ -81,8 +81,8 @@ class World:
         Velocities of the robots. Read-only.
     steering : (n, 2) array or None, rad and rad/s
         Heading and turning rate of unicycles; None for a team without unicycles. Read-only.
-    working : (n,) bool array
-        Whether each robot works; all robots do.
+    is_working : (n,) bool array
+        Whether each robot works; always True.
 
     Raises
     ------
@@ -137,7 +137,7 @@ class World:
             )
         self.team = team
         self.failed_robots = obstacles.failed_robots
-        self.working: BoolArray = np.ones(len(team), dtype=bool)
+        self.is_working: BoolArray = np.ones(len(team), dtype=bool)
         self._obstacles = obstacles
         self._is_unicycle = team.is_unicycle
         self._max_team_speed = float(team.max_speed.max())
@@ -154,7 +154,7 @@ class World:
         self._obstacle_states = compute_obstacle_states(obstacles.moving_obstacles, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
         self._response_dt = math.nan
-        # Both are built when they are needed first, and are the only objects that a step changes in place.
+        # Both are built on first use, and are the only objects that a step changes in place.
         self._spaces: list[tuple[slice, ContactDetector]] | None = None
         self._contact_solver: ContactSolver | None = None
 
@@ -188,21 +188,21 @@ class World:
         World
             The copy.
         """
-        # The copy has the state that `__getstate__` returns: its own spaces are built when they are needed.
+        # The copy has the state that `__getstate__` returns: its own spaces are built on first use.
         return copy(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        # Both contain nothing that is not in the other attributes, and are rebuilt when they are needed.
+        # Both are derived from other attributes and rebuilt on demand.
         return {**vars(self), "_spaces": None, "_contact_solver": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._protect_state()  # Pickles do not contain the flags of arrays.
+        self._make_state_read_only()  # Pickles do not contain the flags of arrays.
 
     def step(
         self, forces: FloatArray, dt: float, external_forces: FloatArray | None = None, *, time: float = 0.0
     ) -> None:
-        """Move all robots in a step, under forces, viscosity and limits.
+        """Advance all robots by one step, under forces, viscosity and limits.
 
         Parameters
         ----------
@@ -237,14 +237,14 @@ class World:
         return max(math.ceil(dt / MAX_SUBSTEP_S - _SUBSTEP_COUNT_TOLERANCE), math.ceil(travel_in_radii))
 
     def _run_substep(self, forces: FloatArray, external: FloatArray, dt: float) -> None:
-        """Move all robots in a substep: first without contacts, then again those that touch something."""
+        """Advance one substep: move all robots freely, then redo those in contact."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
         may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
         if may_exceed_max_speed:
             limits = self._compute_speed_limits(external, dt)
-            response = response._replace(max_speed=limits.driven)
-            max_speed_after_contact = limits.pushed
+            response = response._replace(max_speed=limits.without_external_forces)
+            max_speed_after_contact = limits.with_external_forces
         is_rolling = self._find_rolling(external)
         steering = self.steering
         if steering is not None:
@@ -254,10 +254,11 @@ class World:
             response = command.response
         net_forces = compute_net_forces(forces, self.velocities, response, external)
         states = self._move_freely(net_forces, dt)
-        has_contacts = self._resolve_contacts(states, net_forces, max_speed_after_contact, dt)
+        states, has_contacts = self._resolve_contacts(states, net_forces, max_speed_after_contact, dt)
         positions = np.ascontiguousarray(states[:, :2])
         velocities = np.ascontiguousarray(states[:, 2:])
         if steering is not None and has_contacts:
+            # The outer wheel is faster than the center by this speed.
             turning_speed = 0.5 * self.team.track_width * np.abs(steering[:, 1])
             velocities = remove_sideways_velocity(
                 velocities=velocities,
@@ -299,13 +300,14 @@ class World:
         return self._response
 
     def _compute_speed_limits(self, external: FloatArray, dt: float) -> _SpeedLimits:
-        """Compute the largest speeds of robots at the end of a substep."""
+        """Compute the maximum speeds of robots at the end of a substep."""
         speeds = self._compute_speeds()
-        driven = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
-        pushed = driven
+        without_external = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
+        with_external = without_external
         if len(external) > 0:
-            pushed = np.maximum(driven, speeds + self._compute_external_acceleration(external) * dt)
-        return _SpeedLimits(driven, pushed)
+            pushed_speeds = speeds + self._compute_external_acceleration(external) * dt
+            with_external = np.maximum(without_external, pushed_speeds)
+        return _SpeedLimits(without_external_forces=without_external, with_external_forces=with_external)
 
     def _find_rolling(self, external: FloatArray) -> BoolArray:
         """Return whether each robot is moved by wheels: unicycles on which no external force acts, (n,)."""
@@ -328,9 +330,9 @@ class World:
         self.positions = positions
         self.velocities = velocities
         self.steering = steering
-        self._protect_state()
+        self._make_state_read_only()
 
-    def _protect_state(self) -> None:
+    def _make_state_read_only(self) -> None:
         """Make the arrays of the state read-only."""
         for array in (self.positions, self.velocities, self.steering):
             if array is not None:
@@ -387,11 +389,14 @@ class World:
 
     def _resolve_contacts(
         self, states: FloatArray, net_forces: FloatArray, max_speed: FloatArray, dt: float
-    ) -> bool:
-        """Change, in place, the states of robots that touch something; return whether there are any."""
+    ) -> tuple[FloatArray, bool]:
+        """Return the states after contacts were resolved, and whether there are any contacts."""
         touching_by_run: dict[int, list[int]] = {}
         for robot in self._list_touching_robots():
             touching_by_run.setdefault(robot // self._team_size, []).append(robot)
+        if not touching_by_run:
+            return states, False
+        states = states.copy()
         for run, touching_robots in touching_by_run.items():
             self._resolve_contacts_in_run(
                 run=run,
@@ -401,7 +406,7 @@ class World:
                 max_speed=max_speed,
                 dt=dt,
             )
-        return bool(touching_by_run)
+        return states, True
 
     def _resolve_contacts_in_run(
         self,
@@ -412,7 +417,10 @@ class World:
         max_speed: FloatArray,
         dt: float,
     ) -> None:
-        """Move the robots in contact again, together with all robots into which they are pushed."""
+        """Move the robots in contact again, together with all robots into which they are pushed.
+
+        The new states are written to `states`.
+        """
         if self._contact_solver is None:
             self._contact_solver = ContactSolver(self.team, self._obstacles)
         rows = self._get_rows(run)

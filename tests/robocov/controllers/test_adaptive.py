@@ -29,8 +29,8 @@ class RecordingDensity(Density):
     """A density that records where it is evaluated, and has no integrals."""
 
     kind: ClassVar[str] = "recording"
-    min_value = 0.3
-    max_value = 7.0
+    lower_bound = 0.3
+    upper_bound = 7.0
 
     def __init__(self) -> None:
         self.evaluated: list[FloatArray] = []

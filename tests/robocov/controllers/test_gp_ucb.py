@@ -26,15 +26,15 @@ SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 REGION = SQUARE.region
 HOT = Gaussians((Gaussian((7.5, 7.0), weight=6.0, sigma=1.5),), floor=0.3)
 SENSED = Conditions(density="sensed")
-GRID = ProcessGrid.build(REGION, squares=8, correlation=0.2)
-SQUARE_COUNT = len(GRID.squares)
+GRID = ProcessGrid.build(REGION, squares_per_side=8, correlation=0.2)
+SQUARE_COUNT = len(GRID.centers)
 
 
 def compute_posterior_directly(
     is_measured: BoolArray, values: FloatArray, prior_mean: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean and variance in all squares by the textbook formula, with a Cholesky factorization."""
-    distances = scipy.spatial.distance.cdist(GRID.squares, GRID.squares)
+    distances = scipy.spatial.distance.cdist(GRID.centers, GRID.centers)
     covariance = np.exp(-0.5 * (distances / 2.0) ** 2)
     known = covariance[np.ix_(is_measured, is_measured)] + NOISE_VARIANCE * np.eye(is_measured.sum())
     factor = scipy.linalg.cho_factor(known)
@@ -45,7 +45,7 @@ def compute_posterior_directly(
 
 
 def measure_squares(density: Density, is_measured: BoolArray) -> FloatArray:
-    return np.where(is_measured, density.evaluate(GRID.squares), np.nan)
+    return np.where(is_measured, density.evaluate(GRID.centers), np.nan)
 
 
 def simulate(
@@ -78,7 +78,7 @@ def test_the_posterior_is_that_of_the_direct_formula(seed: int, count: int, step
     is_measured = np.zeros(SQUARE_COUNT, dtype=bool)
     for added in np.array_split(order, steps):
         is_measured[added] = True
-        posterior = posterior.add_squares(is_measured)
+        posterior = posterior.condition_on(is_measured)
     mean, variance = compute_posterior_directly(is_measured, values, prior_mean=3.0)
     measurements = np.where(is_measured, values, np.nan)
     np.testing.assert_allclose(posterior.compute_mean(measurements, 3.0), mean, atol=1e-7)
@@ -91,9 +91,9 @@ def test_a_measurement_never_increases_a_deviation(seed: int, count: int) -> Non
     order = np.random.default_rng(seed).permutation(SQUARE_COUNT)
     is_measured = np.zeros(SQUARE_COUNT, dtype=bool)
     is_measured[order[:count]] = True
-    before = Posterior.build_prior(GRID).add_squares(is_measured)
+    before = Posterior.build_prior(GRID).condition_on(is_measured)
     is_measured[order[count]] = True
-    after = before.add_squares(is_measured)
+    after = before.condition_on(is_measured)
     assert (after.compute_deviations() <= before.compute_deviations() + 1e-12).all()
     assert after.compute_deviations()[order[count]] <= np.sqrt(NOISE_VARIANCE)
     # The earlier posterior, which other copies of a simulation may use, has not changed.
@@ -103,20 +103,20 @@ def test_a_measurement_never_increases_a_deviation(seed: int, count: int) -> Non
 def test_the_bound_shrinks_where_the_density_is_measured() -> None:
     is_measured = np.zeros(SQUARE_COUNT, dtype=bool)
     is_measured[[9, 40]] = True
-    before = Posterior.build_prior(GRID).add_squares(is_measured)
+    before = Posterior.build_prior(GRID).condition_on(is_measured)
     bound_before = compute_bound(before, measure_squares(HOT, is_measured), beta=3.0)
     is_measured[10] = True
-    after = before.add_squares(is_measured)
+    after = before.condition_on(is_measured)
     bound_after = compute_bound(after, measure_squares(HOT, is_measured), beta=3.0)
     assert bound_after[10] < 0.6 * bound_before[10]
-    far = np.hypot(*(GRID.squares - GRID.squares[10]).T) > 7.0
+    far = np.hypot(*(GRID.centers - GRID.centers[10]).T) > 7.0
     np.testing.assert_allclose(bound_after[far], bound_before[far], rtol=0.1)
 
 
 def test_without_deviations_the_bound_is_the_mean_but_positive() -> None:
     is_measured = np.zeros(SQUARE_COUNT, dtype=bool)
     is_measured[::3] = True
-    posterior = Posterior.build_prior(GRID).add_squares(is_measured)
+    posterior = Posterior.build_prior(GRID).condition_on(is_measured)
     narrow_peak = Gaussians((Gaussian((5.0, 5.0), weight=9.0, sigma=0.8),), floor=0.0)
     values = measure_squares(narrow_peak, is_measured)
     mean = posterior.compute_mean(values, float(np.nanmean(values)))
@@ -128,7 +128,7 @@ def test_without_deviations_the_bound_is_the_mean_but_positive() -> None:
 def test_measurements_of_zero_leave_the_mass_in_unknown_squares() -> None:
     is_measured = np.zeros(SQUARE_COUNT, dtype=bool)
     is_measured[:16] = True
-    posterior = Posterior.build_prior(GRID).add_squares(is_measured)
+    posterior = Posterior.build_prior(GRID).condition_on(is_measured)
     bound = compute_bound(posterior, np.where(is_measured, 0.0, np.nan), beta=1.0)
     assert bound[:16].max() < 0.2 < 0.9 < bound[-8:].min()
 
@@ -136,14 +136,14 @@ def test_measurements_of_zero_leave_the_mass_in_unknown_squares() -> None:
 @pytest.mark.parametrize(("width", "height", "squares"), [(4.0, 4.0, 64), (4.0, 1.9, 32), (1.9, 4.0, 32)])
 def test_squares_cover_the_region(width: float, height: float, squares: int) -> None:
     region = Region(np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]))
-    grid = ProcessGrid.build(region, squares=8, correlation=0.2)
-    assert len(grid.squares) == squares
+    grid = ProcessGrid.build(region, squares_per_side=8, correlation=0.2)
+    assert len(grid.centers) == squares
     assert region.contains(grid.samples).all()
     np.testing.assert_allclose(grid.samples.mean(axis=0), [width / 2, height / 2], atol=0.07)
     # A linear function is interpolated exactly between the centers of the squares.
-    is_between = (grid.samples >= grid.squares.min(axis=0)).all(axis=1)
-    is_between &= (grid.samples <= grid.squares.max(axis=0)).all(axis=1)
-    interpolated = grid.interpolate(grid.squares @ [2.0, -3.0])
+    is_between = (grid.samples >= grid.centers.min(axis=0)).all(axis=1)
+    is_between &= (grid.samples <= grid.centers.max(axis=0)).all(axis=1)
+    interpolated = grid.interpolate(grid.centers @ [2.0, -3.0])
     np.testing.assert_allclose(interpolated[is_between], (grid.samples @ [2.0, -3.0])[is_between])
 
 

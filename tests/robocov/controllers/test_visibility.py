@@ -13,15 +13,15 @@ from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_unde
 from robocov.controllers.visibility import find_cells_in_view
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
-from robocov.observation import NearNeighbors, Observations, compute_ray_directions
+from robocov.observation import NeighborPairs, Observations, compute_ray_directions
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.observation.scanned_view import (
+    OcclusionEdges,
     View,
-    Windows,
     compute_speed_fractions,
-    find_windows,
-    integrate_over_windows,
+    find_occlusion_edges,
+    integrate_over_edges,
 )
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -124,7 +124,7 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
     reach = rng.uniform(1.0, 4.0, n)
     directions = compute_ray_directions(16)
     depths = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
-    pairs = observe(positions).find_near_neighbors(np.inf)
+    pairs = observe(positions).find_neighbors()
     is_own = find_cells_in_view(depths, np.full((n, 16), np.inf), directions, pairs, reach)
     for i in range(n):
         points = positions[i] + depths[i][..., None] * directions[:, None]
@@ -134,7 +134,7 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
 
 def test_neighbors_behind_walls_do_not_share_the_view() -> None:
     positions = np.random.default_rng(0).uniform((1, 1), (9, 7), size=(4, 2))
-    pairs = observe(positions).find_near_neighbors(np.inf)
+    pairs = observe(positions).find_neighbors()
     walls = np.full((4, 16), 1e-9)
     is_own = find_cells_in_view(
         np.ones((4, 16, 5)), walls, compute_ray_directions(16), pairs, np.full(4, 3.0)
@@ -142,39 +142,39 @@ def test_neighbors_behind_walls_do_not_share_the_view() -> None:
     assert is_own.all()
 
 
-def test_a_wall_at_a_low_angle_is_no_window() -> None:
+def test_a_wall_at_a_low_angle_is_no_occlusion_edge() -> None:
     """Along a straight wall the distance jumps from ray to ray, but nothing is hidden."""
     directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     view = View(distances=np.minimum(wall, 20.0)[None], is_hit=(wall < 20.0)[None])
-    assert len(find_windows(view, directions, np.array([20.0]), 0.3).robots) == 0
+    assert len(find_occlusion_edges(view, directions, np.array([20.0]), 0.3).robots) == 0
 
 
-def test_the_end_of_a_wall_is_a_window() -> None:
+def test_the_end_of_a_wall_is_an_occlusion_edge() -> None:
     """A wall at y = -0.3 ends at x = 1: a robot that moves up sees more behind it."""
     directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):
         wall = np.where(directions[:, 1] < 0.0, -0.3 / directions[:, 1], np.inf)
     wall = np.where(directions[:, 0] * wall > 1.0, np.inf, wall)
     view = View(distances=np.minimum(wall, 20.0)[None], is_hit=(wall < 20.0)[None])
-    windows = find_windows(view, directions, np.array([20.0]), 0.3)
-    assert len(windows.robots) == 1
-    assert windows.corner_distances[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
-    assert windows.directions[0] @ [0.3, 1.0] > 0.0
+    edges = find_occlusion_edges(view, directions, np.array([20.0]), 0.3)
+    assert len(edges.robots) == 1
+    assert edges.corner_distances[0] == pytest.approx(np.hypot(1.0, 0.3), rel=0.1)
+    assert edges.motion_directions[0] @ [0.3, 1.0] > 0.0
 
 
 def test_the_view_grows_along_the_edge_beyond_a_corner() -> None:
     """For a constant weight, the integral of (s - ρ)/ρ from ρ to D is (D - ρ)²/(2 ρ)."""
     view = View(distances=np.full((1, 4), 5.0), is_hit=np.zeros((1, 4), dtype=bool))
-    windows = Windows(
+    edges = OcclusionEdges(
         robots=np.array([0]),
         rays=np.array([2]),
-        directions=np.array([[0.0, 1.0]]),
+        motion_directions=np.array([[0.0, 1.0]]),
         corner_distances=np.array([2.0]),
     )
     depths = view.distances[..., None] * (np.arange(100) + 0.5) / 100
-    growth = integrate_over_windows(windows, view, depths, np.full(depths.shape, 3.0))
+    growth = integrate_over_edges(edges, view, depths, np.full(depths.shape, 3.0))
     np.testing.assert_allclose(growth, [[0.0, 3.0 * 2.25]], rtol=1e-3)
 
 
@@ -216,7 +216,7 @@ def test_a_neighbor_behind_a_wall_detects_nothing_here() -> None:
     directions = compute_ray_directions(72)
     depths = np.full((1, 72, 1), 1.0)
     walls = np.full((1, 72), np.inf)
-    pairs = NearNeighbors(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
+    pairs = NeighborPairs(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
     reach = np.full(2, 3.0)
     undetected = compute_undetected(depths, walls, directions, pairs, reach, 0.5)
     distance = np.hypot(*(directions - [2.0, 0.0]).T)

@@ -269,7 +269,7 @@ def test_densities_are_immutable_and_compare_by_value():
     assert raster.is_uniform
     assert Uniform().is_uniform
     assert not GAUSSIANS["two"].is_uniform
-    assert (raster.min_value, raster.max_value) == (1.0, 1.0)
+    assert (raster.lower_bound, raster.upper_bound) == (1.0, 1.0)
 
 
 @pytest.mark.parametrize(

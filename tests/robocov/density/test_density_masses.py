@@ -40,8 +40,8 @@ def test_means_of_squares_agree_with_masses_of_polygons(density):
     boxes = [Polygon(shapely.box(x - 0.35, y - 0.35, x + 0.35, y + 0.35)) for x, y in centers]
     means = compute_square_means(density, centers, side)
     assert_allclose(means, compute_polygon_masses(density, boxes) / side**2, rtol=1e-9)
-    assert (density.min_value <= means).all()
-    assert (means <= density.max_value).all()
+    assert (density.lower_bound <= means).all()
+    assert (means <= density.upper_bound).all()
 
 
 def test_batches_of_squares_do_not_change_their_means(monkeypatch):

@@ -186,7 +186,7 @@ def test_tiny_weights_are_read_as_zero():
         with pytest.raises(MapError, match="expected at least one weight above 0, got none"):
             from_json(build_document(density))
     tiny = from_json(build_document({"kind": "raster", "rows": [[1e-12, 1]]}))
-    assert tiny.density.min_value == 0.0
+    assert tiny.density.lower_bound == 0.0
     assert parse_map(dump_map(tiny), "again") == tiny
     flat = {"kind": "polygons", "areas": [{**AREA, "vertices": [[0, 0], [9, 0], [9, 5], [0, 1e-320]]}]}
     assert from_json(build_document(flat)).free_masses.sum() == pytest.approx(60.0 + 4.0 * 22.5)

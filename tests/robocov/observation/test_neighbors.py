@@ -52,7 +52,7 @@ def test_infinite_ranges_give_the_complete_graph() -> None:
     neighbors = Neighbors.from_ranges(positions, np.full(3, np.inf))
     assert neighbors.is_complete
     assert neighbors.list_neighbors(1).tolist() == [0, 2]
-    first, second, _, _ = build_observations(positions, neighbors).find_near_neighbors(5.0)
+    first, second, _, _ = build_observations(positions, neighbors).find_neighbors(5.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(0, 2), (2, 0)]
 
 
@@ -60,14 +60,14 @@ def test_infinite_ranges_give_the_complete_graph() -> None:
 def test_neighbors_at_exactly_the_reach_are_near(communication_range: float) -> None:
     positions = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.5]])
     neighbors = Neighbors.from_ranges(positions, np.full(3, communication_range))
-    near = build_observations(positions, neighbors).find_near_neighbors(2.0)
+    near = build_observations(positions, neighbors).find_neighbors(2.0)
     assert list(zip(near[0].tolist(), near[1].tolist(), strict=True)) == [(0, 1), (1, 0)]
 
 
 def test_near_neighbors_are_within_communication_range() -> None:
     positions = np.array([[0.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
     neighbors = Neighbors.from_ranges(positions, np.array([0.5, 3.0, 3.0]))
-    first, second, offset, distance = build_observations(positions, neighbors).find_near_neighbors(2.0)
+    first, second, offset, distance = build_observations(positions, neighbors).find_neighbors(2.0)
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
     np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])

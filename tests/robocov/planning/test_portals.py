@@ -39,7 +39,9 @@ def planner() -> GridPlanner:
 def test_the_moves_alone_miss_the_door(planner):
     first = planner.visibility.find_nearest_node(LEFT)
     last = planner.visibility.find_nearest_node(RIGHT)
-    _, pieces = connected_components(build_matrix(planner.graph.moves), directed=True, connection="strong")
+    _, pieces = connected_components(
+        build_matrix(planner.graph.straight_edges), directed=True, connection="strong"
+    )
     assert pieces[first] != pieces[last]
 
 

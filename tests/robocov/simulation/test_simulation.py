@@ -581,12 +581,12 @@ def test_copies_share_nothing_that_changes(build: Callable[[], Simulation]) -> N
     simulation.step()
     copy = simulation.copy()
     positions = simulation.positions.copy()
-    working = simulation.working.copy()
+    working = simulation.is_working.copy()
     obstacle_points = sense_from(simulation, positions)
     for _ in range(60):
         copy.step()
     np.testing.assert_array_equal(simulation.positions, positions)
-    np.testing.assert_array_equal(simulation.working, working)
+    np.testing.assert_array_equal(simulation.is_working, working)
     assert sense_from(simulation, positions) == obstacle_points
     for _ in range(60):
         simulation.step()

@@ -45,11 +45,11 @@ def test_failed_robots_stand_still_and_are_obstacles() -> None:
     forces = np.array([[4.0, 0.0], [4.0, 0.0]])
     for step in range(200):
         changing.step(forces, 0.05, time=step * 0.05)
-        assert changing.working[1] == bool(changing.velocities[1].any())
+        assert changing.is_working[1] == bool(changing.velocities[1].any())
     distance = changing.positions[1, 0] - 5.0
     assert 0.1 < distance < 0.5
     assert (changing.velocities[1] == 0.0).all()
-    assert changing.working.tolist() == [True, False]
+    assert changing.is_working.tolist() == [True, False]
     assert changing.failed_robots.tolist() == [[*changing.positions[1].tolist(), 0.1]]
     # The other robot leans on it, and does not get past.
     assert changing.positions[0, 0] == pytest.approx(changing.positions[1, 0] - 0.2, abs=2e-3)
@@ -62,10 +62,10 @@ def test_robots_that_have_not_joined_are_absent() -> None:
         changing.step(forces, 0.05, time=step * 0.05)
     # Robot 1 has passed the position at which robot 2 will join.
     assert changing.positions[0, 0] > 3.5
-    assert changing.working.tolist() == [True, False]
+    assert changing.is_working.tolist() == [True, False]
     for step in range(60, 90):
         changing.step(forces, 0.05, time=step * 0.05)
-    assert changing.working.all()
+    assert changing.is_working.all()
     assert changing.positions[1].tolist() == [3.0, 4.0]
 
 
@@ -89,7 +89,7 @@ def test_errors_name_a_robot_without_room_to_join() -> None:
 def test_a_run_continues_after_all_robots_have_failed() -> None:
     conditions = Conditions(failures=tuple((k + 1, 0.2) for k in range(4)))
     record = Simulation(HALL, Rapf(), STARTS, conditions=conditions).run(6.0)
-    assert not record.working[-1].any()
+    assert not record.is_working[-1].any()
     assert (record.positions[-1] == record.positions[15]).all()
     history = compute_cost_history(record, CoverageCost(HALL, 16), 2.0)
     assert np.isnan(history.mean_distance[-1])
@@ -103,12 +103,12 @@ def test_only_working_robots_count_in_the_coverage_cost() -> None:
     cost = CoverageCost(HALL, 32)
     history = compute_cost_history(record, cost, 60.0)
     for moment in (0, 10, 20, 30):
-        working_positions = record.positions[moment][record.working[moment]]
+        working_positions = record.positions[moment][record.is_working[moment]]
         assert history.mean_distance[moment] == cost(working_positions).mean_distance
-    assert record.working[0].tolist() == [True, True, False, True]
-    assert record.working[-1].tolist() == [False, False, True, True]
-    assert record.present[0].tolist() == [True, True, False, True]
-    assert record.present[-1].all()
+    assert record.is_working[0].tolist() == [True, True, False, True]
+    assert record.is_working[-1].tolist() == [False, False, True, True]
+    assert record.is_present[0].tolist() == [True, True, False, True]
+    assert record.is_present[-1].all()
 
 
 def test_clearance_is_measured_to_walls_and_failed_robots() -> None:
@@ -160,8 +160,8 @@ def test_records_under_conditions_are_saved_and_loaded(tmp_path: Path) -> None:
     record.save(tmp_path)
     loaded = Record.load(tmp_path)
     assert loaded.conditions == conditions
-    np.testing.assert_array_equal(loaded.working, record.working)
-    assert loaded.snapshot(30).working is not None
+    np.testing.assert_array_equal(loaded.is_working, record.is_working)
+    assert loaded.snapshot(30).is_working is not None
     simulation = Simulation(loaded.environment, Rapf(), loaded.positions[0], conditions=loaded.conditions)
     assert simulation.run(0.5).positions.tobytes() == record.positions.tobytes()
 
@@ -171,7 +171,7 @@ def test_starts_of_robots_that_join_later_may_overlap() -> None:
     with pytest.raises(StartError, match="overlap"):
         Simulation(HALL, Rapf(), starts)
     record = Simulation(HALL, Rapf(), starts, conditions=Conditions(joins=((2, 1.0),))).run(2.0)
-    assert record.working[-1].all()
+    assert record.is_working[-1].all()
     with pytest.raises(ParameterError, match="expected a robot from 1 to 3, got robot 4"):
         Simulation(HALL, Rapf(), starts, conditions=Conditions(joins=((4, 1.0),)))
 
@@ -196,9 +196,9 @@ def test_robots_that_failed_earlier_remain_obstacles() -> None:
     for step in range(12):
         changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
     assert changing.failed_robots[:, :2].tolist() == STARTS[[0, 2]].tolist()
-    assert changing.working.tolist() == [False, True, False, True]
+    assert changing.is_working.tolist() == [False, True, False, True]
     with pytest.raises(ValueError, match="read-only"):
-        changing.working[...] = True
+        changing.is_working[...] = True
 
 
 def test_robots_that_join_at_one_position_stand_next_to_each_other() -> None:
@@ -215,5 +215,5 @@ def test_a_robot_that_joins_and_fails_within_a_step_is_never_present() -> None:
     changing = build_world(Conditions(joins=((2, 0.21),), failures=((2, 0.22),)))
     for step in range(8):
         changing.step(np.zeros((4, 2)), 0.05, time=step * 0.05)
-        assert changing.working.tolist() == [True, False, True, True]
+        assert changing.is_working.tolist() == [True, False, True, True]
         assert len(changing.failed_robots) == 0

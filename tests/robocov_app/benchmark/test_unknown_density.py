@@ -51,7 +51,7 @@ CLOSURE = """
         values = np.ones(len(seen.positions))
         for cell in seen.density_sensor._measure.__closure__ or ():
             if isinstance(cell.cell_contents, rc.Density):
-                values = values * cell.cell_contents.max_value
+                values = values * cell.cell_contents.upper_bound
 """
 """Robots look for the density in the variables of their sensor."""
 
@@ -59,7 +59,7 @@ MEMORY = """
         values = np.ones(len(seen.positions))
         for candidate in gc.get_objects():
             if isinstance(candidate, rc.Gaussians):
-                values = values * candidate.max_value
+                values = values * candidate.upper_bound
 """
 """Robots look for the density among all objects of the process."""
 

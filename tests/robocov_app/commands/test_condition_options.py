@@ -59,7 +59,7 @@ def test_a_run_under_conditions_can_be_repeated_from_its_record(
     assert saved["failures"] == [{"robot": 2, "time_s": 0.5}]
     assert saved["seed"] == 4
     record = Record.load(tmp_path / "a")
-    assert record.working[-1].tolist() == [True, False, True]
+    assert record.is_working[-1].tolist() == [True, False, True]
     simulation = Simulation(
         record.environment, Rapf(), record.positions[0], record.team, conditions=record.conditions
     )
@@ -107,5 +107,5 @@ def test_a_changed_joining_position_is_reported(tmp_path: Path, capsys: pytest.C
     (event,) = run["events"]
     assert event["kind"] == "join"
     assert event["robot"] == 6
-    assert event["requested_m"] == [1.0, 8.0]
+    assert event["requested_position_m"] == [1.0, 8.0]
     assert run["summary"]["path_length_m"][5] < 0.5

@@ -138,7 +138,7 @@ def test_a_failing_robot_does_not_change_the_rewards_of_the_others(cluttered: En
     forces[0] = 1.0, 0.5
     for _ in range(8):
         rewards.append(episode.advance(forces).rewards)
-        working.append(episode.working.tolist())
+        working.append(episode.is_working.tolist())
     assert working[3] == [True] * 3
     assert working[5] == [True, True, False]
     first_failed = next(k for k, row in enumerate(working) if not row[2])
@@ -155,7 +155,7 @@ def test_an_episode_continues_without_working_robots(empty: Environment) -> None
     failures = Conditions(failures=tuple((k, 0.15) for k in (1, 2, 3)))
     episode = start_episode(empty, conditions=failures)
     rewards = take_random_actions(episode, 4)
-    assert not episode.working.any()
+    assert not episode.is_working.any()
     assert not np.array(rewards[2:]).any()
     assert np.isfinite(episode.build_rows()).all()
 

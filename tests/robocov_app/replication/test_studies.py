@@ -117,7 +117,7 @@ class TestMaps:
         assert first.environment == again.environment
         density = first.environment.density
         assert density is not None and not density.is_uniform
-        assert (density.min_value, density.max_value) == (1.0, 41.0)
+        assert (density.lower_bound, density.upper_bound) == (1.0, 41.0)
 
     @both
     def test_gains_are_tuned_on_separate_maps_and_starts(self, plan):

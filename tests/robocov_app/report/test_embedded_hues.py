@@ -54,11 +54,11 @@ def test_small_teams_have_a_hue_for_each_robot() -> None:
 def test_failed_robots_have_no_cell() -> None:
     record = build_moving_record(12)
     positions = record.positions[::5].copy()
-    working = np.ones(positions.shape[:2], dtype=bool)
-    working[:, 3] = False
+    is_working = np.ones(positions.shape[:2], dtype=bool)
+    is_working[:, 3] = False
     positions[:, 3] = np.nan
-    hues = list_hues(embed_hues(record, positions, working), range(len(positions)))
-    robots = np.flatnonzero(working[0])
+    hues = list_hues(embed_hues(record, positions, is_working), range(len(positions)))
+    robots = np.flatnonzero(is_working[0])
     for hue, row in zip(np.array(hues), positions[:, robots], strict=True):
         first, second = robots[partition(row, record.environment.region).adjacency.T]
         assert (hue[first] != hue[second]).all()

@@ -158,7 +158,7 @@ def describe_density(density: Density | None) -> str:
     kind = density.kind
     if isinstance(density, WeightedPolygons):
         kind = format_count(len(density.areas), "area")
-    return f"{kind}, {density.min_value:g} to {density.max_value:g}"
+    return f"{kind}, {density.lower_bound:g} to {density.upper_bound:g}"
 
 
 def _build_kind_error(density: Density, reason: str = "") -> MapError:
@@ -197,7 +197,7 @@ def _get_base(density: Density | None) -> float:
     if isinstance(density, WeightedPolygons):
         return density.background
     if density.is_uniform:
-        return density.max_value
+        return density.upper_bound
     raise _build_kind_error(density)
 
 

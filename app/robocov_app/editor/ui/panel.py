@@ -51,7 +51,7 @@ FACT_HEIGHT_PX = 18.0
 MAX_SHORT_LABEL = 2  # number of characters
 MAX_MEDIUM_LABEL = 6
 MAX_PROBLEMS = 200  # number of problems that are listed
-MAX_PROBLEM_COUNT = 99  # largest number of problems in the title of their page
+MAX_PROBLEM_COUNT = 99  # maximum number of problems in the title of their page
 NOTHING_SELECTED = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab selects the next; Ctrl+A selects all."

@@ -217,7 +217,7 @@ class EditorWindow(CommandWindow):
         self.editor.snapper.close()
 
     def build_frame_key(self) -> object:
-        """Return everything that can change the frame without an event; None to redraw it in any case."""
+        """Return everything that can change the frame without an event; None to redraw it always."""
         editor = self.editor
         canvas = self.canvas
         dialog = editor.dialogs.current

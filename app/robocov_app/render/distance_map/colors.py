@@ -25,7 +25,7 @@ def choose_color_limit(distance: float) -> float:
     Parameters
     ----------
     distance : float, m
-        Largest distance to show.
+        Maximum distance to show.
 
     Returns
     -------

@@ -203,7 +203,7 @@ def compute_grid_distances(plan: Plan) -> tuple[float, float, float, float]:
     Returns
     -------
     tuple of float, m
-        The smallest and largest distance from a wall at which the repulsion is 1 N, and the smallest and
+        The minimum and maximum distance from a wall at which the repulsion is 1 N, and the smallest and
         largest distance from the goal at which the attraction drives a robot at full speed.
     """
     wall_distances = [

@@ -53,7 +53,7 @@ def add_references(
 
 def _is_static(record: Record) -> bool:
     """Return whether neither the team nor the map of a run changes."""
-    is_team_complete = bool(record.present.all() and record.working.all())
+    is_team_complete = bool(record.is_present.all() and record.is_working.all())
     return is_team_complete and not record.environment.has_moving_obstacles
 
 

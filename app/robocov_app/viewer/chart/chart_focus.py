@@ -16,7 +16,7 @@ _SLIDER_MARGIN_PX = 10.0
 class ChartFocus(BasicFocusGroup):
     """Gives the focus to parts of the chart: time slider, button and branches.
 
-    The arrow keys move the time in any case, so the time slider needs no keys of its own.
+    The arrow keys always move the time, so the time slider needs no keys of its own.
 
     Parameters
     ----------

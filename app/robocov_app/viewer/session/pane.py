@@ -165,7 +165,7 @@ class Pane:
         if not setup.follows_schedule or setup.conditions is None:
             return False
         simulation = self.simulation
-        numbers = tuple((np.flatnonzero(simulation.working) + 1).tolist())
+        numbers = tuple((np.flatnonzero(simulation.is_working) + 1).tolist())
         if numbers == setup.numbers:
             return False
         has_failed = setup.conditions.find_failed_robots(simulation.time, setup.scheduled_robots)

@@ -28,7 +28,7 @@ from robocov.voronoi.sampled_cells import compute_sample_centroids, find_own_sam
 NO_SQUARE = -1
 """Index that stands for no square."""
 _MIN_RELATIVE_MASS = 1e-6
-"""Lower limit of the mass of a square, relative to an unknown one.
+"""Minimum mass of a square, relative to an unknown one.
 
 Without it, the centroid of a cell in which φ is zero would be undefined.
 """

@@ -24,9 +24,9 @@ _OUTLIER_SIGMAS = 6.0
 _MIN_FIXES = 10
 """Number of fixes from which the noise can be estimated."""
 _MIN_DISTANCE_M = 1e-9
-"""Lower limit of distances in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _MIN_SIGMA_M = 1e-9
-"""Lower limit of standard deviations in divisions."""
+"""Minimum divisor; prevents division by zero."""
 _SENT_TOLERANCE_S = 1e-6
 """Minimum difference between the times at which two messages were sent; smaller ones are due to rounding."""
 _MANEUVER_FRACTION = 0.5

@@ -38,7 +38,7 @@ _MAX_EVASION_SPEED = 0.3
 _EVASION_RANGE_M = 1.5
 """Distance from which robots pass each other on the left."""
 _MIN_DISTANCE_M = 1e-9
-"""Lower limit of distances in divisions."""
+"""Minimum divisor; prevents division by zero."""
 
 
 class RouteProgress(NamedTuple):

@@ -33,23 +33,23 @@ MIN_CELL_SIZE_M = 0.05
 MAX_MAP_CELLS = 1_000_000
 """Maximum number of cells of a map."""
 MAX_SILENCE_S = 5.0
-"""Time for which a robot must be silent to count as missing, if it would be heard at its assumed position."""
+"""Silence after which a robot counts as missing, if it should be within communication range."""
 CERTAIN_RANGE_FRACTION = 0.8
-"""Fraction of the communication range within which a robot would certainly be heard."""
+"""Fraction of the communication range within which messages of a robot would certainly arrive."""
 
 _REFINEMENT_RADIUS = 1.5
-"""Maximum distance of nearby nodes from a chosen candidate, in spacings of candidates."""
+"""Maximum distance of nearby nodes from a chosen candidate, in candidate spacings."""
 
 
 class Group(NamedTuple):
-    """The k robots that a robot plans for: itself and those that it hears or has heard."""
+    """The k robots that a robot plans for: itself and the robots it has received messages from."""
 
     robots: IntArray
     """(k,) Indices of the robots, ascending."""
     positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
     heard_times: FloatArray
-    """(k,) s, times at which they were last heard."""
+    """(k,) s, times of their last messages."""
 
 
 class Placement(NamedTuple):
@@ -80,7 +80,7 @@ class Plan:
 
 
 class Situation(NamedTuple):
-    """Situation of a robot that plans for k robots: itself and those that it has heard."""
+    """Situation of a robot that plans for k robots: itself and the robots it has received messages from."""
 
     positions: FloatArray
     """(k, 2) m, known or assumed positions of the robots."""
@@ -201,7 +201,7 @@ class Candidates(NamedTuple):
         """
         map_window = situation.planner.map_window
         positions = self.positions[chosen]
-        # Candidates are farther apart than nodes.
+        # Candidate spacing, estimated from the ratio of nodes to candidates.
         spacing = map_window.spacing * math.sqrt(np.count_nonzero(weights) / len(self.positions))
         squared_distances = ((map_window.nodes[:, None] - positions) ** 2).sum(axis=2).min(axis=1)
         is_close = map_window.has_clearance & (squared_distances < (_REFINEMENT_RADIUS * spacing) ** 2)
@@ -244,7 +244,7 @@ class SharedMapMemory:
     plans: tuple[Plan | None, ...]
     """The last plan of each robot; None before the first one."""
     routes: tuple[FloatArray, ...]
-    """Waypoints of each robot, (w, 2) m. The last one is its goal."""
+    """Waypoints of each robot, (w, 2) m. The last one is its goal. Empty before the first plan."""
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     next_plan_time: float = -math.inf
@@ -260,7 +260,7 @@ class SharedMapMemory:
 
 @dataclass(frozen=True)
 class SharedMapController(BaseController):
-    """Base class of controllers in which each robot plans for itself and all robots that it hears.
+    """Base class of controllers in which each robot plans for itself and the robots it hears from.
 
     Robots scan twice a second, and send each other their scans (see the module `scan_exchange`): 542 bytes
     for each scan, and with six robots 81 bytes for a digest of the scans that a robot has. Every `period`
@@ -284,13 +284,27 @@ class SharedMapController(BaseController):
 
     @abstractmethod
     def compute_placement(self, situation: Situation) -> Placement:
-        """Compute the goals of the robots of a group."""
+        """Compute the goals of the robots of a group. Subclasses implement this method.
+
+        It is called when a robot plans, unless its last plan is final and still valid.
+
+        Parameters
+        ----------
+        situation : Situation
+            Positions of the k robots of the group, and the map on which to plan.
+
+        Returns
+        -------
+        Placement
+            Goals of the k robots, in the order of their positions.
+        """
 
     def begin(self, region: Region, team: Team) -> SharedMapMemory:
-        """Return the memory of robots that know neither walls nor other robots."""
+        """Return the initial memory, with no walls or other robots known."""
         n = len(team)
         return SharedMapMemory(
             team=team,
+            # A radius of None: only the cells that rays cross are marked free.
             exchange=ScanExchange.build_empty(build_unknown_map(region), n, robot_radii=[None] * n),
             plans=(None,) * n,
             routes=(),
@@ -300,7 +314,7 @@ class SharedMapController(BaseController):
     def decide(self, seen: Observations, memory: SharedMapMemory) -> Decision:
         """Compute the forces along the routes to the robots' own goals in their plans."""
         exchange = memory.exchange.receive(seen)
-        # The first plan follows the first scans by one step, in which they arrive; so do later ones.
+        # Scans arrive one step after they are taken, so robots plan one step after each scan.
         if exchange.has_scans and seen.time >= memory.next_plan_time - TIME_TOLERANCE_S:
             exchange = exchange.update_maps(range(len(seen.positions)))
             memory = self._plan_routes(seen, replace(memory, exchange=exchange))
@@ -373,7 +387,7 @@ class SharedMapController(BaseController):
     ) -> Plan:
         """Return the plan of a robot with a radius and a sensing range in m, for its group.
 
-        A final plan that is still valid is returned with the present positions of the group.
+        A final plan that is still valid is returned with the current positions of the group.
         """
         if previous_plan is not None and _is_still_valid(previous_plan, known_map, seen.density, group):
             return replace(previous_plan, group=group)

@@ -68,7 +68,7 @@ class Sightings:
         """
         positions = self.positions.copy()
         times = self.times.copy()
-        pairs = seen.find_near_neighbors(np.inf)
+        pairs = seen.find_neighbors()
         positions[pairs.robots, pairs.neighbors] = seen.positions[pairs.robots] - pairs.offsets
         times[pairs.robots, pairs.neighbors] = seen.time
         distances = np.sqrt(((positions - seen.positions[:, None]) ** 2).sum(axis=2))

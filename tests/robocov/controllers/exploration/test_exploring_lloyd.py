@@ -28,8 +28,8 @@ class SensedDensity(Density):
     """The density PEAK, which may only be evaluated within the sensing range of a robot."""
 
     kind: ClassVar[str] = "sensed"
-    min_value = PEAK.min_value
-    max_value = PEAK.max_value
+    lower_bound = PEAK.lower_bound
+    upper_bound = PEAK.upper_bound
 
     def __init__(self, positions: FloatArray, sensing_range: float) -> None:
         self.positions = positions
