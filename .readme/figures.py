@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from PIL import Image
+from small_images import reduce_colors
 
 from robocov_app.benchmark import suite
 from robocov_app.cli import main
@@ -29,12 +31,10 @@ FIGURES = {
 """File in the result folder of the command that is shown."""
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 """Tracks of the benchmark whose maps are the large plans."""
-PLAN_COLORS = 16
-"""Number of colors of the figure of the large plans, which contains shades of two colors only."""
+FIGURE_SHADES = 256
+PLAN_SHADES = 16
+"""Numbers of colors of a figure with a color scale, and of the plans, which contain shades of two colors."""
 WIDTH_PX = 1400
-SHADED = Image.Quantize.MEDIANCUT
-COLORED = Image.Quantize.FASTOCTREE
-"""Choices of the colors of an image: the first suits shades, the second keeps the hues of lines apart."""
 SUFFIXES = {"light": "", "dark": "-dark"}
 
 
@@ -45,8 +45,12 @@ def draw_figure(name: str, theme: str) -> None:
         status = main([*COMMANDS[name], "--theme", theme, "--out", str(out)])
         if status:
             raise SystemExit(status)
-        method = COLORED if FIGURES[name] == "trajectories.png" else SHADED
-        save_small_image(out / FIGURES[name], f"{name}{SUFFIXES[theme]}.png", method=method)
+        image = resize_image(out / FIGURES[name])
+    if FIGURES[name] == "trajectories.png":
+        image = reduce_colors(np.asarray(image))
+    else:
+        image = reduce_shades(image, FIGURE_SHADES)
+    image.save(PICTURES / f"{name}{SUFFIXES[theme]}.png", optimize=True)
 
 
 def draw_large_plans(theme: str) -> None:
@@ -56,16 +60,20 @@ def draw_large_plans(theme: str) -> None:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "plans.png"
         save_figure(figure, path)
-        save_small_image(path, f"plans{SUFFIXES[theme]}.png", colors=PLAN_COLORS)
+        image = reduce_shades(resize_image(path), PLAN_SHADES)
+    image.save(PICTURES / f"plans{SUFFIXES[theme]}.png", optimize=True)
 
 
-def save_small_image(source: Path, name: str, colors: int = 256, method: Image.Quantize = SHADED) -> None:
-    """Reduce an image to the width of the handbook and a number of colors, and save it."""
+def resize_image(source: Path) -> Image.Image:
+    """Return an image with the width of the handbook."""
     image = Image.open(source).convert("RGB")
     height = round(image.height * WIDTH_PX / image.width)
-    image = image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
-    image = image.quantize(colors, method=method, dither=Image.Dither.NONE)
-    image.save(PICTURES / name, optimize=True)
+    return image.resize((WIDTH_PX, height), Image.Resampling.LANCZOS)
+
+
+def reduce_shades(image: Image.Image, colors: int) -> Image.Image:
+    """Reduce an image that consists of shades of a few colors to a number of colors."""
+    return image.quantize(colors, dither=Image.Dither.NONE)
 
 
 if __name__ == "__main__":

@@ -10,10 +10,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import imageio_ffmpeg
-import numpy as np
 import pygame
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from small_images import reduce_colors
 
 from robocov.mapfile import find_map_file, load_map
 from robocov_app.editor.edits.create import add_rectangle
@@ -36,9 +35,6 @@ DIALOG_SIZE = (900, 600)
 METERS_PER_PIXEL = 0.025
 """Scale of the floor plan in the import dialog."""
 BLUE = (74, 111, 165)
-PALETTE_SIZE = 256
-EXACT_COLORS = 64
-"""Number of the most frequent colors that screenshots contain exactly."""
 
 
 def draw_window(theme: str, name: str) -> None:
@@ -138,37 +134,6 @@ def draw_import_dialog(theme: str, name: str) -> None:
 def save_screenshot(window: ViewerWindow | EditorWindow, file: Path) -> None:
     """Save a screenshot of a window as a small file."""
     reduce_colors(copy_pixels(window.screen)).save(file, optimize=True)
-
-
-def reduce_colors(pixels: NDArray[np.uint8]) -> Image.Image:
-    """Reduce an image to 256 colors: the most frequent ones exactly, and an approximation of the rest.
-
-    Large areas keep their colors exactly, and small ones, such as arrows, approximately.
-
-    Parameters
-    ----------
-    pixels : (height, width, 3) uint8 array
-
-    Returns
-    -------
-    Image.Image
-    """
-    colors, indices, counts = np.unique(
-        pixels.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
-    )
-    order = np.argsort(-counts)
-    exact = colors[order[:EXACT_COLORS]]
-    rare = Image.fromarray(colors[order[EXACT_COLORS:]][None])
-    approximate_count = PALETTE_SIZE - EXACT_COLORS
-    values = rare.quantize(approximate_count, method=Image.Quantize.MAXCOVERAGE).getpalette()
-    assert values is not None
-    approximate = np.reshape(values, (-1, 3))[:approximate_count]
-    palette = np.concatenate([exact, approximate])
-    offsets = colors[:, None].astype(int) - palette
-    nearest = (offsets**2).sum(axis=2).argmin(axis=1).astype(np.uint8)
-    image = Image.fromarray(nearest[indices].reshape(pixels.shape[:2]), "P")
-    image.putpalette(palette.astype(np.uint8).tobytes())
-    return image
 
 
 def record_tour(name: str) -> None:

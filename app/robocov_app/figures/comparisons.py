@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from robocov.record import Record
+from robocov.typing import FloatArray
 from robocov_app.figures import map_drawing, run_drawing
 from robocov_app.figures.contact_points import find_contact_points
 from robocov_app.figures.extent import Extent, enclose_maps
@@ -112,25 +114,70 @@ def plot_comparison(
     -------
     matplotlib.figure.Figure
     """
-    theme = get_theme(theme)
-    extent = enclose_maps(record.environment for record in records)
-    contacts = [find_contact_points(record) for record in records]
-    legends = [
-        run_drawing.build_run_handles(record, theme, colors, contacts=points)
-        for record, points in zip(records, contacts, strict=True)
-    ]
-    handles = merge_legends(legends, map_drawing.get_label)
+    contents = _Contents(
+        records=records,
+        contacts=[find_contact_points(record) for record in records],
+        mean_distances=mean_distances,
+        mean_times=mean_times,
+        theme=get_theme(theme),
+        colors=colors,
+    )
+    handles = contents.build_handles()
+    figure, drawn_handles = _draw_page(contents, size, handles)
+    if size is None and len(drawn_handles) < len(handles):
+        # A legend with fewer entries may need less space.
+        figure, _ = _draw_page(contents, size, drawn_handles)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Contents:
+    """What a comparison shows.
+
+    Attributes
+    ----------
+    records : sequence of Record
+    contacts : list of (c, 2) array, m
+        Points at which contacts of each run began.
+    mean_distances, mean_times : sequence of float or None
+        Costs of the final positions, m and s; None if they are unknown.
+    theme : Theme
+    colors : {"robots", "paper"}
+    """
+
+    records: Sequence[Record]
+    contacts: list[FloatArray]
+    mean_distances: Sequence[float | None] | None
+    mean_times: Sequence[float | None] | None
+    theme: Theme
+    colors: ColorScheme
+
+    def build_handles(self) -> list[Artist]:
+        """Build the legend entries for all that the runs may contain."""
+        legends = [
+            run_drawing.build_run_handles(record, self.theme, self.colors, contacts=points)
+            for record, points in zip(self.records, self.contacts, strict=True)
+        ]
+        return merge_legends(legends, map_drawing.get_label)
+
+
+def _draw_page(
+    contents: _Contents, size: tuple[int, int] | None, handles: list[Artist]
+) -> tuple[Figure, list[Artist]]:
+    """Draw a comparison with space for a legend; return the page, and the entries that the legend needs."""
+    theme = contents.theme
+    extent = enclose_maps(record.environment for record in contents.records)
     page = _create_page(size, theme)
-    captions = _build_captions(page, records, mean_distances, mean_times)
+    captions = _build_captions(page, contents)
     grid = _choose_grid(page, captions, extent.aspect)
     if size is None:
         height = grid.compute_page_height(page, handles, _MAX_PAGE_HEIGHT_PX)
         page = FigurePage((PAGE_WIDTH_PX, height), theme, PAGE_SCALE)
     panels = grid.arrange(page, handles)
     all_axes = []
-    for record, points, panel in zip(records, contacts, panels, strict=True):
+    for record, points, panel in zip(contents.records, contents.contacts, panels, strict=True):
         axes = _add_panel_axes(page, panel, extent)
-        run_drawing.draw_run(axes, record, theme, colors, contacts=points)
+        run_drawing.draw_run(axes, record, theme, contents.colors, contacts=points)
         all_axes.append(axes)
     _write_captions(page, captions, panels, grid)
     drawn_handles = run_drawing.select_drawn(handles, all_axes)
@@ -138,7 +185,7 @@ def plot_comparison(
     if captions.fit_in_one_line(grid.caption_width):
         boxes = [panel.box._replace(width=max(panel.box.width, panel.caption_width)) for panel in panels]
     page.draw_footer(drawn_handles, boxes, panels[0].box.width / extent.width)
-    return page.figure
+    return page.figure, drawn_handles
 
 
 def _create_page(size: tuple[int, int] | None, theme: Theme) -> FigurePage:
@@ -186,18 +233,14 @@ def _write_captions(
     write_heading(page, captions.shared, panels[0].box, grid.caption_height + _HEADING_RISE * page.scale)
 
 
-def _build_captions(
-    page: FigurePage,
-    records: Sequence[Record],
-    mean_distances: Sequence[float | None] | None,
-    mean_times: Sequence[float | None] | None,
-) -> _Captions:
+def _build_captions(page: FigurePage, contents: _Contents) -> _Captions:
     """Build the captions; facts that all runs have in common are only in the heading of the page."""
+    records = contents.records
     unknown = [None] * len(records)
     costs = [
         format_run_cost(record, distance, time)
         for record, distance, time in zip(
-            records, mean_distances or unknown, mean_times or unknown, strict=True
+            records, contents.mean_distances or unknown, contents.mean_times or unknown, strict=True
         )
     ]
     facts = [

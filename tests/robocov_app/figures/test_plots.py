@@ -196,6 +196,13 @@ class TestComparison:
         order = ["final position", "cell centroid", "final Voronoi cell"]
         assert [text for text in list_legend_texts(figure) if text in order] == order
 
+    def test_entries_that_are_not_drawn_leave_no_space_in_the_legend(self):
+        record = record_walk(ROOMS, 3)
+        at_goals = replace(record, goals=record.positions)
+        without_goals = replace(record, goals=np.full_like(record.goals, np.nan))
+        heights = [plot_comparison([item, record]).bbox.height for item in (at_goals, without_goals)]
+        assert heights[0] == heights[1]
+
     def test_texts_are_legible_at_half_the_size(self):
         figure = plot_comparison([record_walk(ROOMS, 3)] * 3)
         assert figure.bbox.width == pytest.approx(1600, abs=0.1)
