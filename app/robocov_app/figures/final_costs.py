@@ -19,7 +19,7 @@ from robocov_app.figures.dot_rows import (
     label_rows,
 )
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TEXT, ValueAxis, get_figure, set_value_limits, to_plot_color
+from robocov_app.figures.page import TEXT, PlotColor, ValueAxis, get_figure, set_value_limits, to_plot_color
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
@@ -105,28 +105,32 @@ def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], 
 
 
 def _draw_sample(axes: Axes, values: FloatArray, row: float, style: CurveStyle, theme: Theme) -> None:
-    """Draw one row of sorted values: points, median, and a box with whiskers if there are enough values."""
+    """Draw one row of sorted values: points, and a box and the median if there are enough values."""
     if not len(values):
         return
     draw_row_points(axes, values, row, style, theme)
-    low, middle, high = np.percentile(values, [25, 50, 75])
     if len(values) >= MIN_BOX_VALUES:
-        color = to_plot_color(style.get_color(theme))
-        max_length = _WHISKER_LENGTH * (high - low)
-        start = values[values >= low - max_length].min()
-        end = values[values <= high + max_length].max()
-        line: dict[str, Any] = {"color": color, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
-        axes.plot([start, low], [row, row], **line)
-        axes.plot([high, end], [row, row], **line)
-        top = row - HALF_BOX_HEIGHT
-        bottom = row + HALF_BOX_HEIGHT
-        axes.fill(
-            [low, high, high, low],
-            [top, top, bottom, bottom],
-            facecolor=(*color, 0.14),
-            edgecolor=color,
-            linewidth=1.4,
-            zorder=2,
-        )
+        _draw_box(axes, values, row, to_plot_color(style.get_color(theme)))
     if len(values) > 1:
-        draw_row_median(axes, float(middle), row, theme)
+        draw_row_median(axes, float(np.median(values)), row, theme)
+
+
+def _draw_box(axes: Axes, values: FloatArray, row: float, color: PlotColor) -> None:
+    """Draw a box between the quartiles of values, with whiskers."""
+    low, high = np.percentile(values, [25, 75])
+    max_length = _WHISKER_LENGTH * (high - low)
+    start = values[values >= low - max_length].min()
+    end = values[values <= high + max_length].max()
+    line: dict[str, Any] = {"color": color, "linewidth": 1.4, "solid_capstyle": "butt", "zorder": 3}
+    axes.plot([start, low], [row, row], **line)
+    axes.plot([high, end], [row, row], **line)
+    top = row - HALF_BOX_HEIGHT
+    bottom = row + HALF_BOX_HEIGHT
+    axes.fill(
+        [low, high, high, low],
+        [top, top, bottom, bottom],
+        facecolor=(*color, 0.14),
+        edgecolor=color,
+        linewidth=1.4,
+        zorder=2,
+    )
