@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from driven_window import Driver, open_viewer
+from hypothesis import given
+from hypothesis import strategies as st
 
 from robocov_app.render.canvas import Canvas
-from robocov_app.viewer.chart.curves import map_curve_colors
+from robocov_app.viewer.chart.curves import map_curve_colors, simplify_points
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window.screen_video import copy_pixels
 
@@ -124,3 +127,22 @@ def test_values_of_the_past_are_shown_at_once(driver: Driver) -> None:
     assert not np.array_equal(
         copy_pixels(driver.window.screen)[top : top + height, width - 150 : width], live
     )
+
+
+def test_points_on_straight_sections_are_left_out() -> None:
+    """Segments of a curve overlap at their ends, which would be visible as dots."""
+    x = np.arange(100.0)
+    y = np.where(x < 50.0, 20.0, 20.0 + (x - 50.0))
+    points = simplify_points(np.column_stack([x, y]))
+    assert points.tolist() == [[0.0, 20.0], [50.0, 20.0], [99.0, 69.0]]
+
+
+@given(st.lists(st.floats(0.0, 100.0), min_size=2, max_size=60))
+def test_a_simplified_curve_differs_by_less_than_a_pixel(rows: list[float]) -> None:
+    columns = 3.0 * np.arange(len(rows))
+    points = simplify_points(np.column_stack([columns, rows]))
+    assert points[0].tolist() == [columns[0], rows[0]]
+    assert points[-1].tolist() == [columns[-1], rows[-1]]
+    line = shapely.LineString(points)
+    distances = shapely.distance(line, shapely.points(columns, rows))
+    assert distances.max() < 0.25

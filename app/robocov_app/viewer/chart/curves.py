@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, mix
@@ -20,6 +21,8 @@ GHOST_REACH_PX = 6.0
 MIN_THINNED_POINTS = 400
 """Curves with at least this many points are thinned."""
 _MAX_POINTS_PER_PX = 1.5
+_MAX_SIMPLIFICATION_PX = 0.2
+"""Maximum distance of a point that is left out from the drawn curve."""
 _CURVE_WIDTH_PX = 1.8
 _DASH_STRETCH = 1.4  # dashes are longer than in figures, because the curves are short
 _GHOST_STRENGTH = 0.45
@@ -49,7 +52,7 @@ def draw_curves(canvas: Canvas, frame: ChartFrame, scale: ChartScale) -> None:
     width = canvas.scale_width(_CURVE_WIDTH_PX)
     for pane in panes:
         curve = pane.curves[frame.quantity.name]
-        points = thin_points(scale.to_points(curve.times, curve.values))
+        points = simplify_points(thin_points(scale.to_points(curve.times, curve.values)))
         if len(points) > 1:
             style = styles[pane.number]
             dashes = [_DASH_STRETCH * width * length for length in style.list_dash_lengths()]
@@ -128,3 +131,14 @@ def thin_points(points: FloatArray) -> FloatArray:
     columns = np.rint(points[:, 0] * _MAX_POINTS_PER_PX)
     is_last_in_column = np.append(columns[1:] != columns[:-1], True)
     return np.asarray(points[is_last_in_column])
+
+
+def simplify_points(points: FloatArray) -> FloatArray:
+    """Leave out points of a curve, (k, 2) px, that lie on a straight line between others.
+
+    Antialiased segments overlap at their ends, which would be visible as dots along a straight section.
+    """
+    if len(points) < 3:
+        return points
+    curve = shapely.simplify(shapely.LineString(points), _MAX_SIMPLIFICATION_PX, preserve_topology=False)
+    return np.asarray(shapely.get_coordinates(curve))
