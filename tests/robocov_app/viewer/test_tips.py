@@ -47,6 +47,16 @@ def test_tips_are_below_their_widget_or_beside_its_page() -> None:
 
 
 @pytest.mark.usefixtures("driver")
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_tips_beside_the_page_are_not_above_it(side: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise, the top bar would cover the title of the first tool's tip."""
+    page = pygame.Rect(260, 75, 60, 300)
+    monkeypatch.setitem(globals(), "PAGE", page)
+    tip = find_tip_box("Hand (V)\nClick or drag a robot\nor an obstacle\nor the floor", side=side)
+    assert tip.top == page.top
+
+
+@pytest.mark.usefixtures("driver")
 @pytest.mark.parametrize("page", [pygame.Rect(0, 40, 600, 300), pygame.Rect(0, 60, 600, 340)])
 def test_without_space_beside_the_page_tips_are_below_or_above_it(
     page: pygame.Rect, monkeypatch: pytest.MonkeyPatch

@@ -151,14 +151,16 @@ def _place_box(
 ) -> Rect:
     """Return the box of a tip at a distance from its page, px, inside the window; see `draw_tool_tip`."""
     box = Rect((0, 0), size)
+    # Above its page, the top bar would cover a tip.
+    below_top_of_page = Rect(window.left, page.top, window.width, window.bottom - page.top)
     if side == "right":
         box.midleft = page.right + distance, widget.centery
         if box.right <= window.right:
-            return box.clamp(window)
+            return box.clamp(below_top_of_page)
     elif side == "left":
         box.midright = page.left - distance, widget.centery
         if box.left >= window.left:
-            return box.clamp(window)
+            return box.clamp(below_top_of_page)
     anchor = widget if side == "below" else page
     box.midtop = widget.centerx, anchor.bottom + distance
     if box.bottom > window.bottom:
