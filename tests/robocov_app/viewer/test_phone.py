@@ -235,6 +235,17 @@ def test_the_page_shows_the_state_of_the_window(upright_phone: Driver) -> None:
     assert controls.scroll_box == upright_phone.window.layout.panel
 
 
+def test_menus_have_rows_for_fingers_and_no_keys(phone: Driver) -> None:
+    run_page_command(phone, "share")
+    menu = phone.window.dialogs.current
+    options = [widget for widget in phone.window.dialogs.ui.widgets.values() if widget.kind == "option"]
+    assert len(options) == len([row for row in menu.rows if row is not None])
+    window = pygame.Rect((0, 0), phone.window.layout.size)
+    for option in options:
+        assert option.rect.height >= TARGET_PX * RATIO
+        assert window.contains(option.rect)
+
+
 def test_a_button_of_the_page_closes_what_covers_the_window(upright_phone: Driver) -> None:
     run_page_command(upright_phone, "share")
     assert upright_phone.window.dialogs.is_open

@@ -13,6 +13,7 @@ from robocov_app.toolkit.window.input import ENTER_KEYS
 
 # Lengths in pixels at scale 1.
 _ROW_PX = 24
+_FINGER_ROW_PX = 48
 _SEPARATOR_PX = 7
 _TEXT_MARGINS_PX = 50
 
@@ -30,6 +31,8 @@ class Menu(Dialog):
         Upper left corner; the menu moves if it does not fit there.
     run : callable
         Runs a command by its name.
+    is_for_fingers : bool
+        Whether rows are as high as fingers need them, and keys are left out, as on a phone.
 
     Attributes
     ----------
@@ -44,10 +47,16 @@ class Menu(Dialog):
     closes_on_outside_click = True
 
     def __init__(
-        self, rows: Sequence[Command | None], position: tuple[int, int], run: Callable[[str], object]
+        self,
+        rows: Sequence[Command | None],
+        position: tuple[int, int],
+        run: Callable[[str], object],
+        *,
+        is_for_fingers: bool = False,
     ) -> None:
         self.rows = rows
         self.highlighted = -1
+        self._is_for_fingers = is_for_fingers
         self._position = position
         self._run = run
 
@@ -58,16 +67,20 @@ class Menu(Dialog):
                 ui.row(height=_SEPARATOR_PX, below=0)
                 ui.cell()
                 continue
-            ui.row(height=_ROW_PX, below=0)
+            ui.row(height=_FINGER_ROW_PX if self._is_for_fingers else _ROW_PX, below=0)
             is_clicked = ui.option(
                 command.title,
-                command.key_text,
+                self._get_key_text(command),
                 key=command.name,
                 highlighted=number == self.highlighted,
                 disabled_reason=command.get_disabled_reason(),
             )
             if is_clicked:
                 self._choose(command)
+
+    def _get_key_text(self, command: Command) -> str:
+        """Return the key of a command at the right end of its row; empty on a phone."""
+        return "" if self._is_for_fingers else command.key_text
 
     def _choose(self, command: Command | None) -> None:
         self.is_done = True
@@ -106,7 +119,7 @@ class Menu(Dialog):
         title_size = round(TEXT_PX * scale)
         key_size = round(SMALL_TEXT_PX * scale)
         widths = [
-            measure_text(command.title, title_size) + measure_text(command.key_text, key_size)
+            measure_text(command.title, title_size) + measure_text(self._get_key_text(command), key_size)
             for command in self.rows
             if command is not None
         ]

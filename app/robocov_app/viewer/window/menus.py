@@ -69,7 +69,8 @@ class WindowMenus:
     def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
         """Open a menu of commands; an empty name separates two groups."""
         rows = [self._get_command(name) if name else None for name in names]
-        self._dialogs.ask(Menu(rows, pixel, self._run_command))
+        is_on_phone = self._viewer.view.is_compact
+        self._dialogs.ask(Menu(rows, pixel, self._run_command, is_for_fingers=is_on_phone))
 
     def _get_command(self, name: str) -> Command:
         """Return a command; that of the video says what it does now."""
