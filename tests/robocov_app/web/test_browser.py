@@ -409,6 +409,10 @@ def test_a_request_for_control_is_visible_above_the_invitation(browser, tmp_path
             assert browser.find("#invitation").is_displayed()
             student.request_control()
             browser.wait_until(lambda: browser.find("#toast").is_displayed())
+            _, toast_top, _, toast_height = browser.measure("#toast")
+            _, code_top, _, code_height = browser.measure("#invitation img")
+            assert toast_top + toast_height <= code_top, "phones can still read the code"
+            assert code_top + code_height < 720
             push_button(browser, "#toast button", "Hand over")
             browser.wait_until(lambda: "watching" in get_classes(browser))
         browser.find("#close-invitation").click()
