@@ -291,7 +291,7 @@ class Radio:
             Messages after the positions were exchanged.
         """
         if self._is_sending(step):
-            is_received = self._draw_reception_mask(step, true_positions, is_working)
+            is_received = self._sample_reception_mask(step, true_positions, is_working)
             if self._period_bytes is not None:
                 inbox, is_sender = self._allocate_bandwidth_to_positions(inbox)
                 is_received &= is_sender
@@ -536,7 +536,7 @@ class Radio:
         previous_periods = math.floor((step - 1) * periods_per_step + TIME_TOLERANCE_S)
         return periods > previous_periods
 
-    def _draw_reception_mask(self, step: int, positions: FloatArray, is_working: BoolArray) -> BoolArray:
+    def _sample_reception_mask(self, step: int, positions: FloatArray, is_working: BoolArray) -> BoolArray:
         """Return which robot (row) receives the position of which other robot (column), (n, n) bool.
 
         Robots receive each other within range, unless the message is lost at random.

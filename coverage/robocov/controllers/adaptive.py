@@ -89,9 +89,9 @@ class Adaptive(BaseController):
     plus `explore` standard deviations: with a positive number, robots are attracted by unvisited areas, and
     the computation takes several times as long.
 
-    The implementation is based on summaries of the papers, not on their full texts. It differs from the
-    paper as follows: implicit steps of `period` seconds, which are stable for all gains; cells and centroids
-    that are sampled on a lattice; w = 1; equal weights of all neighbors in the consensus.
+    We had only summaries of the papers, not their full texts; details may differ. Known differences from the
+    paper: implicit steps of `period` seconds, which are stable for all gains; cells and centroids that are
+    sampled on a lattice; w = 1; equal weights of all neighbors in the consensus.
 
     Examples
     --------
@@ -129,7 +129,7 @@ class Adaptive(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
-        """Return the memory of robots that have not measured anything yet."""
+        """Return the initial memory, without any measurements."""
         robot_count = len(team)
         # Gains are floats, even where they are whole numbers.
         functions_per_side = int(self.basis)

@@ -78,8 +78,8 @@ class Barrier(BaseController):
     be known. The square root is rounded over the last millimeter, and continued as an odd function within the
     safe distance, so robots that start too close to each other separate.
 
-    The implementation is based on summaries of the paper (IEEE T-RO 33, 661-674), not on the full text; h_ij
-    is taken from the documentation of MathWorks' barrier certificate block.
+    We had only summaries of the paper (IEEE T-RO 33, 661-674), not its full text; details may differ. h_ij is
+    taken from the documentation of MathWorks' barrier certificate block.
     """
 
     name = "barrier"

@@ -227,12 +227,11 @@ class Boosting(BaseController):
     trail is not boosted again, so the result is no worse than without boosts, apart from changes by
     other robots in the meantime.
 
-    The implementation is based on the abstracts of the paper (arXiv 1409.0776) and of its sequel by Welikala
-    and Cassandras (arXiv 1903.04133), and on summaries, not on the full texts. It differs from the papers as
-    follows. The map is not known: a robot uses its own scan, and assumes that a neighbor sees a point unless
-    the scan shows an obstacle in the line between them. Each robot is boosted when it comes to rest, without
-    synchronization. The trail, the durations, the values of the gains, and the avoidance of obstacles and
-    robots are our own.
+    We had only summaries and the abstracts of the paper (arXiv 1409.0776) and of its sequel by Welikala and
+    Cassandras (arXiv 1903.04133), not the full texts; details may differ. Known differences: the map is not
+    known: a robot uses its own scan, and assumes that a neighbor sees a point unless the scan shows an
+    obstacle in the line between them. Each robot is boosted when it comes to rest, without synchronization.
+    The trail, the durations, the values of the gains, and the avoidance of obstacles and robots are our own.
 
     Examples
     --------

@@ -68,8 +68,8 @@ class Diffeomorphism(WholeMapController):
     obstacles.
 
     We did not have the full text of the two papers ("A coverage algorithm for a class of non-convex regions",
-    CDC 2008; "Performing coverage on nonconvex domains", CCA 2008); details may differ. Here F is
-    piecewise linear, and obstacles become small areas instead of points.
+    CDC 2008; "Performing coverage on nonconvex domains", CCA 2008); details may differ. Here F is piecewise
+    linear, and obstacles become small areas instead of points.
     """
 
     name = "diffeomorphism"
@@ -88,7 +88,7 @@ class Diffeomorphism(WholeMapController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> DiffeomorphismMemory:
-        """Return the memory before the first plan; raise ParameterError if no robot fits into the map."""
+        """Return the initial memory; raise ParameterError if no robot fits into the map."""
         self._get_chart(team)
         return DiffeomorphismMemory(team)
 

@@ -21,7 +21,7 @@ _DIMENSIONLESS = "1"
 
 
 def update_name(name: str, known: Collection[str]) -> str:
-    """Return the present name of a gain or choice from a file, which may be of an earlier version.
+    """Return the current name of a gain or choice from a file, which may be of an earlier version.
 
     Examples
     --------
@@ -114,7 +114,7 @@ class Option:
     optional: ClassVar[bool] = False
 
     def validate(self, value: object, controller_name: str) -> str:
-        """Return the present name of a choice if the value is one of the choices.
+        """Return the current name of a choice if the value is one of the choices.
 
         Parameters
         ----------

@@ -74,8 +74,8 @@ class GeodesicLloyd(WholeMapController):
     Distances are exact, and cells are sampled on a lattice. Walls are enlarged by the radius of the robot and
     `clearance`; goals are moved into the remaining space, in which robots follow shortest paths.
 
-    The implementation is based on general knowledge, not on the full texts of the two papers, which compute
-    the Voronoi cells on a grid.
+    We did not have the full texts of the two papers, which compute the Voronoi cells on a grid; details may
+    differ.
     """
 
     name = "geodesic-lloyd"
@@ -92,7 +92,7 @@ class GeodesicLloyd(WholeMapController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> GeodesicMemory:
-        """Return the memory before the first plan; raise ParameterError if no robot fits into the map."""
+        """Return the initial memory; raise ParameterError if no robot fits into the map."""
         self._get_planner(team)
         return GeodesicMemory(team)
 

@@ -95,10 +95,10 @@ class GpUcb(BaseController):
     *Messages.* In each period, a robot sends at most 50 measurements, 4 + 10 k bytes for k of them, see
     `robocov.controllers.density_exchange`.
 
-    *Sources.* The controller follows what is generally known of Luo and Sycara (ICRA 2018), Benevento,
-    Santos, Notarstefano, Paynabar, Bloch and Egerstedt (ICRA 2020), and Santos, Madhushani, Benevento and
-    Leonard (MRS 2021); the bound with a weight β is that of Gaussian-process bandits (Krause and Ong 2011).
-    Of these papers, only abstracts and summaries were available. Known differences: one process instead of
+    *Sources.* The controller follows Luo and Sycara (ICRA 2018), Benevento, Santos, Notarstefano, Paynabar,
+    Bloch and Egerstedt (ICRA 2020), and Santos, Madhushani, Benevento and Leonard (MRS 2021); the bound with
+    a weight β is that of Gaussian-process bandits (Krause and Ong 2011). We had only abstracts and summaries
+    of these papers, not their full texts; details may differ. Known differences: one process instead of
     mixtures; robots exchange measurements instead of sending them to one place; a linear decrease of β
     instead of schedules from regret bounds, which grow with the logarithm of the number of measurements;
     fixed parameters of the kernel, apart from its scale; cells that are sampled on a lattice.
@@ -138,7 +138,7 @@ class GpUcb(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> GpUcbMemory:
-        """Return the memory of robots that have not measured anything."""
+        """Return the initial memory, without any measurements."""
         robot_count = len(team)
         grid = ProcessGrid.build(region, int(self.squares), self.correlation)
         square_count = len(grid.centers)

@@ -115,10 +115,9 @@ class RangeLimited(BaseController):
     The centroid is exact for the uniform density. Another density is integrated over a polygon whose chords
     replace the arcs (see `robocov.voronoi`).
 
-    The cells, the cost and its gradient are based on general knowledge, not on the full text of the paper
-    (ESAIM: COCV 11, 691-719). Two choices are our own: robots move straight to the centroid within their
-    limits, as with `Lloyd`, and r may be smaller than the communication range, which may be infinite in a
-    simulation.
+    We did not have the full text of the paper (ESAIM: COCV 11, 691-719); details may differ. Two choices are
+    our own: robots move straight to the centroid within their limits, as with `Lloyd`, and r may be smaller
+    than the communication range, which may be infinite in a simulation.
     """
 
     name = "range-limited"

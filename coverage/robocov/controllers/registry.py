@@ -199,7 +199,7 @@ def _describe_unknown_controller(name: str) -> str:
 
 
 def update_gain_names(controller: str, gains: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the gains in a file with the present names of gains and choices.
+    """Return the gains in a file with the current names of gains and choices.
 
     Parameters
     ----------

@@ -270,10 +270,9 @@ class Howard(BaseController):
     charge `k_obs`, so its effect does not depend on the number of rays. Before the first scan,
     a straight wall through the closest obstacle point is assumed.
 
-    The sum over all obstacles and robots, the inverse-square forces and the friction are based on general
-    knowledge, not on the full text of the paper. Three choices are our own: each ray carries a fraction of
-    the charge; forces do not grow below 5 cm; and robots repel all others within communication range, because
-    the range sensor does not detect robots.
+    We did not have the full text of the paper; details may differ. Three choices are our own: each ray
+    carries a fraction of the charge; forces do not grow below 5 cm; and robots repel all others within
+    communication range, because the range sensor does not detect robots.
     """
 
     name = "howard"
@@ -337,11 +336,11 @@ class Poduri(BaseController):
 
     At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
 
-    The two forces, their balance at η R_c and the degree of at least K are based on general knowledge, not on
-    the full text of the paper. The following choices are our own. If at most K robots are within η R_c of a
-    robot, the links to its K nearest neighbors are critical for it, before they are in danger. Robots know
-    only positions of others: each also keeps a link that is critical for the neighbor, according to the
-    positions that it knows. The closest obstacle point repels with (24), within `rho_obs`.
+    We did not have the full text of the paper; details may differ. The following choices are our own. If at
+    most K robots are within η R_c of a robot, the links to its K nearest neighbors are critical for it,
+    before they are in danger. Robots know only positions of others: each also keeps a link that is critical
+    for the neighbor, according to the positions that it knows. The closest obstacle point repels with (24),
+    within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
     able to stop within (1 - η) R_c.
@@ -505,11 +504,10 @@ class Dispersion(BaseController):
 
     Notes
     -----
-    The behaviors and their order are based on the paper's abstract and on general knowledge, not on the full
-    text; the formulas are our own. In the paper, robots move at constant speed and never come to rest. To
-    make placements comparable, `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so
-    that robots do not oscillate there. Each robot assumes that others may be as large as the largest of the
-    team.
+    We had only the paper's abstract, not its full text; details may differ. The formulas are our own. In the
+    paper, robots move at constant speed and never come to rest. To make placements comparable,
+    `explore_speed` is 0 by default, and the speed falls to zero at `reach`, so that robots do not oscillate
+    there. Each robot assumes that others may be as large as the largest of the team.
     """
 
     name = "dispersion"

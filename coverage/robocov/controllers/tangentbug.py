@@ -177,13 +177,13 @@ class TangentBug(BaseController):
 
     Notes
     -----
-    The implementation is based on the paper's abstract and on general knowledge, not on the full texts of the
-    papers. The following choices are our own. A robot's centroid moves with the robot, and would draw it back
-    from each detour; therefore the goal is fixed from the time when the robot starts to follow a boundary
-    until it is reached or given up. Because a boundary may be as long as the building, the robot follows it
-    for at most `detour` times the distance to its goal, and then returns. It tries again after its centroid
-    has moved by `moved`. Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots
-    slide along each other, and assume that others may be as large as the largest of the team.
+    We had only the paper's abstract, not the full texts of the papers; details may differ. The following
+    choices are our own. A robot's centroid moves with the robot, and would draw it back from each detour;
+    therefore the goal is fixed from the time when the robot starts to follow a boundary until it is reached
+    or given up. Because a boundary may be as long as the building, the robot follows it for at most `detour`
+    times the distance to its goal, and then returns. It tries again after its centroid has moved by `moved`.
+    Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along each
+    other, and assume that others may be as large as the largest of the team.
     """
 
     name = "tangentbug"

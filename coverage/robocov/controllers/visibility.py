@@ -71,10 +71,10 @@ class Visibility(BaseController):
     Arcs and occlusion edges are found in the robot's own scan; between scans, robots keep their velocities.
     The cell of a robot without neighbors in communication range is its whole view.
 
-    The implementation is based on the paper's abstract (Automatica 53, 195-207) and on general knowledge, not
-    on the full text. In the paper, robots send each other their views. Here they send positions, and a robot
-    assumes that a neighbor sees a point unless its own scan shows an obstacle in the line between the two.
-    Robots also slow down to avoid collisions, which is our own addition.
+    We had only the paper's abstract (Automatica 53, 195-207), not its full text; details may differ. In the
+    paper, robots send each other their views. Here they send positions, and a robot assumes that a neighbor
+    sees a point unless its own scan shows an obstacle in the line between the two. Robots also slow down to
+    avoid collisions, which is our own addition.
     """
 
     name = "visibility"

@@ -185,7 +185,7 @@ def divide_into_cells(request: MapRequest, rng: np.random.Generator) -> list[Cel
         if max(width, height) < 2.0 * street_width:
             return None
         street = _Street(
-            normal=_draw_normal(rng, tilt_deviation, is_upright=height > width),
+            normal=_sample_normal(rng, tilt_deviation, is_upright=height > width),
             width=street_width,
             widening_share=_compute_widening_share(block_count, request.obstacle_count),
         )
@@ -213,8 +213,8 @@ class _Street(NamedTuple):
     widening_share: float
 
 
-def _draw_normal(rng: np.random.Generator, tilt_deviation: float, *, is_upright: bool) -> Point:
-    """Draw the normal of a street that divides a cell, with a random tilt.
+def _sample_normal(rng: np.random.Generator, tilt_deviation: float, *, is_upright: bool) -> Point:
+    """Sample the normal of a street that divides a cell, with a random tilt.
 
     Without the tilt, the normal is parallel to the longer side of the cell, so that the street divides this
     side. `is_upright` says that the longer side is the vertical one.
@@ -391,10 +391,10 @@ def _trim_block(block: Cell, trim: Trim) -> Polygon:
 def _sample_trims(
     cells: list[Cell], feasible_widening: float, corner_disc: DiscStart, rng: np.random.Generator
 ) -> list[Trim | None]:
-    """Draw a trim for each block; None if the block stays whole or the trimmed block would be too thin."""
+    """Sample a trim for each block; None if the block stays whole or the trimmed block would be too thin."""
     trims: list[Trim | None] = []
-    drawn_trims = [_sample_trim(rng) for _ in cells]
-    for cell, trim in zip(cells, drawn_trims, strict=True):
+    sampled_trims = [_sample_trim(rng) for _ in cells]
+    for cell, trim in zip(cells, sampled_trims, strict=True):
         largest_block = _build_block(cell, 0.0, corner_disc, trim)
         smallest_block = _build_block(cell, feasible_widening, corner_disc, trim)
         is_feasible = _is_thick(largest_block) and _is_thick(smallest_block)
@@ -403,7 +403,7 @@ def _sample_trims(
 
 
 def _sample_trim(rng: np.random.Generator) -> Trim | None:
-    """Draw a chamfer or a notch; None for neither."""
+    """Sample a chamfer or a notch; None for neither."""
     choice = rng.random()
     corner = int(rng.integers(0, _CORNER_CHOICES))
     if choice < _CHAMFER_PROBABILITY:

@@ -93,10 +93,10 @@ def build_cave(
     builder = _create_builder(request, corner_disc)
     if _build_inner_rectangle(request, 2.0 * builder.min_radius).is_empty:
         return None
-    points, values = draw_random_field(request, rng)
+    points, values = sample_random_field(request, rng)
     values += _compute_border_rise(request, points)
     values -= _compute_start_depth(request, corner_disc, points)
-    # The tunnels are drawn from the same random numbers at every level of the field.
+    # The tunnels are sampled from the same random numbers at every level of the field.
     tunnel_seed = int(rng.integers(2**32))
     core = _choose_core(builder, points, values, tunnel_seed)
     # Dilate the core by the radius that blocks the requested fraction. While gaps are too narrow, cut tunnels
@@ -269,8 +269,8 @@ def _build_obstacles(request: MapRequest, outline: Ring, pillars: list[Ring]) ->
     return [rock, *(PolygonObstacle(ring, name="pillar") for ring in pillars)]
 
 
-def draw_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Draw a smooth random field of mean 0 and variance 1.
+def sample_random_field(request: MapRequest, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Sample a smooth random field of mean 0 and variance 1.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ _MAX_OUTLINES = 8
 _POSITIONS_PER_OUTLINE = 128
 """Number of random positions that are tested for each of these outlines."""
 _MAX_REDRAWS = 8
-"""Maximum number of times that an outline is drawn until it is suitable."""
+"""Maximum number of times that an outline is sampled until it is suitable."""
 _VERTEX_PROBABILITIES = {3: 0.1, 4: 0.25, 5: 0.3, 6: 0.2, 7: 0.15}
 """Numbers of vertices of a convex polygon, and their probabilities."""
 _MIN_ANGLE_STEP = 0.4
@@ -117,14 +117,14 @@ def _place_shape(
 ) -> shapely.Polygon | None:
     """Return a random outline of a shape at a free position; None if no free position is found.
 
-    Several outlines are drawn, and each is tested at many random positions. At a free position, the outline
+    Several outlines are sampled, and each is tested at many random positions. At a free position, the outline
     keeps the gap from the boundary and from the outlines placed before, and does not touch the start disc.
     """
     gap = request.gap
     size = request.size
     tree = shapely.STRtree(placed_outlines)
     for _ in range(_MAX_OUTLINES):
-        outline = _draw_shape(request, shape, area, rng)
+        outline = _sample_shape(request, shape, area, rng)
         outline_size = np.ptp(outline, axis=0)
         free_size = size - 2.0 * gap - outline_size
         if (free_size < 0.0).any():
@@ -150,22 +150,22 @@ def _place_shape(
     return None
 
 
-def _draw_shape(request: MapRequest, shape: str, area: float, rng: np.random.Generator) -> FloatArray:
-    """Draw a random outline of a shape, (k, 2) m.
+def _sample_shape(request: MapRequest, shape: str, area: float, rng: np.random.Generator) -> FloatArray:
+    """Sample a random outline of a shape, (k, 2) m.
 
     The outline is an L if the opening of a U would be narrower than the gap.
     """
     if shape == "convex":
-        return draw_convex_polygon(rng, area)
+        return sample_convex_polygon(rng, area)
     if shape == "U":
-        outline = draw_u_shape(rng, area, request.gap_before_rounding)
+        outline = sample_u_shape(rng, area, request.gap_before_rounding)
         if outline is not None:
             return outline
-    return draw_l_shape(rng, area)
+    return sample_l_shape(rng, area)
 
 
-def draw_convex_polygon(rng: np.random.Generator, area: float) -> FloatArray:
-    """Draw a random convex polygon that is usually not thin; its 3 to 7 vertices lie on an ellipse.
+def sample_convex_polygon(rng: np.random.Generator, area: float) -> FloatArray:
+    """Sample a random convex polygon that is usually not thin; its 3 to 7 vertices lie on an ellipse.
 
     Parameters
     ----------
@@ -193,8 +193,8 @@ def draw_convex_polygon(rng: np.random.Generator, area: float) -> FloatArray:
     return _scale_and_rotate(outline, area, rng)
 
 
-def draw_l_shape(rng: np.random.Generator, area: float) -> FloatArray:
-    """Draw a random outline of an L of the given area, in a random direction.
+def sample_l_shape(rng: np.random.Generator, area: float) -> FloatArray:
+    """Sample a random outline of an L of the given area, in a random direction.
 
     Parameters
     ----------
@@ -225,8 +225,8 @@ def draw_l_shape(rng: np.random.Generator, area: float) -> FloatArray:
     return _scale_and_rotate(outline, area, rng)
 
 
-def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> FloatArray | None:
-    """Draw a random outline of a U of the given area, in a random direction. The arms may differ in length.
+def sample_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> FloatArray | None:
+    """Sample a random outline of a U of the given area, in a random direction. The arms may differ in length.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def draw_u_shape(rng: np.random.Generator, area: float, min_opening: float) -> F
     -------
     (8, 2) array, m, or None
         Vertices. The bounding box is centered at the origin. None if the opening was too narrow in every
-        outline that was drawn.
+        outline that was sampled.
     """
     # All lengths are relative to the height of the left arm until the outline is scaled.
     for _ in range(_MAX_REDRAWS):

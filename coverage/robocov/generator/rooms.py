@@ -268,8 +268,8 @@ def build_building(
     list of Obstacle or None
         The walls, then the furniture. None if rooms would be too small, or the furniture does not fit.
     """
-    wall_thickness = _draw_wall_thickness(request, rng)
-    plan = draw_floor_plan(request, wall_thickness, rng)
+    wall_thickness = _sample_wall_thickness(request, rng)
+    plan = sample_floor_plan(request, wall_thickness, rng)
     if plan is None:
         return None
     walls: list[Obstacle] = [*plan.build_walls()]
@@ -282,8 +282,8 @@ def build_building(
     return None if furniture is None else [*walls, *furniture]
 
 
-def _draw_wall_thickness(request: MapRequest, rng: np.random.Generator) -> float:
-    """Draw the thickness of walls, m."""
+def _sample_wall_thickness(request: MapRequest, rng: np.random.Generator) -> float:
+    """Sample the thickness of walls, m."""
     # Interpolate the largest fraction of the blocked area that walls take.
     room_side_gaps = request.mean_spacing / request.gap
     weight = (_LARGE_ROOM_SIDE_GAPS - room_side_gaps) / (_LARGE_ROOM_SIDE_GAPS - _SMALL_ROOM_SIDE_GAPS)
@@ -300,8 +300,10 @@ def _draw_wall_thickness(request: MapRequest, rng: np.random.Generator) -> float
     return 2.0 * max(request.round_down(half_thickness), request.rounding_step)
 
 
-def draw_floor_plan(request: MapRequest, wall_thickness: float, rng: np.random.Generator) -> FloorPlan | None:
-    """Draw a floor plan with the requested number of rooms.
+def sample_floor_plan(
+    request: MapRequest, wall_thickness: float, rng: np.random.Generator
+) -> FloorPlan | None:
+    """Sample a floor plan with the requested number of rooms.
 
     Parameters
     ----------
@@ -505,7 +507,7 @@ def _place_furniture(
     # The polygons of the doors and of the furniture in each room. Further furniture must keep the gap from
     # these polygons.
     occupied = _list_door_openings(plan)
-    # A room is drawn with a probability that is proportional to its area. Because of rounding errors, the
+    # A room is chosen with a probability that is proportional to its area. Because of rounding errors, the
     # last cumulative sum may differ a little from 1. Dividing by it makes the last cumulative probability
     # exactly 1.
     cumulative_areas = np.cumsum(room_areas / room_areas.sum())
@@ -519,7 +521,7 @@ def _place_furniture(
         shrinkage = max(_MIN_SHRINKAGE, _FAILURE_SHRINKAGE**failure_count)
         area_ratio = rng.uniform(_MIN_PIECE_AREA_RATIO, _MAX_PIECE_AREA_RATIO)
         piece_area = min(remaining_area, mean_piece_area * area_ratio * shrinkage)
-        piece = _draw_piece(request, piece_area, rng)
+        piece = _sample_piece(request, piece_area, rng)
         obstacle = _place_piece(request, piece, inner_rooms[room], occupied[room], start_disc, rng)
         if obstacle is None:
             failure_count += 1
@@ -573,8 +575,8 @@ class _FurniturePiece(NamedTuple):
         return self.kind == "round table"
 
 
-def _draw_piece(request: MapRequest, area: float, rng: np.random.Generator) -> _FurniturePiece:
-    """Draw a random piece of furniture of about the given area, m²."""
+def _sample_piece(request: MapRequest, area: float, rng: np.random.Generator) -> _FurniturePiece:
+    """Sample a random piece of furniture of about the given area, m²."""
     kind = str(rng.choice(list(_PIECE_PROBABILITIES), p=list(_PIECE_PROBABILITIES.values())))
     min_stretch, max_stretch = _CABINET_STRETCH if kind == "cabinet" else _TABLE_STRETCH
     stretch = rng.uniform(min_stretch, max_stretch)
@@ -587,10 +589,10 @@ def _draw_piece(request: MapRequest, area: float, rng: np.random.Generator) -> _
     return _FurniturePiece(kind, np.maximum(request.round_points(size), min_side))
 
 
-def _draw_piece_corners(
+def _sample_piece_corners(
     request: MapRequest, piece: _FurniturePiece, room: Box, rng: np.random.Generator
 ) -> FloatArray | None:
-    """Draw positions of a piece in a room at which the piece touches each wall or keeps the gap from it.
+    """Sample positions of a piece in a room at which the piece touches each wall or keeps the gap from it.
 
     A cabinet stands against a wall with its longer side. A round table touches no wall.
 
@@ -633,7 +635,7 @@ def _place_piece(
     gap from doors and from the other pieces, whose polygons are `occupied`.
     """
     # Lower left corners, upper right corners and centers of the piece at all positions, (k, 2) m each.
-    lower_left = _draw_piece_corners(request, piece, room, rng)
+    lower_left = _sample_piece_corners(request, piece, room, rng)
     if lower_left is None:
         return None
     upper_right = request.round_points(lower_left + piece.size)

@@ -17,8 +17,8 @@ from robocov.generator import generate_map
 from robocov.generator.caves import (
     build_gap_tunnel,
     build_tunnels,
-    draw_random_field,
     extract_area_below_zero,
+    sample_random_field,
 )
 from robocov.generator.request import MapRequest
 from robocov.typing import FloatArray
@@ -161,7 +161,7 @@ def test_the_edge_of_the_mesh_is_above_every_level() -> None:
 @settings(max_examples=30)
 @given(st.integers(0, 2**32), st.floats(-1.0, 1.0))
 def test_points_of_the_mesh_with_lower_values_are_in_the_area(seed: int, level: float) -> None:
-    points, values = draw_random_field(REQUEST, np.random.default_rng(seed))
+    points, values = sample_random_field(REQUEST, np.random.default_rng(seed))
     area = extract_area_below_zero(points, values - level)
     assert area.is_valid
     inner = points[1:-1, 1:-1].reshape(-1, 2)
@@ -170,7 +170,7 @@ def test_points_of_the_mesh_with_lower_values_are_in_the_area(seed: int, level: 
 
 
 def test_a_field_has_mean_zero_and_variance_one_and_is_smooth() -> None:
-    fields = [draw_random_field(REQUEST, np.random.default_rng(seed)) for seed in range(40)]
+    fields = [sample_random_field(REQUEST, np.random.default_rng(seed)) for seed in range(40)]
     values = np.stack([field for _, field in fields])
     assert abs(values.mean()) < 0.1
     assert values.var() == pytest.approx(1.0, abs=0.15)

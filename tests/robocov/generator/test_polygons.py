@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.generator.polygons import draw_convex_polygon, draw_l_shape, draw_u_shape
+from robocov.generator.polygons import sample_convex_polygon, sample_l_shape, sample_u_shape
 
 SEEDS = st.integers(0, 2**32)
 AREAS = st.floats(0.05, 20.0)
@@ -23,7 +23,7 @@ def build_shape(outline, area):
 
 @given(SEEDS, AREAS)
 def test_convex_polygons_are_convex_and_compact(seed, area):
-    outline = draw_convex_polygon(np.random.default_rng(seed), area)
+    outline = sample_convex_polygon(np.random.default_rng(seed), area)
     shape = build_shape(outline, area)
     assert 3 <= len(outline) <= 7
     assert shape.convex_hull.area == pytest.approx(area)
@@ -32,7 +32,7 @@ def test_convex_polygons_are_convex_and_compact(seed, area):
 
 @given(SEEDS, AREAS)
 def test_an_l_shape_has_right_angles_and_one_reflex_corner(seed, area):
-    outline = draw_l_shape(np.random.default_rng(seed), area)
+    outline = sample_l_shape(np.random.default_rng(seed), area)
     build_shape(outline, area)
     before = outline - np.roll(outline, 1, axis=0)
     after = np.roll(outline, -1, axis=0) - outline
@@ -43,7 +43,7 @@ def test_an_l_shape_has_right_angles_and_one_reflex_corner(seed, area):
 
 @given(SEEDS, AREAS, st.floats(0.1, 2.0))
 def test_a_u_shape_has_the_requested_opening(seed, area, opening):
-    outline = draw_u_shape(np.random.default_rng(seed), area, opening)
+    outline = sample_u_shape(np.random.default_rng(seed), area, opening)
     if outline is None:
         # Only a wide opening does not fit in a shape of this area.
         assert opening > 0.5 * np.sqrt(area)

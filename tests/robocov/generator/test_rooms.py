@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robocov.generator.request import MapRequest
-from robocov.generator.rooms import draw_floor_plan
+from robocov.generator.rooms import sample_floor_plan
 
 THICKNESS = 0.1
 
@@ -25,7 +25,7 @@ def list_rooms_reached_from_the_first(plan):
 @given(st.integers(0, 2**32), st.integers(1, 30), st.floats(0.3, 0.8), st.sampled_from([10, 15.5, 24.0]))
 def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
     request = MapRequest(count, 0.1, gap, width, 12.0)
-    plan = draw_floor_plan(request, THICKNESS, np.random.default_rng(seed))
+    plan = sample_floor_plan(request, THICKNESS, np.random.default_rng(seed))
     assume(plan is not None)
     rooms = [shapely.box(*room) for room in plan.rooms]
     assert len(rooms) == count
@@ -56,7 +56,7 @@ def test_rooms_tile_the_plan_and_doors_join_them(seed, count, gap, width):
 
 def test_about_half_of_the_plans_have_a_corridor():
     request = MapRequest(8, 0.1, 0.6, 12.0, 10.0)
-    plans = [draw_floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
+    plans = [sample_floor_plan(request, THICKNESS, np.random.default_rng(seed)) for seed in range(60)]
     has_corridor = [
         any(room.sides[0] == 12.0 and room.sides[1] < 1.6 for room in plan.rooms)
         for plan in plans
@@ -67,4 +67,6 @@ def test_about_half_of_the_plans_have_a_corridor():
 
 
 def test_there_is_no_plan_if_rooms_would_be_too_small():
-    assert draw_floor_plan(MapRequest(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
+    assert (
+        sample_floor_plan(MapRequest(60, 0.1, 1.0, 10.0, 10.0), THICKNESS, np.random.default_rng(0)) is None
+    )

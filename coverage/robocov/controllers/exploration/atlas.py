@@ -150,7 +150,7 @@ class Atlas(BaseController):
     fails, and when a wall appears or disappears.
 
     *Lost robots.* A robot out of range is assumed to be at its goal in the last plan, and is removed from the
-    plan if it is not heard there.
+    plan if no message arrives from it there.
 
     Examples
     --------
@@ -196,7 +196,7 @@ class Atlas(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> AtlasMemory:
-        """Return the memory of robots that know neither walls nor other robots.
+        """Return the initial memory, with no walls or other robots known.
 
         Parameters
         ----------
@@ -332,7 +332,7 @@ class Atlas(BaseController):
     def _plan(
         self, seen: Observations, memory: AtlasMemory, robot: int, reports: Sequence[TeammateReport]
     ) -> tuple[PlannerState, FloatArray | None]:
-        """Make a plan for a robot. Return its state, and its goal; None if it keeps its present route."""
+        """Make a plan for a robot. Return its state, and its goal; None if it keeps its current route."""
         team = memory.team
         previous = memory.states[robot]
         position = seen.positions[robot]

@@ -25,7 +25,7 @@ class TeamKnowledge:
     teammates: Teammates
     """The robots that it takes into account."""
     encountered: frozenset[int] = frozenset()
-    """Indices of the robots that it has heard, or that others have reported to it, except for failed ones."""
+    """Indices of its neighbors so far, and of robots that others have reported to it; without failed ones."""
     loss_times: Mapping[int, float] = field(default_factory=dict)
     """Time at which each lost robot was found to have failed or to be missing, s, by its index."""
 

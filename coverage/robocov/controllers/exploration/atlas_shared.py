@@ -18,14 +18,14 @@ from robocov.team import Team
 class AtlasShared(Atlas):
     """`Atlas` with shared maps: robots send each other their scans, and the positions of other robots.
 
-    If all robots hear each other, they have the same map, and make the same plan for the whole team, however
-    large it is. Relocations are then final, no robot plans for itself alone, and all robots learn from each
-    viewpoint. A robot that does not hear all others behaves as with `Atlas`. It assumes that robots out of
-    range are where one of its neighbors last heard them.
+    If all robots receive each other's messages, they have the same map, and make the same plan for the whole
+    team, however large it is. Relocations are then final, no robot plans for itself alone, and all robots
+    learn from each viewpoint. A robot with some robots out of range behaves as with `Atlas`. It assumes that
+    these robots are where one of its neighbors last received a message from them.
 
     Messages are those of the module `scan_exchange`, twice a second: 542 bytes for a scan, and with six
-    robots 81 bytes for a digest of the scans that a robot has. A robot with a neighbor that does not hear all
-    others also sends a report with each plan: 28 bytes for each robot that it knows of.
+    robots 81 bytes for a digest of the scans that a robot has. A robot with a neighbor that is not in range
+    of all others also sends a report with each plan: 28 bytes for each robot that it knows of.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ class AtlasShared(Atlas):
         for robot in due_robots:
             neighbors = seen.neighbors.list_neighbors(robot).tolist()
             teammates = memory.states[robot].knowledge.teammates
-            # Robots that hear all others need no reports.
-            if len(teammates.robots) > 0 and not exchange.neighbors_hear_all(robot, neighbors):
+            # Robots in range of all others need no reports.
+            if len(teammates.robots) > 0 and not exchange.neighbors_reach_all(robot, neighbors):
                 report = teammates.build_report()
                 exchange = exchange.add_message(robot, Message(report, report.size))
         if seen.scans is not None:
@@ -115,5 +115,5 @@ class AtlasShared(Atlas):
         return replace(memory, exchange=exchange), messages
 
     def _is_agreed(self, teammates: Teammates, seen: Observations, memory: AtlasMemory, robot: int) -> bool:
-        # A robot that hears all others that it knows of has the same scans as they have.
-        return bool((teammates.heard_times == seen.time).all())
+        # A robot in range of all others that it knows of has the same scans as they have.
+        return bool((teammates.message_times == seen.time).all())

@@ -119,7 +119,7 @@ class ExploringLloyd(BaseController):
     response_time: float = response_time_gain()
 
     def begin(self, region: Region, team: Team) -> ExploringMemory:
-        """Return the memory of robots that have not measured anything."""
+        """Return the initial memory, without any measurements."""
         robot_count = len(team)
         grid = SquareGrid.build(region, int(self.squares))
         square_count = len(grid.centers)

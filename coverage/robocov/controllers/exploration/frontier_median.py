@@ -51,11 +51,11 @@ class FrontierMedian(SharedMapController):
     of each target t' in view of t and within the sensing range R is reduced by 1 - |t - t'| / R, because a
     robot at t will see it. This is repeated for the remaining robots.
 
-    The implementation is based on the abstracts of the papers and on general knowledge, not on the full
-    texts. The following choices are our own. The distance between targets is the spacing of the planning
-    lattice. Small gaps between rays are ignored, and so are frontiers that are shorter than `shortest` or out
-    of reach. A frontier is also ignored after a robot has been there, or was stuck on its path to it. A robot
-    stays where it is if no target has any utility left for it; in the paper, it moves to a target even then.
+    We had only the abstracts of the papers, not their full texts; details may differ. The following choices
+    are our own. The distance between targets is the spacing of the planning lattice. Small gaps between rays
+    are ignored, and so are frontiers that are shorter than `shortest` or out of reach. A frontier is also
+    ignored after a robot has been there, or was stuck on its path to it. A robot stays where it is if no
+    target has any utility left for it; in the paper, it moves to a target even then.
     """
 
     name = "frontier-median"

@@ -43,8 +43,7 @@ class GreedySubmodular(SharedMapController):
     This gain is submodular as well; the bound holds for it, not for the cost. The descent is Lloyd's
     iteration on geodesic cells, without interchange.
 
-    The implementation is based on the abstracts of the papers and on general knowledge, not on the full
-    texts.
+    We had only the abstracts of the papers, not their full texts; details may differ.
     """
 
     name = "greedy-submodular"

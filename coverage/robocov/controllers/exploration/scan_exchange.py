@@ -4,8 +4,8 @@ Robots send three kinds of messages, each to all robots in communication range:
 
 - *Scans* (`NumberedScan`). A robot sends each of its own scans once, when it takes it: 542 bytes for 240
   rays.
-- *Digests* (`Digest`). With each scan, a robot sends a list of the scans that it has and of the robots that
-  it hears: 8 bytes, and 12 bytes and 1 bit for each robot of the team.
+- *Digests* (`Digest`). With each scan, a robot sends a list of the scans that it has and of its
+  neighbors: 8 bytes, and 12 bytes and 1 bit for each robot of the team.
 - *Repairs*. A robot sends scans that are missing in the digest of another robot again, also those that it
   has received from third robots: at most `MAX_REPAIRS` for each scan that it takes.
 
@@ -50,13 +50,13 @@ class Digest:
         Time at which it was sent.
     inventory : Inventory
         The scans that the robot has.
-    is_heard : (n,) bool array
-        Whether the robot hears each of the others.
+    is_neighbor : (n,) bool array
+        Whether each robot is a neighbor, from which messages arrive.
     """
 
     time: float
     inventory: Inventory
-    is_heard: BoolArray
+    is_neighbor: BoolArray
 
     @property
     def size(self) -> int:
@@ -68,7 +68,7 @@ class Digest:
         >>> Digest(0.0, inventory, np.ones(6, dtype=bool)).size
         81
         """
-        robot_count = len(self.is_heard)
+        robot_count = len(self.is_neighbor)
         return _TIME_BYTES + _INVENTORY_BYTES * robot_count + -(-robot_count // 8)
 
 
@@ -252,8 +252,8 @@ class ScanExchange:
         states[robot] = replace(state, outgoing=(message, *others))
         return replace(self, robots=tuple(states))
 
-    def neighbors_hear_all(self, robot: int, neighbors: Sequence[int]) -> bool:
-        """Return whether each neighbor of a robot hears all others, according to its newest digest.
+    def neighbors_reach_all(self, robot: int, neighbors: Sequence[int]) -> bool:
+        """Return whether each neighbor of a robot has all others as neighbors, as its newest digest says.
 
         Parameters
         ----------
@@ -267,7 +267,7 @@ class ScanExchange:
         digests = self.robots[robot].digests
         other_count = len(self.robots) - 1
         return all(
-            neighbor in digests and np.count_nonzero(digests[neighbor].digest.is_heard) == other_count
+            neighbor in digests and np.count_nonzero(digests[neighbor].digest.is_neighbor) == other_count
             for neighbor in neighbors
         )
 
@@ -317,9 +317,9 @@ def _prepare_messages(
     They replace the messages of these kinds that have not been sent yet.
     """
     neighbors = seen.neighbors.list_neighbors(robot).tolist()
-    is_heard = np.zeros(len(seen.positions), dtype=bool)
-    is_heard[neighbors] = True
-    digest = Digest(seen.time, state.log.inventory, is_heard)
+    is_neighbor = np.zeros(len(seen.positions), dtype=bool)
+    is_neighbor[neighbors] = True
+    digest = Digest(seen.time, state.log.inventory, is_neighbor)
     repairs = _choose_repairs(state, robot, neighbors)
     repair_times = state.repair_times
     if repairs:
@@ -365,16 +365,16 @@ def _needs_repair(scan: NumberedScan, state: RobotExchange, received: ReceivedDi
 def _is_responsible(scan: NumberedScan, state: RobotExchange, robot: int, received: ReceivedDigest) -> bool:
     """Return whether it is up to a robot to send a scan again to the sender of a digest.
 
-    Only one robot should do so. Candidates are the robots that the sender hears and that have the scan, as
-    far as `robot` knows. The owner of the scan comes first, then the robots with the next higher indices, and
-    then those from 0 on.
+    Only one robot should do so. Candidates are the neighbors of the sender that have the scan, as far as
+    `robot` knows. The owner of the scan comes first, then the robots with the next higher indices, and then
+    those from 0 on.
     """
-    robot_count = len(received.digest.is_heard)
+    robot_count = len(received.digest.is_neighbor)
     for step in range(robot_count):
         candidate = (scan.robot + step) % robot_count
         if candidate == robot:
             return True
-        if received.digest.is_heard[candidate] and _has_scan(candidate, scan, state):
+        if received.digest.is_neighbor[candidate] and _has_scan(candidate, scan, state):
             return False
     return False
 

@@ -48,7 +48,7 @@ class Group(NamedTuple):
     """(k,) Indices of the robots, ascending."""
     positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
-    heard_times: FloatArray
+    message_times: FloatArray
     """(k,) s, times of their last messages."""
 
 
@@ -260,15 +260,15 @@ class SharedMapMemory:
 
 @dataclass(frozen=True)
 class SharedMapController(BaseController):
-    """Base class of controllers in which each robot plans for itself and the robots it hears from.
+    """Base class of controllers in which each robot plans for itself and the robots it knows from messages.
 
     Robots scan twice a second, and send each other their scans (see the module `scan_exchange`): 542 bytes
     for each scan, and with six robots 81 bytes for a digest of the scans that a robot has. Every `period`
     seconds, each robot makes a plan on the map of the scans that it has, and follows the shortest route to
-    its own goal in that plan. Robots with the same knowledge make the same plan. A robot that is no longer
-    heard is assumed to be at its goal, and is removed from the plan if it is not heard there. With short
-    communication ranges plans differ, and two robots may move to the same position until they hear each
-    other.
+    its own goal in that plan. Robots with the same knowledge make the same plan. A robot that is out of
+    range is assumed to be at its goal, and is removed from the plan if no message arrives from it there. With
+    short communication ranges plans differ, and two robots may move to the same position until they are in
+    range of each other.
     """
 
     information: ClassVar[Information] = "shared map"
@@ -438,25 +438,25 @@ def _is_still_valid(plan: Plan, known_map: DiscoveredMap, density: Density | Non
 
 
 def _build_group(seen: Observations, team: Team, previous_plan: Plan | None, robot: int) -> Group:
-    """Return the group of a robot: itself, the robots that it hears, and some that it no longer hears.
+    """Return the group of a robot: itself, its neighbors, and some robots that are out of range.
 
-    A robot that is no longer heard is assumed to be at its goal in the previous plan. It stays in the group
-    unless it has been silent for long although it would certainly be heard there.
+    A robot that is out of range is assumed to be at its goal in the previous plan. It stays in the group
+    unless it has been silent for long although it would certainly be in range there.
     """
     position = seen.positions[robot : robot + 1]
     robots = np.append(seen.neighbors.list_neighbors(robot), robot)
     positions = np.vstack([seen.get_neighbor_positions(robot), position])
-    heard_times = np.full(len(robots), seen.time)
+    message_times = np.full(len(robots), seen.time)
     if previous_plan is not None:
         previous = previous_plan.group
         goals = previous_plan.placement.goals
         distance = np.sqrt(((goals - position) ** 2).sum(axis=1))
-        is_silent = seen.time - previous.heard_times > MAX_SILENCE_S
+        is_silent = seen.time - previous.message_times > MAX_SILENCE_S
         is_close = distance < CERTAIN_RANGE_FRACTION * team.communication_range[robot]
-        is_heard = np.isin(previous.robots, robots)
-        is_assumed = ~(is_heard | (is_silent & is_close))
+        is_neighbor = np.isin(previous.robots, robots)
+        is_assumed = ~(is_neighbor | (is_silent & is_close))
         robots = np.concatenate([robots, previous.robots[is_assumed]])
         positions = np.vstack([positions, goals[is_assumed]])
-        heard_times = np.concatenate([heard_times, previous.heard_times[is_assumed]])
+        message_times = np.concatenate([message_times, previous.message_times[is_assumed]])
     order = np.argsort(robots)
-    return Group(robots=robots[order], positions=positions[order], heard_times=heard_times[order])
+    return Group(robots=robots[order], positions=positions[order], message_times=message_times[order])

@@ -32,7 +32,7 @@ class SightingReport(NamedTuple):
 class Sightings:
     """The last known positions of all robots, as known to each robot. Immutable.
 
-    A robot is lost if it has been silent for long although it would certainly be heard at its last known
+    A robot is lost if it has been silent for long although it would certainly be in range at its last known
     position. Its position is nan from then on. Robots pass this on like any other position, until there is a
     newer one.
 
@@ -54,7 +54,7 @@ class Sightings:
         return cls(positions=np.full((*shape, 2), np.nan), times=np.full(shape, -np.inf))
 
     def update(self, seen: Observations, team: Team) -> Sightings:
-        """Return the sightings after a step: with the robots that are heard now, and without the lost ones.
+        """Return the sightings after a step: with the current neighbors, and without the lost robots.
 
         Parameters
         ----------

@@ -34,12 +34,12 @@ class OtherRobots(NamedTuple):
 
 
 class _LostRobots(NamedTuple):
-    """Two masks of the k other robots that a robot knows of. Robots that it hears now are in neither."""
+    """Two masks of the k other robots that a robot knows of. Its current neighbors are in neither."""
 
     has_failed: BoolArray
     """(k,) Whether each robot is silent although it cannot have moved out of range."""
     is_missing: BoolArray
-    """(k,) Whether each robot is not heard although its assumed position is well within range."""
+    """(k,) Whether each robot is silent although its assumed position is well within range."""
 
 
 def update_knowledge(
@@ -109,7 +109,7 @@ def list_others(
     """
     is_at_rest = time - teammates.rest_times >= MIN_REST_S
     # A robot out of contact is assumed to have reached its goal, and to rest there.
-    is_out_of_contact = teammates.heard_times < time
+    is_out_of_contact = teammates.message_times < time
     is_fixed = is_at_rest | is_out_of_contact
     is_outside_group = np.full(len(teammates.robots), not plans_for_all)
     squared_distances = ((teammates.positions - position) ** 2).sum(axis=1)
@@ -137,10 +137,10 @@ def _assume_at_goals(teammates: Teammates, team_goals: TeamGoals | None) -> Team
 def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robot: int) -> _LostRobots:
     """Find the robots that have failed or are missing, as far as the robot with the given index can tell."""
     communication_range = float(team.communication_range[robot])
-    is_heard = np.isin(teammates.robots, seen.neighbors.list_neighbors(robot))
-    silence = np.where(is_heard, 0.0, seen.time - teammates.heard_times)
-    # Since they last heard each other, both robots may have moved apart at full speed.
-    max_distance = teammates.heard_distances + 2.0 * float(team.max_speed[robot]) * silence
+    is_neighbor = np.isin(teammates.robots, seen.neighbors.list_neighbors(robot))
+    silence = np.where(is_neighbor, 0.0, seen.time - teammates.message_times)
+    # Since their last messages, both robots may have moved apart at full speed.
+    max_distance = teammates.message_distances + 2.0 * float(team.max_speed[robot]) * silence
     distance = np.sqrt(((teammates.positions - seen.positions[robot]) ** 2).sum(axis=1))
     return _LostRobots(
         has_failed=(silence > 0.0) & (max_distance < communication_range),

@@ -15,7 +15,7 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 REST_RADIUS_M = 0.1
 """A robot is at rest while it stays within this distance of one point."""
 REPORT_BYTES = 28
-"""Size of a report about one robot: its index, its position, and the time at which it was last heard."""
+"""Size of a report about one robot: its index, its position, and the time of its last message."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,13 +28,13 @@ class TeammateReport:
         Indices of the reported robots, ascending.
     positions : (k, 2) array, m
         Their known or assumed positions.
-    heard_times : (k,) array, s
-        Times at which they were last heard.
+    message_times : (k,) array, s
+        Times of their last messages.
     """
 
     robots: IntArray
     positions: FloatArray
-    heard_times: FloatArray
+    message_times: FloatArray
 
     @property
     def size(self) -> int:
@@ -49,9 +49,9 @@ class Teammates(NamedTuple):
     """(k,) Indices of the others, ascending."""
     positions: FloatArray
     """(k, 2) m, their known or assumed positions."""
-    heard_times: FloatArray
-    """(k,) s, times at which they were last heard."""
-    heard_distances: FloatArray
+    message_times: FloatArray
+    """(k,) s, times of their last messages."""
+    message_distances: FloatArray
     """(k,) m, their distances from the robot at these times; infinite if it knows them only from reports."""
     rest_times: FloatArray
     """(k,) s, times since which they have been within `REST_RADIUS_M` of `rest_positions`."""
@@ -60,12 +60,12 @@ class Teammates(NamedTuple):
 
     @classmethod
     def build_empty(cls) -> Teammates:
-        """Build the knowledge of a robot that has not heard any other one."""
+        """Build the knowledge of a robot that has not received any message."""
         return cls(
             robots=np.empty(0, dtype=np.intp),
             positions=np.empty((0, 2)),
-            heard_times=np.empty(0),
-            heard_distances=np.empty(0),
+            message_times=np.empty(0),
+            message_distances=np.empty(0),
             rest_times=np.empty(0),
             rest_positions=np.empty((0, 2)),
         )
@@ -78,18 +78,18 @@ class Teammates(NamedTuple):
         time: float,
         is_lost: BoolArray,
     ) -> Teammates:
-        """Return the knowledge after the robots that are heard now are added, and lost ones removed.
+        """Return the knowledge after the current neighbors are added, and lost robots removed.
 
         Parameters
         ----------
         robots : (m,) int array
-            Indices of the robots that are heard.
+            Indices of the current neighbors.
         positions : (m, 2) array, m
             Positions of these robots.
         own_position : (2,) array, m
         time : float, s
         is_lost : (k,) bool array
-            Whether each robot known so far has failed or is missing. It is removed unless it is heard now.
+            Whether each robot known so far has failed or is missing. It is removed unless it is a neighbor.
 
         Returns
         -------
@@ -99,8 +99,8 @@ class Teammates(NamedTuple):
         observed = Teammates(
             robots=robots,
             positions=positions,
-            heard_times=now,
-            heard_distances=np.sqrt(((positions - own_position) ** 2).sum(axis=1)),
+            message_times=now,
+            message_distances=np.sqrt(((positions - own_position) ** 2).sum(axis=1)),
             rest_times=now,
             rest_positions=positions,
         )
@@ -123,7 +123,7 @@ class Teammates(NamedTuple):
 
     def build_report(self) -> TeammateReport:
         """Build the report of this knowledge for neighbors."""
-        return TeammateReport(self.robots, self.positions, self.heard_times)
+        return TeammateReport(self.robots, self.positions, self.message_times)
 
     def add_reports(
         self, reports: Sequence[TeammateReport], robot: int, loss_times: Mapping[int, float]
@@ -150,20 +150,20 @@ class Teammates(NamedTuple):
                 math.inf if other == robot else loss_times.get(other, before_start)
                 for other in report.robots.tolist()
             ]
-            is_new = report.heard_times > np.array(min_times)
+            is_new = report.message_times > np.array(min_times)
             reported = Teammates(
                 robots=report.robots,
                 positions=report.positions,
-                heard_times=report.heard_times,
+                message_times=report.message_times,
                 # A robot that was never in range has not failed if it is silent.
-                heard_distances=np.full(len(is_new), math.inf),
-                rest_times=report.heard_times,
+                message_distances=np.full(len(is_new), math.inf),
+                rest_times=report.message_times,
                 rest_positions=report.positions,
             )
             sources.append(reported._select(np.flatnonzero(is_new)))
         merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
         # Keep the most recent row of each robot, or the first one of several. The sort is stable.
-        order = np.lexsort((-merged.heard_times, merged.robots))
+        order = np.lexsort((-merged.message_times, merged.robots))
         _, first_rows = np.unique(merged.robots[order], return_index=True)
         return merged._select(order[first_rows])
 

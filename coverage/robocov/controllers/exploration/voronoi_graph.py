@@ -49,15 +49,14 @@ class VoronoiGraphCoverage(SharedMapController):
     which it is the nearest vertex, by path length, times φ.
 
     In the paper the graph is known, and robots know the neighbors of their neighbors. Here it is the graph
-    of the map that robots discover and share, and each robot plans for all robots that it hears. Unknown
+    of the map that robots discover and share, and each robot plans for itself and its neighbors. Unknown
     space that a path may lead to counts as free, so the graph extends into it. When the map has changed, the
     plan starts from the previous vertices; the first exchange must then save the fraction `threshold` of the
     cost. Robots follow the shortest paths on the map, not the graph. Goals are assigned to robots so that the
     sum of the squared path lengths is minimal. While the graph has fewer vertices than there are robots, as
     in a region in which no wall is known yet, one robot moves to each vertex, and the others stay.
 
-    The implementation is based on the abstract of Yun and Rus and on general knowledge, not on the full texts
-    of the papers.
+    We had only the abstract of Yun and Rus, not the full texts of the papers; details may differ.
     """
 
     name = "voronoi-graph"

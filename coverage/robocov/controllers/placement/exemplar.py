@@ -37,9 +37,9 @@ class Exemplar(PlacementController):
 
     Each robot computes the exemplars for the robots that it knows of; see `PlacementController`.
 
-    The implementation is based on the abstract of the paper, a summary of its method and general knowledge of
-    exemplar-based clustering, not on the full text. The paper computes distances with a visibility graph;
-    these are the geodesic distances used here. It also covers uneven terrain, which robocov lacks.
+    We had only the abstract of the paper and a summary of its method, not the full text; details may differ.
+    The paper computes distances with a visibility graph; these are the geodesic distances used here. It also
+    covers uneven terrain, which robocov lacks.
     """
 
     name = "exemplar"

@@ -39,9 +39,9 @@ class LocalSearch(PlacementController):
     search starts from the goals of the previous plan or, in the first plan, from the positions of the robots.
     Each robot computes the turns of all robots that it knows of; see `PlacementController`.
 
-    The implementation is based on the abstract and the first lines of the paper, and on general knowledge of
-    local search, not on the full text. In the paper, robots exchange messages, and the bound requires twice
-    the usual communication range. Here, robots know only positions.
+    We had only the abstract and the first lines of the paper, not its full text; details may differ. In the
+    paper, robots exchange messages, and the bound requires twice the usual communication range. Here, robots
+    know only positions.
     """
 
     name = "local-search"

@@ -189,7 +189,7 @@ class PlacementController(WholeMapController):
 
     Each robot plans for all robots that it knows of: itself, those within communication range, and others
     that it assumes at their last known positions. It forgets a robot that has been silent for 5 s although it
-    would certainly be heard at its last known position. Robots with the same knowledge make the same plan.
+    would certainly be in range at its last known position. Robots with the same knowledge make the same plan.
 
     Once in each `period`, goals are assigned to robots so that the sum of the squared lengths of the shortest
     paths is minimal. With this assignment, no robot has to pass another one that is already at its goal.
@@ -221,7 +221,7 @@ class PlacementController(WholeMapController):
         """
 
     def begin(self, region: Region, team: Team) -> PlacementMemory:
-        """Return the memory before the first plan; raise ParameterError if no robot fits into the map."""
+        """Return the initial memory; raise ParameterError if no robot fits into the map."""
         self._get_placement_map(team)
         n = len(team)
         return PlacementMemory(

@@ -296,8 +296,8 @@ def test_a_robot_is_at_rest_while_it_stays_near_a_point() -> None:
     teammates = Teammates(
         robots=np.array([1, 4]),
         positions=positions,
-        heard_times=np.array([1.0, 1.0]),
-        heard_distances=np.ones(2),
+        message_times=np.array([1.0, 1.0]),
+        message_distances=np.ones(2),
         rest_times=np.array([0.0, 0.5]),
         rest_positions=positions,
     )
@@ -305,10 +305,10 @@ def test_a_robot_is_at_rest_while_it_stays_near_a_point() -> None:
     own_position = np.array([0.05, 4.0])
     later = teammates.add_observation(np.array([1, 2, 4]), heard, own_position, 2.0, np.zeros(2, dtype=bool))
     assert later.rest_times.tolist() == [0.0, 2.0, 2.0]
-    assert later.heard_times.tolist() == [2.0, 2.0, 2.0]
+    assert later.message_times.tolist() == [2.0, 2.0, 2.0]
     np.testing.assert_array_equal(later.positions, heard)
     np.testing.assert_array_equal(later.rest_positions, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
-    np.testing.assert_allclose(later.heard_distances, np.hypot(*(heard - own_position).T))
+    np.testing.assert_allclose(later.message_distances, np.hypot(*(heard - own_position).T))
 
 
 def test_silent_robots_are_kept_unless_they_are_gone() -> None:
@@ -319,16 +319,18 @@ def test_silent_robots_are_kept_unless_they_are_gone() -> None:
     is_lost = np.array([False, True, False])
     later = teammates.add_observation(no_robots, np.empty((0, 2)), np.zeros(2), 3.0, is_lost)
     assert later.robots.tolist() == [1, 4]
-    assert later.heard_times.tolist() == [2.0, 2.0]
+    assert later.message_times.tolist() == [2.0, 2.0]
 
 
 def test_the_latest_report_about_a_robot_counts() -> None:
     def build_teammates(*rows: tuple[int, float, float]) -> Teammates:
         """Return teammates by robot, coordinates, and the time when it was heard."""
-        robots, x, heard_times = np.array(rows, dtype=float).reshape(-1, 3).T
+        robots, x, message_times = np.array(rows, dtype=float).reshape(-1, 3).T
         positions = np.column_stack([x, x])
         distances = np.ones(len(x))
-        return Teammates(robots.astype(np.intp), positions, heard_times, distances, heard_times, positions)
+        return Teammates(
+            robots.astype(np.intp), positions, message_times, distances, message_times, positions
+        )
 
     own = build_teammates((2, 0.2, 5.0), (3, 0.3, 1.0), (6, 0.6, 4.0))
     report = build_teammates(
@@ -342,9 +344,9 @@ def test_the_latest_report_about_a_robot_counts() -> None:
     later = own.add_reports([report.build_report()], 0, {4: 2.5, 5: 3.5})
     assert later.robots.tolist() == [2, 3, 4, 6]
     assert later.positions[:, 0].tolist() == [0.2, 0.33, 0.4, 0.6]
-    assert later.heard_times.tolist() == [5.0, 2.0, 3.0, 4.0]
+    assert later.message_times.tolist() == [5.0, 2.0, 3.0, 4.0]
     # A robot that may never have been in range cannot be considered failed because of its silence.
-    assert later.heard_distances.tolist() == [1.0, math.inf, math.inf, 1.0]
+    assert later.message_distances.tolist() == [1.0, math.inf, math.inf, 1.0]
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(Atlas, [1]), (AtlasShared, [1, 2])])
@@ -374,7 +376,7 @@ def test_robots_out_of_range_are_assumed_at_their_goals() -> None:
     assert first.robots.tolist() == [1]
     assert second.robots.tolist() == [0]
     # They have been out of range for long.
-    assert max(first.heard_times[0], second.heard_times[0]) < 10.0
+    assert max(first.message_times[0], second.message_times[0]) < 10.0
     np.testing.assert_allclose(first.positions[0], positions[1], atol=0.7)
 
 
@@ -515,8 +517,8 @@ def test_a_robot_is_missed_only_after_a_while() -> None:
     teammates = Teammates(
         robots=np.array([1]),
         positions=assumed_position,
-        heard_times=np.zeros(1),
-        heard_distances=np.full(1, math.inf),
+        message_times=np.zeros(1),
+        message_distances=np.full(1, math.inf),
         rest_times=np.zeros(1),
         rest_positions=assumed_position,
     )

@@ -53,7 +53,7 @@ def test_silent_robots_are_expected_at_their_goals_until_they_are_missed_there(
     not_linked = Neighbors.from_ranges(positions, np.full(2, 3.0))
     seen = Observations(positions, np.zeros((2, 2)), not_linked, np.full((2, 2), np.nan), REGION, time=time)
     previous_group = Group(
-        robots=np.array([0, 1]), positions=positions, heard_times=np.array([time, time - silence])
+        robots=np.array([0, 1]), positions=positions, message_times=np.array([time, time - silence])
     )
     previous_plan = Plan(
         group=previous_group,
@@ -67,4 +67,4 @@ def test_silent_robots_are_expected_at_their_goals_until_they_are_missed_there(
     assert group.robots.tolist() == ([0, 1] if is_expected else [0])
     if is_expected:
         assert group.positions[1].tolist() == goal
-        assert group.heard_times[1] == time - silence
+        assert group.message_times[1] == time - silence
