@@ -5,7 +5,7 @@
     │   ├── MapError          a map file, with line, column and JSON path of the first issue
     │   ├── StartError        a start without space for the team
     │   └── ParameterError    a gain, a limit, the name of a controller
-    ├── ControllerEndedError  a user's controller ended Python (exit status 1)
+    ├── ControllerEndedError  a user's controller terminated Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
 Every message is one line that names the source (a file or an argument), the place in it, the expected value
@@ -240,7 +240,7 @@ class ParameterError(InputError):
 
 
 class ControllerEndedError(RobocovError):
-    """A user's controller ended the Python process, tried to do so, or closed its output."""
+    """A user's controller terminated Python, tried to do so, or closed its output."""
 
 
 class OutputError(RobocovError):

@@ -1,6 +1,6 @@
 """Shapes from which the plans of the benchmark are built.
 
-Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every processor.
+Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every machine.
 """
 
 from typing import NamedTuple

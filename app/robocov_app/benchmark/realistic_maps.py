@@ -1,6 +1,6 @@
 """Random maps that resemble real places: homes, offices, yards, plants, and halls with traffic.
 
-Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every processor.
+Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every machine.
 """
 
 import itertools
@@ -18,7 +18,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.typing import FloatArray
-from robocov_app.benchmark.plan_search import search_map
+from robocov_app.benchmark.plan_search import find_valid_map
 from robocov_app.benchmark.plan_shapes import (
     INNER_WALL_M,
     FloorPlan,
@@ -80,7 +80,7 @@ _AISLES_Y_M = (5.7, 9.6, 1.5)
 def build_floor_plan(kind: str, seed: int) -> Environment:
     """Build a random map of a kind.
 
-    Plans are drawn until one is suitable, as in `search_map`.
+    Plans are sampled until one is suitable, as in `find_valid_map`.
 
     Parameters
     ----------
@@ -99,11 +99,11 @@ def build_floor_plan(kind: str, seed: int) -> Environment:
     ParameterError
         If no plan with this seed is suitable.
     """
-    return search_map(
+    return find_valid_map(
         kind,
         seed,
         kind_number=_SEED_ORDER.index(kind),
-        draw=FLOOR_PLANS[kind],
+        sample_plan=FLOOR_PLANS[kind],
         start_radius=_START_RADIUS_M,
         min_blocked_fraction=_MIN_BLOCKED_FRACTION,
     )

@@ -260,7 +260,7 @@ def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[
     )
     handles: list[Artist] = [robot_drawing.build_robot_handle(legend.ROBOT, theme.final, theme), border]
     legends = [
-        map_drawing.build_map_handles(snapshot.environment, theme, has_density=False)[1:]
+        map_drawing.build_map_handles(snapshot.environment, theme, show_density=False)[1:]
         for snapshot in snapshots
     ]
     for handle in legend.merge_legends(legends, map_drawing.get_label):
@@ -351,7 +351,7 @@ def _draw_snapshot(
         zorder=0,
     )
     image.set_clip_path(Polygon(snapshot.environment.region.vertices, transform=axes.transData))
-    map_drawing.draw_map(axes, snapshot.environment, theme, has_density=False, time=snapshot.time)
+    map_drawing.draw_map(axes, snapshot.environment, theme, show_density=False, time=snapshot.time)
     positions = snapshot.field.result.positions
     numbers = snapshot.numbers or range(1, len(positions) + 1)
     robot_drawing.draw_robots(axes, positions, snapshot.team.radius, numbers, theme)

@@ -65,7 +65,7 @@ def _build_path_style(theme: Theme) -> dict[str, Any]:
 
 
 def draw_map(
-    axes: Axes, environment: Environment, theme: Theme, *, has_density: bool = True, time: float = 0.0
+    axes: Axes, environment: Environment, theme: Theme, *, show_density: bool = True, time: float = 0.0
 ) -> None:
     """Draw a map: its density, obstacles at rest, moving obstacles and boundary.
 
@@ -75,12 +75,12 @@ def draw_map(
         Axes that show the map in meters.
     environment : Environment
     theme : Theme
-    has_density : bool
-        Whether the density is drawn.
+    show_density : bool
+        Whether to draw the density.
     time : float, s
         Time at which moving obstacles are drawn.
     """
-    if has_density and describe_density(environment):
+    if show_density and describe_density(environment):
         _draw_density(axes, environment, theme)
     for polygon in environment.at(time).blocked.geoms:
         rings = [
@@ -179,7 +179,7 @@ def get_label(handle: Artist) -> str:
     return str(handle.get_label())
 
 
-def build_map_handles(environment: Environment, theme: Theme, *, has_density: bool = True) -> list[Artist]:
+def build_map_handles(environment: Environment, theme: Theme, *, show_density: bool = True) -> list[Artist]:
     """Build the legend entries for what `draw_map` draws; the first one is the boundary."""
     handles: list[Artist] = [
         Line2D(
@@ -201,7 +201,7 @@ def build_map_handles(environment: Environment, theme: Theme, *, has_density: bo
         )
         handles.append(square)
     density = describe_density(environment)
-    if has_density and density:
+    if show_density and density:
         # A medium density, since the legend has a single color for the gradient.
         color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=to_plot_color(color), linewidth=0.0, label=density))

@@ -40,7 +40,7 @@ def compute_action_limits(action: Action, team: Team) -> FloatArray:
 def compute_driving_forces(
     action: Action, actions: FloatArray, velocities: FloatArray, team: Team
 ) -> FloatArray:
-    """Compute the forces with which robots execute their actions.
+    """Compute the forces that execute the actions.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def compute_driving_forces(
     Notes
     -----
     For a desired velocity u, the force is ``F = ν u + m (u - q') / τ``, where q' is the current velocity, and
-    τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates the viscosity of (28), the second one
-    accelerates the robot toward u.
+    τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates the viscous drag in equation (28) of the
+    paper; the second accelerates the robot toward u.
     """
     if action == "force":
         return actions

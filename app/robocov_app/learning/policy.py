@@ -96,7 +96,7 @@ class PolicyController:
 
     name: ClassVar[str] = "policy"
     label: ClassVar[str] = "policy"
-    summary: ClassVar[str] = "a policy that was learned"
+    summary: ClassVar[str] = "learned policy"
 
     policy: Policy | None = None
     layout: ObservationLayout = field(default_factory=ObservationLayout)
@@ -196,7 +196,7 @@ class ControllerPolicy:
     Parameters
     ----------
     controller : Controller
-        Controller that decides about the actions.
+        Controller that chooses the actions.
 
     See Also
     --------
@@ -250,7 +250,7 @@ class ControllerPolicy:
         if self._episode is not episode:
             self._start(episode)
         if self._decision_cycle != episode.cycle:
-            seen = replace(episode.observe(), scans=self._scan(episode))
+            seen = replace(episode.observe(), scans=self._take_due_scan(episode))
             decision = self._informed.decide(seen, self._memory)
             self._memory = decision.memory
             self._decision_cycle = episode.cycle
@@ -266,10 +266,10 @@ class ControllerPolicy:
         self._informed = inform_controller(self.controller, episode.environment)
         self._memory = self._informed.begin(episode.environment.region, episode.team)
 
-    def _scan(self, episode: Episode) -> Scans | None:
-        """Return new scans if they are due; otherwise None.
+    def _take_due_scan(self, episode: Episode) -> Scans | None:
+        """Scan if a scan is due, and schedule the next one; otherwise return None.
 
-        They are due as often as in a run, but at most once per decision.
+        Scans are due as often as in a run, but at most once per decision.
         """
         # Controllers in a user's file may lack this attribute.
         scanning: Scanning | None = getattr(self._informed, "scanning", None)

@@ -116,14 +116,15 @@ class CoverageTask:
     recording: bool = False
 
     def __post_init__(self) -> None:
-        self._check_times()
-        self._check_kinds()
+        self._check_numbers()
+        self._check_choices_and_types()
+        self._check_velocity_step()
         # The class is frozen. `team` and `robots` must agree, whichever was given.
         object.__setattr__(self, "team", self.whole_team)
         object.__setattr__(self, "robots", len(self.whole_team))
 
-    def _check_times(self) -> None:
-        """Check the number of robots, the durations and the numbers of control periods, and the penalty."""
+    def _check_numbers(self) -> None:
+        """Check that the numbers are in their ranges."""
         check_dt(self.dt)
         require_number("robots", self.robots, 1, MAX_ROBOTS, whole=True)
         require_number("repeat", self.repeat, 1, _MAX_REPEAT, whole=True)
@@ -138,21 +139,24 @@ class CoverageTask:
                 f"contact_penalty: expected a finite number of at least 0, got {quote(self.contact_penalty)}"
             )
 
-    def _check_kinds(self) -> None:
+    def _check_choices_and_types(self) -> None:
         """Check the kinds of action and reward, and the types of team, observation and conditions."""
         check_kind("reward", self.reward, REWARDS)
         check_kind("action", self.action, ACTIONS)
-        if self.action == "velocity" and self.dt > VELOCITY_TIME_CONSTANT_S:
-            raise ParameterError(
-                f"dt: expected at most {VELOCITY_TIME_CONSTANT_S:g} s for robots to follow velocities, "
-                f"got {self.dt:g} s"
-            )
         if self.team is not None:
             require_type("team", self.team, Team, "a Team")
         require_type("observation", self.observation, ObservationLayout, "an ObservationLayout")
         if self.conditions is not None:
             require_type("conditions", self.conditions, Conditions, "a Conditions")
             self.conditions.check_team(len(self.whole_team))
+
+    def _check_velocity_step(self) -> None:
+        """Check that the control period is short enough for robots to follow desired velocities."""
+        if self.action == "velocity" and self.dt > VELOCITY_TIME_CONSTANT_S:
+            raise ParameterError(
+                f"dt: expected at most {VELOCITY_TIME_CONSTANT_S:g} s for robots to follow velocities, "
+                f"got {self.dt:g} s"
+            )
 
     @property
     def whole_team(self) -> Team:

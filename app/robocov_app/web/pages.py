@@ -29,7 +29,7 @@ MAX_MAP_PIXELS = 1_000_000
 MAX_ASPECT_RATIO = 1.2
 """A page whose aspect differs from that of the window by more than this factor shows the map instead."""
 MAX_SHRINKAGE = 1.6
-"""A page on which the window would be smaller than in its own size by more than this factor, too."""
+"""A page that would shrink the window by more than this factor also shows the map instead."""
 MAX_NOTICES = 8
 """Maximum number of notices waiting to be sent to a page."""
 MAX_FRAMES_IN_FLIGHT = 2
@@ -133,7 +133,7 @@ class Page:
             pass
 
     def notify(self, notice: str) -> None:
-        """Show a message in the page."""
+        """Queue a message for the page."""
         self.notices.append(notice)
         self.has_updates.set()
 
@@ -352,14 +352,19 @@ def _needs_own_picture(settings: PageChanged, window: PageChanged) -> bool:
 
 
 def _choose_map_size(settings: PageChanged, sizes: list[MapSize]) -> MapSize:
-    """Return the size of the map for a page; add it to `sizes` unless these are `MAX_MAP_SIZES` already."""
+    """Return the map size for a page.
+
+    A new size is added to `sizes`, up to `MAX_MAP_SIZES`; beyond that, the size with the closest aspect ratio
+    is returned.
+    """
     size = _compute_map_size(settings)
-    if size not in sizes and len(sizes) >= MAX_MAP_SIZES:
-        aspect_ratio = size.width / size.height
-        return min(sizes, key=lambda other: abs(log(other.width / other.height / aspect_ratio)))
-    if size not in sizes:
+    if size in sizes:
+        return size
+    if len(sizes) < MAX_MAP_SIZES:
         sizes.append(size)
-    return size
+        return size
+    aspect_ratio = size.width / size.height
+    return min(sizes, key=lambda other: abs(log(other.width / other.height / aspect_ratio)))
 
 
 def _compute_map_size(settings: PageChanged) -> MapSize:

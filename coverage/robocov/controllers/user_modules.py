@@ -70,21 +70,27 @@ def explain_fault(context: str, error: BaseException, ending: str = "") -> Roboc
     Returns
     -------
     ControllerEndedError
-        For exceptions that would end Python, as `SystemExit` does. The message names file and line.
+        For exceptions that would terminate Python, as `SystemExit` does. The message names file and line.
     ParameterError
         For all other exceptions. The message names file and line.
     """
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
     location = _format_fault_location(error)
     suffix = location + "".join(f" for {note}" for note in notes) + ending
-    try:
-        message = str(error)
-    except Exception:  # The class of the exception may be the user's own.
-        message = "it has no message"
-    fault = f"{type(error).__name__}: {message}" if message else type(error).__name__
+    fault = _describe_exception(error)
     if isinstance(error, Exception):
         return ParameterError(f"{context}: {fault}{suffix}")
-    return ControllerEndedError(f"{context}: it ended Python with {fault}{suffix}")
+    return ControllerEndedError(f"{context}: it terminated Python by raising {fault}{suffix}")
+
+
+def _describe_exception(error: BaseException) -> str:
+    """Return the class and the message of an exception."""
+    name = type(error).__name__
+    try:
+        message = str(error)
+    except Exception:  # The class of the exception may be the user's own, and fail to build a message.
+        return f"{name} (no message)"
+    return f"{name}: {message}" if message else name
 
 
 def explain_user_fault(error: BaseException) -> RobocovError | None:

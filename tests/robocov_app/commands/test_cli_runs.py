@@ -170,7 +170,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ),
         (
             "def __post_init__(self): exit(0)",
-            "'Mine' cannot be created: it ended Python with SystemExit: 0 (mine.py, line 7)",
+            "'Mine' cannot be created: it terminated Python by raising SystemExit: 0 (mine.py, line 7)",
         ),
         (
             "def __post_init__(self): raise TypeError('no')",
@@ -197,7 +197,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ("scanning = 5", "controller 'Mine': scanning: expected a Scanning, got 5"),
         (
             "def begin(self, region, team): exit(1)",
-            "controller 'Mine': it ended Python with SystemExit: 1 (mine.py, line 7) at 0.000 s",
+            "controller 'Mine': it terminated Python by raising SystemExit: 1 (mine.py, line 7) at 0.000 s",
         ),
         (
             "def decide(self, seen, memory): return 3",
@@ -214,7 +214,7 @@ def test_an_invalid_controller_class_is_reported_with_its_line(
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")
     arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *arguments, status=1 if "ended Python" in part else 2)
+    assert part in read_error(capsys, *arguments, status=1 if "terminated Python" in part else 2)
     assert not out.exists()
 
 
@@ -266,7 +266,10 @@ def test_an_invalid_value_of_a_gain_is_rejected_in_a_short_line(
             "return None",
             "controller 'Mine': force(own) returned None (is a return statement missing?) for robot 1",
         ),
-        ("raise SystemExit(0)", "controller 'Mine': it ended Python with SystemExit: 0 (mine.py, line 5)"),
+        (
+            "raise SystemExit(0)",
+            "controller 'Mine': it terminated Python by raising SystemExit: 0 (mine.py, line 5)",
+        ),
         (
             "return [float('nan'), 0]",
             "controller 'Mine': force(own) returned [nan, 0] for robot 1 at 0.000 s",
@@ -288,7 +291,7 @@ def test_a_failing_controller_is_reported_with_its_line(
     )
     out = tmp_path / "run"
     arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *arguments, status=1 if "ended Python" in part else 2)
+    assert part in read_error(capsys, *arguments, status=1 if "terminated Python" in part else 2)
     assert not out.exists(), "no empty folder is left behind"
 
 

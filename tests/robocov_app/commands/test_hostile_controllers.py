@@ -1,4 +1,7 @@
-"""Controllers that end Python or close its output are reported in one line, with status 1."""
+"""Controllers that terminate Python exit with status 1, ordinary exceptions with 2.
+
+Both are reported in one line.
+"""
 
 from __future__ import annotations
 
@@ -30,26 +33,26 @@ class Mine:
         return 0.0, 0.0
 """
 SMALL = ["--duration", "0.3", "--robots", "2", "--lattice", "16", "--no-figures", "--out", "out"]
-RAISED = {
-    "sys.exit()": "controller 'Mine': it ended Python with SystemExit (mine.py, line 16) for robot 1 at 0.",
-    "sys.exit(0)": "controller 'Mine': it ended Python with SystemExit: 0 (mine.py, line 16)",
-    "raise Odd('hm')": "controller 'Mine': it ended Python with Odd: hm (mine.py, line 16)",
-    "raise GeneratorExit": "controller 'Mine': it ended Python with GeneratorExit (mine.py, line 16)",
-    "raise KeyboardInterrupt": "of your own: it ended Python with KeyboardInterrupt (mine.py, line 16)",
+EXITS = {
+    "sys.exit()": "it terminated Python by raising SystemExit (mine.py, line 16) for robot 1 at 0.",
+    "sys.exit(0)": "controller 'Mine': it terminated Python by raising SystemExit: 0 (mine.py, line 16)",
+    "raise Odd('hm')": "controller 'Mine': it terminated Python by raising Odd: hm (mine.py, line 16)",
+    "raise GeneratorExit": "'Mine': it terminated Python by raising GeneratorExit (mine.py, line 16)",
+    "raise KeyboardInterrupt": "it terminated Python by raising KeyboardInterrupt (mine.py, line 16)",
     "sys.stdout.close()": "controller mine.py:Mine: it closed the standard output",
     "os.close(1)": "controller mine.py:Mine: it closed the standard output",
     "os.close(2)": "controller mine.py:Mine: it closed the standard error",
 }
-ENDED = {
+TERMINATIONS = {
     "os._exit(0)": "mine.py:Mine: it terminated Python (exit status 0) before the command had finished",
     "os._exit(3)": "controller mine.py:Mine: it terminated Python (exit status 3)",
     "os.kill(os.getpid(), signal.SIGKILL)": "it terminated Python (killed by signal 9 (SIGKILL))",
     "os.abort()": "it terminated Python (killed by signal 6 (SIGABRT))",
 }
-ORDINARY = {
+EXCEPTIONS = {
     "self.force(own)": "controller 'Mine': RecursionError: ",
     "bytearray(1 << 62)": "controller 'Mine': MemoryError (mine.py, line 16)",
-    "raise Unspeakable": "controller 'Mine': Unspeakable: it has no message (mine.py, line 16)",
+    "raise Unspeakable": "controller 'Mine': Unspeakable (no message) (mine.py, line 16)",
 }
 
 
@@ -63,45 +66,45 @@ def run_command(folder: Path, body: str, *arguments: str) -> subprocess.Complete
     return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-def read_error_line(ended: subprocess.CompletedProcess[str]) -> str:
-    assert "Traceback" not in ended.stderr
-    assert "fault of robocov" not in ended.stderr
-    errors = [line for line in ended.stderr.splitlines() if line.startswith("robocov: error: ")]
-    assert len(errors) == 1, ended.stderr
+def read_error_line(result: subprocess.CompletedProcess[str]) -> str:
+    assert "Traceback" not in result.stderr
+    assert "fault of robocov" not in result.stderr
+    errors = [line for line in result.stderr.splitlines() if line.startswith("robocov: error: ")]
+    assert len(errors) == 1, result.stderr
     assert escape_controls(errors[0]) == errors[0]
     return errors[0]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("body", [*RAISED, *ENDED])
-def test_a_controller_that_ends_python_is_reported_in_one_line(folder: Path, body: str) -> None:
-    ended = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
-    assert ended.returncode == 1, ended.stderr
-    assert (RAISED | ENDED)[body] in read_error_line(ended)
+@pytest.mark.parametrize("body", [*EXITS, *TERMINATIONS])
+def test_a_controller_that_terminates_python_is_reported_in_one_line(folder: Path, body: str) -> None:
+    result = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+    assert result.returncode == 1, result.stderr
+    assert (EXITS | TERMINATIONS)[body] in read_error_line(result)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("body", ORDINARY)
+@pytest.mark.parametrize("body", EXCEPTIONS)
 def test_a_failing_controller_is_reported_in_one_line(folder: Path, body: str) -> None:
-    ended = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
-    assert ended.returncode == 2, ended.stderr
-    assert ORDINARY[body] in read_error_line(ended)
+    result = run_command(folder, body, "run", "square", "--controller", "mine.py:Mine", *SMALL)
+    assert result.returncode == 2, result.stderr
+    assert EXCEPTIONS[body] in read_error_line(result)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
-def test_a_comparison_ended_by_a_controller_is_reported(folder: Path) -> None:
-    ended = run_command(
+def test_a_comparison_terminated_by_a_controller_is_reported(folder: Path) -> None:
+    result = run_command(
         folder, "os._exit(0)", "compare", "square", "--controllers", "rpf", "mine.py:Mine", *SMALL
     )
-    assert ended.returncode == 1
-    assert ENDED["os._exit(0)"] in read_error_line(ended)
+    assert result.returncode == 1
+    assert TERMINATIONS["os._exit(0)"] in read_error_line(result)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")
 def test_supervision_does_not_change_the_output_of_a_correct_controller(folder: Path) -> None:
-    ended = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Mine", *SMALL, "--json")
-    assert ended.returncode == 0, ended.stderr
-    assert ended.stdout.startswith('{"out": "out"')
+    result = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Mine", *SMALL, "--json")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith('{"out": "out"')
     wrong = run_command(folder, "pass", "run", "square", "--controller", "mine.py:Yours", *SMALL)
     assert wrong.returncode == 2
     assert "unknown class 'Yours' (known: Mine" in read_error_line(wrong)
@@ -112,7 +115,7 @@ def test_supervision_does_not_change_the_output_of_a_correct_controller(folder: 
 def test_a_sweep_reports_the_controller_that_ends_its_worker(folder: Path, body: str) -> None:
     study = 'maps = ["square"]\ncontrollers = ["mine.py:Mine"]\nduration = 0.3\nrobots = 2\nlattice = 16\n'
     (folder / "study.toml").write_text(study)
-    ended = run_command(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
-    assert ended.returncode == 1
+    result = run_command(folder, body, "sweep", "study.toml", "--workers", "1", "--out", "out")
+    assert result.returncode == 1
     row = (folder / "out" / "results.csv").read_text().splitlines()[1]
     assert "mine.py:Mine" in row and "its process ended (" in row

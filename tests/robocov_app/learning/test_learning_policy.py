@@ -225,7 +225,7 @@ def test_the_command_line_accepts_a_policy(tmp_path: Path, capsys: pytest.Captur
     assert run["controller"]["gains"] == {"period": 0.2}
     policy_class = type(make_controller(name))
     assert policy_class.name == policy_class.label == "Outwards"
-    assert policy_class.summary == "a policy that was learned"
+    assert policy_class.summary == "learned policy"
 
 
 def test_invalid_policies_are_rejected(empty: Environment) -> None:

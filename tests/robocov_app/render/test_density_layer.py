@@ -155,12 +155,12 @@ def test_the_density_does_not_change_the_axes_of_a_figure() -> None:
 def test_the_legend_of_a_figure_contains_the_density_if_it_is_drawn() -> None:
     handles = build_map_handles(HEAVY, LIGHT)
     assert handles[-1].get_label() == "density φ, 0.1 to 2.1"
-    handles_without_density = build_map_handles(HEAVY, LIGHT, has_density=False)
+    handles_without_density = build_map_handles(HEAVY, LIGHT, show_density=False)
     assert len(handles_without_density) == len(build_map_handles(PLAIN, LIGHT))
 
 
 def test_a_figure_without_density_has_no_shading() -> None:
     axes = Figure().subplots()
     draw_map(axes, PLAIN, LIGHT)
-    draw_map(axes, HEAVY, LIGHT, has_density=False)
+    draw_map(axes, HEAVY, LIGHT, show_density=False)
     assert not axes.images

@@ -91,8 +91,14 @@ def test_the_middle_case_is_one_that_most_groups_have() -> None:
 
 
 def test_with_very_many_maps_the_extremes_of_all_maps_are_selected() -> None:
-    selection = select_runs(build_paired_result(maps=40, seeds=3))
-    assert len(selection.runs) <= 9
+    result = build_paired_result(maps=40, seeds=3)
+    selection = select_runs(result)
+    # The lowest, the highest and a middle cost of each controller.
+    assert len(selection.runs) <= 3 * len(CONTROLLERS)
+    for controller in CONTROLLERS:
+        selected = [run for run in selection.runs if run.controller == controller]
+        group = [run for run in result.runs if run.controller == controller]
+        assert find_range(selected) == find_range(group)
     assert selection.note.startswith(f"{len(selection.runs)} of 360 runs: over all maps")
 
 

@@ -95,7 +95,7 @@ def test_the_source_of_a_custom_controller_is_saved(tmp_path: Path) -> None:
         ),
         (
             "        raise SystemExit(3)\n",
-            "controller 'Mine': it ended Python with SystemExit: 3 (mine.py, line 11) for robot 1 at 0.000 s",
+            "controller 'Mine': it terminated Python by raising SystemExit: 3 (mine.py, line 11) for robot 1",
         ),
         (
             "        raise ValueError('a\\nb\\udcff')\n",
@@ -111,7 +111,7 @@ def test_the_source_of_a_custom_controller_is_saved(tmp_path: Path) -> None:
 def test_errors_are_outcomes(tmp_path: Path, code: str, message: str) -> None:
     write_controller(tmp_path, "")
     task = get_first_task(build_small_study(controllers=("mine.py:Mine",), folder=tmp_path))
-    # the file is well when the study is made
+    # The file is correct when the study is built, and fails only when the task is performed.
     assert task.source is not None
     task = replace(task, source=task.source._replace(text=HEAD + code))
     outcome = perform(task)

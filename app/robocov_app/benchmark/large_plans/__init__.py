@@ -14,7 +14,7 @@ from robocov_app.benchmark.large_plans.office_floors import draw_office_floor
 from robocov_app.benchmark.large_plans.schools import draw_school
 from robocov_app.benchmark.large_plans.tunnels import draw_tunnels
 from robocov_app.benchmark.large_plans.wards import draw_ward
-from robocov_app.benchmark.plan_search import search_map
+from robocov_app.benchmark.plan_search import find_valid_map
 from robocov_app.benchmark.plan_shapes import FloorPlan
 
 _FIRST_KIND_NUMBER = 100
@@ -59,10 +59,10 @@ def build_large_plan(kind: str, seed: int) -> Environment:
         If no suitable plan is found with this seed.
     """
     layout = seed % _LAYOUTS
-    return search_map(
+    return find_valid_map(
         kind,
         seed,
         kind_number=_FIRST_KIND_NUMBER + list(LARGE_PLANS).index(kind),
-        draw=lambda rng: LARGE_PLANS[kind](rng, layout),
+        sample_plan=lambda rng: LARGE_PLANS[kind](rng, layout),
         start_radius=_START_RADIUS_M,
     )

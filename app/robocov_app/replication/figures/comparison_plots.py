@@ -19,7 +19,7 @@ from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, 
 from robocov_app.look.theme import Theme
 from robocov_app.replication.design.contenders import OURS
 from robocov_app.replication.figures.paper_figures import PAGE_SCALE, WIDE_PX
-from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison
+from robocov_app.replication.results.outcomes import GainOutcomes, Outcomes, PairedComparison, get_level
 
 Draw: TypeAlias = Callable[[], Figure]
 """Draws a figure."""
@@ -184,10 +184,13 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
 
 
 def _compute_mean_gaps(grid: GainOutcomes, k_rep: list[float], rho_0: list[float]) -> FloatArray:
-    """Return the mean gap for each rho_0 (row) and k_rep (column), %; nan for pairs that were not tried."""
+    """Return the mean gap for each rho_0 (row) and k_rep (column), %.
+
+    It is nan for pairs that were not tried or with a failed run.
+    """
     gaps = np.full((len(rho_0), len(k_rep)), np.nan)
     for gains, relative_costs in zip(grid.gains, grid.relative_costs, strict=True):
-        row = rho_0.index(float(gains["rho_0"] or 0.0))
-        column = k_rep.index(float(gains["k_rep"] or 0.0))
+        row = rho_0.index(get_level(gains, "rho_0"))
+        column = k_rep.index(get_level(gains, "k_rep"))
         gaps[row, column] = 100.0 * (relative_costs.mean() - 1.0)
     return gaps

@@ -230,13 +230,21 @@ class GainOutcomes:
         return int(np.argmin(relative_costs[:, is_complete].mean(axis=1)))
 
     def list_levels(self, gain: str) -> list[float]:
-        """Return the different values of a gain in ascending order; a gain without a value counts as 0."""
-        return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
+        """Return the different values of a numeric gain, in ascending order."""
+        return sorted({get_level(gains, gain) for gains in self.gains if gain in gains})
 
     def select_gain(self, name: str, value: float) -> GainOutcomes:
         """Return the outcomes of the sets in which the named gain has the given value."""
         mask = [gains.get(name) == value for gains in self.gains]
         return GainOutcomes(self.instances, tuple(compress(self.gains, mask)), self.relative_costs[mask])
+
+
+def get_level(gains: Mapping[str, Value], name: str) -> float:
+    """Return the value of a gain in a set, as a number."""
+    value = gains[name]
+    # Only the limit of the attraction can be None, for no limit, and no grid varies it.
+    assert value is not None
+    return float(value)
 
 
 def find_best_gains(outcomes: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Value]]:

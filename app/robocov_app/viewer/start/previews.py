@@ -21,10 +21,10 @@ PREVIEW_FILE = Path(__file__).with_name("assets") / "previews.npz"
 """Recorded by ``python -m robocov_app.viewer.start.recording``."""
 FRAMES_PER_SECOND = 4.0
 """Recorded frames per second of a preview; positions between them are interpolated."""
-END_S = 2.0
+LAST_FRAME_HOLD_S = 2.0
 """Time for which a preview stays at its last frame."""
-MAX_SHOWN_NUMBERS = 9
-"""Number of robots above which robots are drawn small."""
+MAX_LARGE_ROBOTS = 9
+"""Maximum number of robots that are drawn at full size."""
 
 _CENTIMETERS = 100.0
 _SUPERSAMPLING = 3
@@ -34,8 +34,8 @@ _EDGE_SMOOTHINGS = 2
 """Number of times that the grid of owners is doubled; slanted edges lose their steps."""
 _OUTLINE_CACHE_BYTES = 12_000_000
 
-_MIN_RADII_PER_WIDTH = 26
-"""Width of a preview in radii of its robots, at least."""
+_MIN_WIDTH_IN_RADII = 26
+"""Minimum width of a preview, in robot radii."""
 
 # Lengths in pixels at scale 1.
 _ROBOT_PX = 5.0
@@ -96,7 +96,7 @@ class RunPreview:
     @property
     def duration(self) -> float:
         """Time until the preview repeats, s."""
-        return (len(self.positions) - 1) / FRAMES_PER_SECOND + END_S
+        return (len(self.positions) - 1) / FRAMES_PER_SECOND + LAST_FRAME_HOLD_S
 
     def interpolate(self, seconds: float) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the positions, (n, 2) m, and the owners, (rows, columns), at a time of the preview."""
@@ -252,9 +252,9 @@ def draw_run(
     screen.blit(_render_cells(owners, run.hues, fitted.size, theme), fitted)
     draw_outline(screen, run.outline, box, theme, scale, outside=outside)
     left, bottom, right, top = run.outline.bounds
-    is_small = len(run.hues) > MAX_SHOWN_NUMBERS
+    is_small = len(run.hues) > MAX_LARGE_ROBOTS
     radius = (_SMALL_ROBOT_PX if is_small else _ROBOT_PX) * scale
-    radius = min(radius, max(fitted.width / _MIN_RADII_PER_WIDTH, 2.0))
+    radius = min(radius, max(fitted.width / _MIN_WIDTH_IN_RADII, 2.0))
     for hue, (x, y) in zip(run.hues.tolist(), positions.tolist(), strict=True):
         disc = sprites.render_disc(
             radius,

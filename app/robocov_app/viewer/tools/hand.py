@@ -49,14 +49,14 @@ class HandTool(ViewerTool):
     hovered: Obstacle | None = None
     _pressed_at: Point = (0.0, 0.0)
     _reach: float = 0.0  # of the latest event, m
-    _drags: bool = False
+    _has_dragged: bool = False
     _is_over_handle: bool = False
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Grab the handle, robot or obstacle under the cursor; with Shift, start a box on the floor."""
         self._pressed_at = event.unsnapped_point
         self._reach = event.reach
-        self._drags = False
+        self._has_dragged = False
         self.drag = self._start_handle_drag(session, event)
         self.robot = None
         if self.drag is not None:
@@ -108,20 +108,20 @@ class HandTool(ViewerTool):
         """Drag the held robot; held obstacles are changed only when the button is released."""
         self._reach = event.reach
         if not self.is_holding:
-            self._hover(session, event)
+            self._update_hover(session, event)
             return
         if self.drag is not None:
             self.drag.update(event)
         if dist(self._pressed_at, event.unsnapped_point) > MIN_DRAG_M:
-            self._drags = True
-        if self.robot is None or not self._drags:
+            self._has_dragged = True
+        if self.robot is None or not self._has_dragged:
             return
         # The robot may have been removed while it was held.
         if self.robot in session.displayed.get_setup(session.timeline.panes[0]).all_numbers:
             session.drag_robot(self.robot, event.unsnapped_point)
 
-    def _hover(self, session: Session, event: ViewerPointerEvent) -> None:
-        """Find the handle or the obstacle under the pointer; a robot in front of it takes precedence."""
+    def _update_hover(self, session: Session, event: ViewerPointerEvent) -> None:
+        """Find the handle under the pointer or, if there is no handle or robot, the obstacle."""
         environment = session.displayed.environment
         self.hovered = None
         selected = self._get_single_selection(session)

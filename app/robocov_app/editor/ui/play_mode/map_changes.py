@@ -1,4 +1,4 @@
-"""The change of the edited map by obstacles that were drawn, moved or deleted in play mode."""
+"""Transfers obstacles edited in play mode to the edited map."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from robocov_app.editor.model.sketch import Item, Sketch
 
 
 def build_play_change(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Build one change of all obstacles that were drawn, moved or deleted in the viewer.
+    """Combine all obstacle edits made in the viewer into one change.
 
     Parameters
     ----------
@@ -20,8 +20,10 @@ def build_play_change(sketch: Sketch, before: Environment, after: Environment) -
     Returns
     -------
     Change or None
-        None if no obstacle has changed. Unchanged obstacles keep their keys and marks.
+        None if no obstacle has changed, or if the viewer shows a map with another boundary. Unchanged
+        obstacles keep their keys and marks.
     """
+    # The viewer cannot edit the boundary. With another one, it shows another map, such as that of a lesson.
     if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
         return None
     remaining = list(sketch.obstacles)
@@ -37,5 +39,5 @@ def build_play_change(sketch: Sketch, before: Environment, after: Environment) -
             items.append(Item(key, shape))
             key += 1
     new = frozenset(item.key for item in items if item.key not in sketch.index_by_key)
-    description = "changes made while trying it"
+    description = "changes made in play mode"
     return Change(replace(sketch, obstacles=tuple(items)), Selection(items=new), description)
