@@ -10,7 +10,7 @@ from robocov_app.toolkit.window.layout import build_layout, find_max_scale, is_i
 def test_the_panel_is_to_the_right_of_the_map() -> None:
     layout = build_layout((1280, 720), 1.0, 1, 4 / 3)
     assert layout.panel == (960, 44, 320, 676)
-    assert layout.arena == (128, 44, 832, 506)
+    assert layout.arena == (136, 44, 824, 506)
 
 
 def test_a_box_does_not_contain_its_right_edge() -> None:
