@@ -5,6 +5,9 @@ import numpy as np
 from robocov.environment import Environment
 from robocov_app.render.density_shading import get_density_range
 
+_MIN_SHOWN_FRACTION = 1e-3
+"""Fraction of the maximum density below which a density is written as 0."""
+
 
 def describe_density(environment: Environment) -> str:
     """Return the range of the density as text; an empty text if the density is uniform."""
@@ -22,8 +25,19 @@ def describe_density_range(low: float, high: float) -> str:
     --------
     >>> describe_density_range(0.5, 7.5)
     'density φ, 0.5 to 7.5'
+
+    The tail of a Gaussian far from its center is written as 0:
+
+    >>> describe_density_range(1e-65, 4.0)
+    'density φ, 0 to 4'
     """
-    return f"density φ, {low:.3g} to {high:.3g}"
+    return f"density φ, {_format_range(low, high)}"
+
+
+def _format_range(low: float, high: float) -> str:
+    """Return two densities as text, such as "0.5 to 7.5"."""
+    shown_low = low if low >= _MIN_SHOWN_FRACTION * high else 0.0
+    return f"{shown_low:.3g} to {high:.3g}"
 
 
 def get_density_kind(environment: Environment) -> str | None:
@@ -39,7 +53,7 @@ def list_density_lines(environment: Environment) -> list[str]:
     if density is None or density.is_uniform:
         return []
     low, high = get_density_range(environment)
-    return [f"weighted by φ   {density.kind}, {low:.3g} to {high:.3g}"]
+    return [f"weighted by φ   {density.kind}, {_format_range(low, high)}"]
 
 
 def get_cost_name(environment: Environment) -> str:

@@ -50,8 +50,8 @@ MIN_REPORT_LINES = 7
 KEEP_PART = "part"
 SET_COLOR = "color"
 HINTS = {
-    KEEP_PART: "Click a part of the map to keep it · Tab: next option · Enter: import · Esc: cancel",
-    SET_COLOR: "Click a color in the left map, or choose one above: free, solid or ignored · Enter: import",
+    KEEP_PART: "Click a part of the map to keep it · Enter: import · Esc: cancel",
+    SET_COLOR: "Click a color in the left map, or choose one above · Enter: import",
 }
 _ROLE_LABELS = {None: "default", "free": "free", "solid": "solid", "ignore": "ignored"}
 

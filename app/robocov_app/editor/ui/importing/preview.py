@@ -158,7 +158,7 @@ def _list_captions(imported: Imported, theme: Theme, *, has_own_colors: bool) ->
     facts_before = f"{format_area(comparison.before.area)} free"
     facts_after = f"{format_area(comparison.after.area)} free"
     if comparison.gap is not None:
-        facts_after += f", narrowest passage {comparison.gap.width:.3g} m"
+        facts_after += f", narrowest {comparison.gap.width:.3g} m"
     if has_own_colors:
         before = _Caption("In its colors", facts_before, "", theme.error)
     else:
