@@ -12,7 +12,7 @@ from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.record import Record
 from robocov.team import Team
 from robocov_app.report.results.result import (
-    FIGURE_NAMES,
+    METRIC_NAMES,
     Gains,
     ReportedResult,
     ReportedRun,
@@ -90,10 +90,10 @@ def build_run(
     team: TeamParameters = (),
     start: str | None = "spread",
     error: str | None = None,
-    **figures: float | None,
+    **metrics: float | None,
 ) -> ReportedRun:
     """Return a run of a result."""
-    all_figures = dict.fromkeys(FIGURE_NAMES) | {"mean_distance_m": final, "contacts": 0} | figures
+    all_metrics = dict.fromkeys(METRIC_NAMES) | {"mean_distance_m": final, "contacts": 0} | metrics
     properties = (map_name, controller, robots, start, seed, gains, team)
     folder_name = "-".join(map(str, properties)).replace("/", "-")
     return ReportedRun(
@@ -105,7 +105,7 @@ def build_run(
         start=start,
         seed=seed,
         gains=gains,
-        figures={} if error else all_figures,
+        metrics={} if error else all_metrics,
         error=error,
         folder=Path(folder_name),
     )

@@ -1,7 +1,7 @@
 """The program of a process in which a controller decides during a verification.
 
 It receives the observations of one robot, or those of the whole team, step by step, and answers with forces,
-goals and messages. It never has the observations of later steps, the simulation or its figures, and it has
+goals and messages. It never has the observations of later steps, the simulation or its metrics, and it has
 the map only if the controller declares the information "whole map". So there is nothing here that the code of
 a controller could look up or change.
 """

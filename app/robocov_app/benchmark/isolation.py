@@ -1,7 +1,7 @@
 """A team whose robots are controlled by separate processes, each of which gets its own observations only.
 
 During a verification, the code of a controller is never in the process that simulates the run, records it and
-computes its figures. That process, the referee, calls an `IsolatedTeam`, which asks other processes for a
+computes its metrics. That process, the referee, calls an `IsolatedTeam`, which asks other processes for a
 decision in each step:
 
 - one process decides for the whole team. Its decisions are executed.

@@ -117,13 +117,13 @@ class Rating:
     rows: Sequence[Mapping[str, Any]]
     failed: int
 
-    def get_values(self, figure: str) -> FloatArray:
-        """Return the values of a figure in the runs that have one, (m,)."""
-        return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
+    def get_values(self, metric: str) -> FloatArray:
+        """Return the values of a metric in the runs that have one, (m,)."""
+        return np.array([row[metric] for row in self.rows if row[metric] is not None], dtype=float)
 
-    def compute_median(self, figure: str) -> float:
-        """Return the median of a figure over the runs; nan if no run has a value."""
-        values = self.get_values(figure)
+    def compute_median(self, metric: str) -> float:
+        """Return the median of a metric over the runs; nan if no run has a value."""
+        values = self.get_values(metric)
         return float(np.median(values)) if len(values) else float("nan")
 
     @property
@@ -176,10 +176,10 @@ class Rating:
         median = estimate_median_time(rest_times, censored)
         return fraction, median if np.isfinite(median) else None
 
-    def compute_rate(self, figure: str) -> float:
-        """Return the median of a figure per robot and second of simulation time."""
+    def compute_rate(self, metric: str) -> float:
+        """Return the median of a metric per robot and second of simulation time."""
         track = suite.TRACKS[self.track]
-        return self.compute_median(figure) / (track.robots * track.duration)
+        return self.compute_median(metric) / (track.robots * track.duration)
 
 
 def list_run_keys(track_name: str) -> list[RunKey]:

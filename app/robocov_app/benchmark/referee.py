@@ -1,4 +1,4 @@
-"""Repeated runs: the referee simulates a run and computes its figures, and its controller decides elsewhere.
+"""Repeated runs: the referee simulates a run and computes its metrics, and its controller decides elsewhere.
 
 A referee is the process of one run. It never imports the code of a user: its simulation gets the forces,
 goals and messages of the robots from other processes, see `robocov_app.benchmark.isolation`. Forces must be
@@ -62,7 +62,7 @@ class RunCheck:
     robots : int
         Number of robots in processes of their own.
     differences : list of str
-        Everything that is not as expected, apart from the figures of the run.
+        Everything that is not as expected, apart from the metrics of the run.
     read_files : list of str
         Files that the controller has read, apart from those of Python and installed packages.
     """

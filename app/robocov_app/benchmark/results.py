@@ -27,7 +27,7 @@ RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
 """Entries of a result that identify its format."""
 MAX_LABEL_CHARS = 60
 """Maximum length of the label of an entry."""
-FIGURES = (
+METRICS = (
     "mean_distance_m",
     "mean_distance_over_run_m",
     "uncovered_area_m2",
@@ -39,15 +39,15 @@ FIGURES = (
     "min_clearance_m",
     "stuck_robots",
 )
-"""Figures of a run that a row contains in addition to its effort and its gaps."""
-_FORMER_FIGURE_NAMES = {"told_bytes": "sent_bytes"}
-"""Names of figures in rows of earlier versions, with those of today."""
+"""Metrics of a run that a row contains in addition to its effort and its gaps."""
+_FORMER_METRIC_NAMES = {"told_bytes": "sent_bytes"}
+"""Names of metrics in rows of earlier versions, with those of today."""
 _RESULTS_VERSION_PATTERN = re.compile(r"\(results (\d+)\)")
 """Number of the results' version in that of robocov; see `robocov_app.sweep.worker.list_result_versions`."""
 _FIRST_VERSION_WITH_MESSAGES = 5
 """Version of the results from which on the built-in controllers share maps by messages."""
 Row: TypeAlias = dict[str, Any]
-"""One run of a result: its track, map and seed, and its figures or its error."""
+"""One run of a result: its track, map and seed, and its metrics or its error."""
 
 
 def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
@@ -90,7 +90,7 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     task : Task
         The run.
     run : Entry or Outcome
-        The figures of the run, or its error.
+        The metrics of the run, or its error.
     effort : bytes
         Content of the run's ``effort.json``.
 
@@ -101,21 +101,21 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     head: Row = {"track": track, "map": task.map, "seed": task.seed}
     if run.error is not None:
         return {**head, "error": run.error}
-    figures = {name: run.figures[name] for name in FIGURES}
-    row = {**head, **figures, **json.loads(effort), **compute_gaps(track, task.map, figures)}
+    metrics = {name: run.metrics[name] for name in METRICS}
+    row = {**head, **metrics, **json.loads(effort), **compute_gaps(track, task.map, metrics)}
     _update_row_names(row)
     return row
 
 
-def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[str, float | None]:
+def compute_gaps(track: str, map_name: str, metrics: Mapping[str, Any]) -> dict[str, float | None]:
     """Compute the gaps of a run to the reference placement and to the certified lower bound.
 
     Parameters
     ----------
     track, map_name : str
         Track and map of the run.
-    figures : Mapping
-        Figures of the run.
+    metrics : Mapping
+        Metrics of the run.
 
     Returns
     -------
@@ -124,9 +124,9 @@ def compute_gaps(track: str, map_name: str, figures: Mapping[str, Any]) -> dict[
         a different area from that of the reference. ``gap_to_bound`` is also None if no bound is known.
     """
     reference = find_reference(map_name, suite.TRACKS[track].survivors)
-    if abs(figures["uncovered_area_m2"] - reference["uncovered_area_m2"]) > AREA_TOLERANCE_M2:
+    if abs(metrics["uncovered_area_m2"] - reference["uncovered_area_m2"]) > AREA_TOLERANCE_M2:
         return {"gap": None, "gap_to_bound": None}
-    cost = figures["mean_distance_m"]
+    cost = metrics["mean_distance_m"]
     bound = reference["lower_bound_m"]
     gap_to_bound = cost / bound - 1.0 if bound else None
     return {"gap": cost / reference["mean_distance_m"] - 1.0, "gap_to_bound": gap_to_bound}
@@ -146,7 +146,7 @@ def identify_suite() -> dict[str, str]:
 
 
 def describe_method() -> list[str]:
-    """Return sentences that describe the method of the benchmark and its figures."""
+    """Return sentences that describe the method of the benchmark and its metrics."""
     return [
         f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
         f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
@@ -220,7 +220,7 @@ def read_result(path: Path) -> dict[str, Any]:
     _check_all_except_rows(result, path)
     result["is_bundled"] = False
     _update_gain_names(result["entry"])
-    result["method"] = [_update_figure_names(str(sentence)) for sentence in result["method"]]
+    result["method"] = [_update_metric_names(str(sentence)) for sentence in result["method"]]
     runs = set()
     for k, row in enumerate(result["rows"]):
         location = f"{path}: rows[{k}]"
@@ -270,15 +270,15 @@ _RUN_TYPES = {"track": str, "map": str, "seed": int}
 _FAILED_ROW_TYPES = {**_RUN_TYPES, "error": str}
 _ROW_TYPES = {
     **_RUN_TYPES,
-    **dict.fromkeys((*FIGURES, "gap", "gap_to_bound"), int | float | None),
+    **dict.fromkeys((*METRICS, "gap", "gap_to_bound"), int | float | None),
     **dict.fromkeys(
         ("mean_distance_m", "uncovered_area_m2", "path_length_m", "contacts", "sent_bytes", "deciding_s"),
         int | float,
     ),
 }
-_FIGURES_THAT_MAY_BE_NEGATIVE = ("min_clearance_m", "gap", "gap_to_bound")
-_MAX_FIGURE = 1e15
-"""Maximum of all figures, which no run reaches."""
+_METRICS_THAT_MAY_BE_NEGATIVE = ("min_clearance_m", "gap", "gap_to_bound")
+_MAX_METRIC = 1e15
+"""Maximum of all metrics, which no run reaches."""
 _BOUND_TOLERANCE = 1e-9
 """Fraction by which rounding errors may make a cost lower than the lower bound."""
 
@@ -305,33 +305,33 @@ def _update_gain_names(entry: dict[str, Any]) -> None:
         entry[key] = update_gain_names(entry["controller"], entry[key])
 
 
-def _update_figure_names(text: str) -> str:
-    """Replace, in a text, the names of figures that were renamed."""
-    for former_name, name in _FORMER_FIGURE_NAMES.items():
+def _update_metric_names(text: str) -> str:
+    """Replace, in a text, the names of metrics that were renamed."""
+    for former_name, name in _FORMER_METRIC_NAMES.items():
         text = text.replace(former_name, name)
     return text
 
 
 def _update_row_names(row: Any) -> None:
-    """Replace, in place, the names of figures that were renamed since a row was made."""
-    for former_name, name in _FORMER_FIGURE_NAMES.items():
+    """Replace, in place, the names of metrics that were renamed since a row was made."""
+    for former_name, name in _FORMER_METRIC_NAMES.items():
         if isinstance(row, dict) and former_name in row:
             row[name] = row.pop(former_name)
 
 
 def _check_row(row: Any, location: str) -> None:
-    """Raise InputError unless a row belongs to a run of the suite, and its figures are possible."""
+    """Raise InputError unless a row belongs to a run of the suite, and its metrics are possible."""
     has_failed = isinstance(row, dict) and "error" in row
     _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, location)
     if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
         raise InputError(f"{location}: {row['track']} on {row['map']} is not a run of the suite")
     if has_failed:
         return
-    for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_FIGURES_THAT_MAY_BE_NEGATIVE}):
+    for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_METRICS_THAT_MAY_BE_NEGATIVE}):
         if row[name] is not None and row[name] < 0.0:
             raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
-        if row[name] is not None and row[name] > _MAX_FIGURE:
-            raise InputError(f"{location}: {name}: expected at most {_MAX_FIGURE:g}, got {row[name]}")
+        if row[name] is not None and row[name] > _MAX_METRIC:
+            raise InputError(f"{location}: {name}: expected at most {_MAX_METRIC:g}, got {row[name]}")
     if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
         raise InputError(
             f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "

@@ -7,8 +7,8 @@ to compute its hash, and lets other processes execute it:
 process            executes                                    sends
 =================  ==========================================  =====================================
 verification       nothing of the user                         runs to referees
-referee            nothing of the user: simulation, record,    observations to controllers; figures,
-(one for a run)    figures, comparison of decisions            differences to the verification
+referee            nothing of the user: simulation, record,    observations to controllers; metrics,
+(one for a run)    metrics, comparison of decisions            differences to the verification
 controller (for    the code of the user, under a guard         forces, goals, messages to the
 team or robot)                                                 referee, as plain numbers and bytes
 =================  ==========================================  =====================================
@@ -66,7 +66,7 @@ NEW_MAP = "new map"
 CHANGED_FRACTION = 0.05
 """Fraction of changed rows for which the probability of missing all of them is reported."""
 _MACHINE_DEPENDENT = ("deciding_s",)
-"""Figures that differ from run to run and are not compared."""
+"""Metrics that differ from run to run and are not compared."""
 _DESCRIBED = ("controller", "label", "information", "gains")
 """Parts of an entry that describe its controller and are compared."""
 _POLL_INTERVAL_S = 0.2
@@ -239,7 +239,7 @@ def verify_result(
     """Verify a result of the benchmark.
 
     1. The gaps of all rows are recomputed, and missing rows are found.
-    2. A sample of the runs is repeated, and must give the same figures, bit for bit
+    2. A sample of the runs is repeated, and must give the same metrics, bit for bit
        (`robocov_app.benchmark.referee`).
     3. In these runs, the decisions of some robots are repeated in separate processes that each receive only
        the observations of one robot (`robocov_app.benchmark.isolation`).
@@ -462,7 +462,7 @@ def _check_in_threads(
 
 
 def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
-    """List the differences found in a run: in its figures, and in the decisions of its robots."""
+    """List the differences found in a run: in its metrics, and in the decisions of its robots."""
     differences = [f"{_format_key(key)}: {difference}" for difference in check.differences]
     if row is not None and check.outcome is not None:
         effort = check.outcome.files.get(EFFORT_FILE, b"{}")
@@ -500,8 +500,8 @@ def _compute_new_gaps(
         if reference is None:
             continue
         gap = math.inf
-        if outcome is not None and outcome.error is None and not outcome.figures["uncovered_area_m2"]:
-            cost = outcome.figures["mean_distance_m"]
+        if outcome is not None and outcome.error is None and not outcome.metrics["uncovered_area_m2"]:
+            cost = outcome.metrics["mean_distance_m"]
             assert cost is not None
             gap = cost / reference.mean_distance - 1.0
         gaps.append((new_map.family, gap))
@@ -549,7 +549,7 @@ def _format_key(key: RunKey) -> str:
 
 
 def _list_differences(key: RunKey, row: Row, recomputed: Mapping[str, Any]) -> list[str]:
-    """List the figures of a row that differ from recomputed ones."""
+    """List the metrics of a row that differ from recomputed ones."""
     return [
         f"{_format_key(key)}: {name}: expected {value}, got {row.get(name)}"
         for name, value in recomputed.items()

@@ -184,21 +184,21 @@ def format_run_title(result: ReportedResult, run: ReportedRun, label: str) -> st
 
 
 def format_run_facts(result: ReportedResult, run: ReportedRun) -> str:
-    """Describe the gains and the most important figures of a run in a sentence."""
+    """Describe the gains and the most important metrics of a run in a sentence."""
     texts = []
     if run.gains:
         texts.append(f"Gains: {format_gains(run.gains, result.gain_units)}")
-    if run.has_figure("mean_time_s"):
-        texts.append(f"mean time {run.figures['mean_time_s']:.3f} s")
-    settled_at = run.figures.get("settled_at_s")
+    if run.has_metric("mean_time_s"):
+        texts.append(f"mean time {run.metrics['mean_time_s']:.3f} s")
+    settled_at = run.metrics.get("settled_at_s")
     if settled_at is None:
         texts.append("not settled")
     else:
         texts.append(f"settled at {settled_at:.1f} s")
-    contacts = run.figures.get("contacts")
+    contacts = run.metrics.get("contacts")
     if contacts is not None:
         texts.append(format_count(int(contacts), "contact"))
-    path_length = run.figures.get("path_length_m")
+    path_length = run.metrics.get("path_length_m")
     if path_length is not None:
         texts.append(f"mean path length {path_length:.2f} m")
     return f"{'; '.join(texts)}."

@@ -56,7 +56,7 @@ def _summarize_run(result: ReportedResult, run: ReportedRun) -> str:
     gap = result.compute_gap(run)
     if np.isfinite(gap):
         text += f", a gap of {100 * gap:.1f}% to the best known placement"
-    settled_at = run.figures.get("settled_at_s")
+    settled_at = run.metrics.get("settled_at_s")
     if settled_at is None:
         return f"{text}; not settled by the end."
     return f"{text}; settled after {settled_at:.1f} s."
@@ -125,11 +125,11 @@ def list_problems(result: ReportedResult) -> list[str]:
     """Describe in how many runs there were contacts, stuck robots, and teams that had not settled."""
     runs = result.completed_runs
     stuck_problem = "a robot was stuck at the end"
-    if len(runs) == 1 and (runs[0].figures.get("stuck_robots") or 0) > 1:
-        stuck_problem = f"{runs[0].figures['stuck_robots']} robots were stuck at the end"
+    if len(runs) == 1 and (runs[0].metrics.get("stuck_robots") or 0) > 1:
+        stuck_problem = f"{runs[0].metrics['stuck_robots']} robots were stuck at the end"
     counts = {
-        "a robot touched a wall or another one": sum((run.figures.get("contacts") or 0) > 0 for run in runs),
-        stuck_problem: sum((run.figures.get("stuck_robots") or 0) > 0 for run in runs),
+        "a robot touched a wall or another one": sum((run.metrics.get("contacts") or 0) > 0 for run in runs),
+        stuck_problem: sum((run.metrics.get("stuck_robots") or 0) > 0 for run in runs),
         "the team had not settled by the end": sum(_is_unsettled(run) for run in runs),
     }
     problems = {problem: count for problem, count in counts.items() if count}
@@ -140,4 +140,4 @@ def list_problems(result: ReportedResult) -> list[str]:
 
 def _is_unsettled(run: ReportedRun) -> bool:
     """Return whether the team of a run had not settled by the end."""
-    return run.has_figure("mean_distance_m") and not run.has_figure("settled_at_s")
+    return run.has_metric("mean_distance_m") and not run.has_metric("settled_at_s")

@@ -28,11 +28,11 @@ from robocov.files.result_folder import report_folder_errors
 from robocov.files.result_names import ERROR_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE, SWEEP_TABLE_FILE
 from robocov.files.writing import flush_to_disk
 from robocov_app.sweep.tasks import Task
-from robocov_app.sweep.worker import FIGURES, Outcome, list_result_versions
+from robocov_app.sweep.worker import METRICS, Outcome, list_result_versions
 from robocov_app.terminal.output import write_json
 
 _ROW_FILE = "row.json"
-"""File in the folder of a run with its figures for the table and the checksums of its other files."""
+"""File in the folder of a run with its metrics for the table and the checksums of its other files."""
 _ROW_FORMAT = "robocov-row"
 _ROW_VERSION = 2
 _CHECKSUM_BYTES = 16
@@ -40,6 +40,8 @@ _TEMPORARY_NAME = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
 """Names of incomplete files and folders, which a killed sweep leaves behind."""
+_METRICS_KEY = "figures"
+"""Key of the metrics in `_ROW_FILE`. It never changes, so that existing runs can be reused."""
 _MAX_NAMED_RUNS = 5
 """Maximum number of damaged runs that a message names."""
 
@@ -47,8 +49,8 @@ _MAX_NAMED_RUNS = 5
 class Entry(NamedTuple):
     """The ledger's entry of a run."""
 
-    figures: Mapping[str, float | int | None]
-    """Figures in the table; empty if the run failed."""
+    metrics: Mapping[str, float | int | None]
+    """Metrics in the table; empty if the run failed."""
     error: str | None
     """Reason why the run failed; None if it did not."""
     versions: Mapping[str, str] = {}
@@ -204,20 +206,20 @@ class Ledger:
             return None
         try:
             row = json.loads(_read_file(folder / _ROW_FILE))
-            figures = row["figures"]
+            metrics = row[_METRICS_KEY]
             error = row["error"]
             _require_undamaged(row["format"] == _ROW_FORMAT and row["digest"] == task.input_hash)
             _require_undamaged(
-                all(value is None or type(value) in (int, float) for value in figures.values())
+                all(value is None or type(value) in (int, float) for value in metrics.values())
             )
             _require_undamaged(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
-                versions = _read_format_1_versions(folder, figures, error)
-                return Entry(figures, error, versions, has_checksums=False)
+                versions = _read_format_1_versions(folder, metrics, error)
+                return Entry(metrics, error, versions, has_checksums=False)
             _require_undamaged(row.pop("check_sum") == _compute_row_checksum(row))
             if checks_files:
                 _check_files(folder, row["files"])
-            return Entry(figures, error, row["versions"])
+            return Entry(metrics, error, row["versions"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
             raise DamagedRunError from fault
 
@@ -231,7 +233,7 @@ class Ledger:
         task : Task
             The run, whose name is that of the folder.
         outcome : Outcome
-            Files and figures of the run.
+            Files and metrics of the run.
 
         Raises
         ------
@@ -245,7 +247,7 @@ class Ledger:
             "version": _ROW_VERSION,
             "digest": task.input_hash,
             "versions": dict(outcome.versions),
-            "figures": dict(outcome.figures),
+            _METRICS_KEY: dict(outcome.metrics),
             "error": outcome.error,
             "files": {name: _describe_file(content) for name, content in outcome.files.items()},
         }
@@ -357,21 +359,21 @@ def is_sweep(folder: Path) -> bool:
     return isinstance(content, dict) and content.get("format") == "robocov-study"
 
 
-def _read_format_1_versions(folder: Path, figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
+def _read_format_1_versions(folder: Path, metrics: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
     """Read the versions of a run in format 1; raise DamagedRunError if its files contradict its row.
 
-    `figures` and `error` are those of the row. Failed runs have no versions.
+    `metrics` and `error` are those of the row. Failed runs have no versions.
     """
     file_name = RUN_FILE if error is None else ERROR_FILE
     run = json.loads(_read_file(folder / file_name))
     if error is not None:
         _require_undamaged(run["error"] == error)
         return {}
-    for name in FIGURES:
+    for name in METRICS:
         value = run["summary"][name]
         # The table contains the mean of values for each robot.
         expected = sum(value) / len(value) if isinstance(value, list) else value
-        _require_undamaged(figures[name] == expected)
+        _require_undamaged(metrics[name] == expected)
     return dict(run["versions"])
 
 

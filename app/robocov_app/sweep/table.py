@@ -21,7 +21,7 @@ from robocov_app.sweep.ledger import Entry, count_rows, has_all_rows
 from robocov_app.sweep.study.parameters import CONDITIONS, TEXT_PARAMETERS, UNITS, name_parameter_column
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import Task
-from robocov_app.sweep.worker import FIGURES, MEAN_TIME
+from robocov_app.sweep.worker import MEAN_TIME, METRICS
 from robocov_app.terminal.output import format_csv_line
 
 _TEMPORARY_CSV_FILE = ".results.part.csv"
@@ -51,7 +51,7 @@ _RUN_COLUMNS = (
     Column("seed", "int64", "", "seed of the starting positions"),
 )
 _DURATION_COLUMN = Column("duration_s", "double", "s", "simulated time")
-_FIGURE_COLUMNS = tuple(Column(name, *facts) for name, facts in FIGURES.items())
+_METRIC_COLUMNS = tuple(Column(name, *facts) for name, facts in METRICS.items())
 _FINAL_COLUMNS = (
     Column("run", "string", "", "the run's folder in runs/"),
     Column("error", "string", "", "why the run failed, null if it did not"),
@@ -59,7 +59,7 @@ _FINAL_COLUMNS = (
 _MEAN_TIME_COLUMN = Column(
     MEAN_TIME, "double", "s", "mean time until the first robot reaches a point, each at its top speed"
 )
-_METRIC_COLUMNS = (
+_OPTIONAL_METRIC_COLUMNS = (
     Column("sensed_area_m2", "double", "m²", "free area in a robot's sensing range and line of sight"),
     Column("range_area_m2", "double", "m²", "free area in a robot's sensing range, ignoring walls"),
     Column("visible_area_m2", "double", "m²", "free area in a robot's line of sight"),
@@ -74,7 +74,7 @@ _METRIC_COLUMNS = (
     ),
 )
 
-RESULT_COLUMNS = (*_FIGURE_COLUMNS, _MEAN_TIME_COLUMN, *_METRIC_COLUMNS)
+RESULT_COLUMNS = (*_METRIC_COLUMNS, _MEAN_TIME_COLUMN, *_OPTIONAL_METRIC_COLUMNS)
 """Columns with results of a run; not every table has all of them."""
 
 
@@ -89,17 +89,17 @@ def build_columns(study: Study) -> tuple[Column, ...]:
         meaning = f"{name.replace('_', ' ')} {owner}"
         kind = "string" if name in TEXT_PARAMETERS else "double"
         parameter_columns.append(Column(name_parameter_column(name), kind, UNITS[name], meaning))
-    figure_columns = [*_FIGURE_COLUMNS]
+    metric_columns = [*_METRIC_COLUMNS]
     if study.has_mixed_speeds:
-        figure_columns.append(_MEAN_TIME_COLUMN)
+        metric_columns.append(_MEAN_TIME_COLUMN)
     if study.metrics:
-        figure_columns += _METRIC_COLUMNS
+        metric_columns += _OPTIONAL_METRIC_COLUMNS
     return (
         *_RUN_COLUMNS,
         *_build_gain_columns(study),
         *parameter_columns,
         _DURATION_COLUMN,
-        *figure_columns,
+        *metric_columns,
         *_FINAL_COLUMNS,
     )
 
@@ -134,7 +134,7 @@ def build_row(task: Task, entry: Entry) -> dict[str, Any]:
     row |= {get_gain_column(name): value for name, value in task.gains.items()}
     row |= {name_parameter_column(name): value for name, value in task.team.items()}
     row["duration_s"] = task.duration
-    row |= entry.figures
+    row |= entry.metrics
     row["run"] = task.name
     row["error"] = entry.error
     return row

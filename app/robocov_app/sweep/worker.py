@@ -1,4 +1,4 @@
-"""Execution of one task: simulation and evaluation of a run, and its files and figures for the table."""
+"""Execution of one task: simulation and evaluation of a run, and its files and metrics for the table."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from robocov_app.terminal.output import format_csv, format_json, replace_non_fin
 
 _COLLECTION_STEPS = 1000
 """Number of steps between two garbage collections in a long run."""
-FIGURES = {
+METRICS = {
     "mean_distance_m": ("double", "m", "mean distance to the nearest robot at the end, weighted by φ"),
     "mean_distance_over_run_m": ("double", "m", "time average of the mean distance over the run"),
     "cost_m3": ("double", "m³", "coverage cost (22) at the end"),
@@ -44,9 +44,9 @@ FIGURES = {
     "path_length_m": ("double", "m", "path length, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }
-"""Figures of a run in the table, in order, with the type of the column, the unit and the meaning."""
+"""Metrics of a run in the table, in order, with the type of the column, the unit and the meaning."""
 MEAN_TIME = "mean_time_s"
-"""Additional figure of runs in which robots differ in speed."""
+"""Additional metric of runs in which robots differ in speed."""
 EFFORT_FILE = "effort.json"
 """File with the computing time and the sent bytes of a run with metrics. They are not in the table, because
 the table must not depend on the machine."""
@@ -75,8 +75,8 @@ class Outcome:
     ----------
     files : mapping of str to bytes
         Files in the folder of the run, by name.
-    figures : mapping of str to float, int or None
-        Figures in the table; empty if the run failed.
+    metrics : mapping of str to float, int or None
+        Metrics in the table; empty if the run failed.
     error : str or None
         Reason why the run failed; None if it did not.
     versions : mapping of str to str
@@ -84,7 +84,7 @@ class Outcome:
     """
 
     files: Mapping[str, bytes]
-    figures: Mapping[str, float | int | None]
+    metrics: Mapping[str, float | int | None]
     error: str | None = None
     versions: Mapping[str, str] = field(default_factory=list_result_versions)
 
@@ -127,21 +127,21 @@ def _perform(task: Task, watch: Watch | None, controller: Controller | None) -> 
     cost = prepare_cost(task)
     record, effort = _simulate_and_measure(task, watch, controller)
     history = compute_cost_history(record, cost, task.cost_hz)
-    # Figures are computed from all steps; the saved record contains only some of them.
+    # Metrics are computed from all steps; the saved record contains only some of them.
     summary = replace_non_finite(summarize(record, history))
-    figures = _select_figures(summary)
+    metrics = _select_metrics(summary)
     files = _build_files(task, record, history, summary)
     if task.metrics:
-        figures |= replace_non_finite(compute_final_metrics(record, history))
+        metrics |= replace_non_finite(compute_final_metrics(record, history))
         files[EFFORT_FILE] = format_json(effort).encode()
-    return Outcome(files, figures)
+    return Outcome(files, metrics)
 
 
-def _select_figures(summary: Mapping[str, Any]) -> dict[str, float | int | None]:
-    """Select the figures for the table from the summary of a run; the path length is averaged over robots."""
+def _select_metrics(summary: Mapping[str, Any]) -> dict[str, float | int | None]:
+    """Select the metrics for the table from the summary of a run; the path length is averaged over robots."""
     path_lengths = summary["path_length_m"]
     values = {**summary, "path_length_m": sum(path_lengths) / len(path_lengths)}
-    return {name: values[name] for name in (*FIGURES, MEAN_TIME) if name in values}
+    return {name: values[name] for name in (*METRICS, MEAN_TIME) if name in values}
 
 
 def _build_files(

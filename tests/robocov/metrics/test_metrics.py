@@ -251,7 +251,7 @@ def test_cost_history_samples_at_the_rate_and_at_the_end(record: Record) -> None
     assert select_sampled_steps(shorter, 10.0)[-1] == len(shorter) - 1
 
 
-def test_summaries_contain_the_figures_of_a_run(record: Record) -> None:
+def test_summaries_contain_the_metrics_of_a_run(record: Record) -> None:
     history = compute_cost_history(record, CoverageCost(record.environment, lattice=24))
     summary = summarize(record, history)
     assert set(summary) == {

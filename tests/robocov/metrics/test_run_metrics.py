@@ -58,7 +58,7 @@ def test_integrals_agree_with_plain_loops(record: Record) -> None:
     assert (np.diff(metrics.work) >= 0).all()
 
 
-def test_the_rate_does_not_change_the_final_figures(record: Record) -> None:
+def test_the_rate_does_not_change_the_final_metrics(record: Record) -> None:
     fine = compute_run_metrics(record, 30.0)
     coarse = compute_run_metrics(record, 0.0)
     assert len(fine.time) == 121
@@ -141,9 +141,9 @@ def test_the_cost_is_near_its_final_value_after_the_last_deviation(
 
 
 def test_final_metrics_have_a_figure_for_each_column(record: Record) -> None:
-    figures = compute_final_metrics(record, build_history([2.0, 1.0, 1.0]))
-    assert figures["near_final_s"] == 1.0
-    assert set(figures) == {*COLUMNS.values(), "near_final_s", "sent_bytes_per_s"} - {"time_s"}
+    metrics = compute_final_metrics(record, build_history([2.0, 1.0, 1.0]))
+    assert metrics["near_final_s"] == 1.0
+    assert set(metrics) == {*COLUMNS.values(), "near_final_s", "sent_bytes_per_s"} - {"time_s"}
 
 
 @pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])

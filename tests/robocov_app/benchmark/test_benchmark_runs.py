@@ -576,7 +576,7 @@ def test_the_page_shows_entries_with_any_content() -> None:
             "work_J: expected at most 1e+15",
         ),
     ],
-    ids=["long label", "empty label", "huge figure"],
+    ids=["long label", "empty label", "huge number"],
 )
 def test_entries_that_no_page_can_show_are_rejected(change: Any, message: str, tmp_path: Path) -> None:
     run_short_benchmark(tmp_path / "out")

@@ -16,9 +16,9 @@ from robocov_app.benchmark.results import ENTRIES, read_result
 Change = Callable[[dict[str, Any]], object]
 
 
-def change_first_row(**figures: object) -> Change:
-    """Return a function that changes figures in the first row of a result."""
-    return lambda result: result["rows"][0].update(figures)
+def change_first_row(**metrics: object) -> Change:
+    """Return a function that changes metrics in the first row of a result."""
+    return lambda result: result["rows"][0].update(metrics)
 
 
 def repeat_first_row(result: dict[str, Any]) -> None:

@@ -37,7 +37,7 @@ from robocov_app.terminal.interruption import Interruption
 MAP = "blocks-a"
 TRACKS = ("ideal", "short-range", "lossy", "noisy", "unicycle", "failures")
 SMALL = VerificationOptions(sample=1, robots=1, new_maps=0)
-ONLY_FIGURES = replace(SMALL, robots=0)
+ONLY_METRICS = replace(SMALL, robots=0)
 
 GLOBAL = """
 POSITIONS = {}
@@ -132,12 +132,12 @@ def build_task(controller: str, track: str) -> Task:
 def isolate(controller: str, track: str, robots: Sequence[int]) -> list[str]:
     """Return how decisions of robots differ if they get only their own observations, without processes.
 
-    The run must have the same figures as without isolation.
+    The run must have the same metrics as without isolation.
     """
     task = build_task(controller, track)
     outcome, differences, _ = run_isolated(task, robots)
     assert outcome.error is None
-    assert outcome.figures == perform(task).figures
+    assert outcome.metrics == perform(task).metrics
     return differences
 
 
@@ -173,7 +173,7 @@ def test_robots_that_share_maps_decide_by_their_own_observations(
     # Robots of gp-ucb have nothing to send if they know that the density is the same everywhere.
     assert any(any(snapshot.seen.messages) for snapshot in snapshots) == (controller != "gp-ucb")
     assert differences == []
-    assert outcome.figures == perform(build_task(controller, track)).figures
+    assert outcome.metrics == perform(build_task(controller, track)).metrics
 
 
 @pytest.mark.slow
@@ -336,7 +336,7 @@ class Mine:
 @pytest.mark.parametrize("code", [STACK, OBJECTS], ids=["stack", "objects"])
 def test_a_controller_finds_nothing_in_its_process(code: str, tmp_path: Path) -> None:
     folder, name = rate(tmp_path, code, "ideal")
-    verification = verify(folder, name, ONLY_FIGURES)
+    verification = verify(folder, name, ONLY_METRICS)
     assert any("path_length_m: expected" in difference for difference in verification.differences)
 
 
@@ -344,7 +344,7 @@ def test_code_is_recognized_by_its_file_and_not_by_its_name(tmp_path: Path) -> N
     target = tmp_path / "written"
     folder, name = rate(tmp_path, f"FILE = {str(target)!r}" + EXECUTED_AS_COMPILER, "ideal")
     target.unlink()
-    verification = verify(folder, name, ONLY_FIGURES)
+    verification = verify(folder, name, ONLY_METRICS)
     assert f"ideal, {MAP}, seed 0: its controller tried writing {target}" in verification.differences
     assert not target.exists()
 
@@ -366,7 +366,7 @@ class Mine:
 @pytest.mark.slow
 def test_compilers_may_write_files(tmp_path: Path) -> None:
     folder, name = rate(tmp_path, COMPILED, "ideal")
-    verification = verify(folder, name, ONLY_FIGURES)
+    verification = verify(folder, name, ONLY_METRICS)
     assert verification.differences == []
 
 
@@ -375,8 +375,8 @@ def test_compilers_may_write_files(tmp_path: Path) -> None:
     [
         """
 import robocov_app.sweep.worker as worker
-select_figures = worker._select_figures
-worker._select_figures = lambda summary: {**select_figures(summary), "contacts": 0, "mean_distance_m": COST}
+select_metrics = worker._select_metrics
+worker._select_metrics = lambda summary: {**select_metrics(summary), "contacts": 0, "mean_distance_m": COST}
 """,
         """
 from robocov_app.benchmark import verification
@@ -384,7 +384,7 @@ verification._list_differences = lambda *_: []
 """,
         """
 import robocov_app.benchmark.controller_program as program
-COMMAND = "import robocov_app.sweep.worker as worker; worker._select_figures = lambda _: {}"
+COMMAND = "import robocov_app.sweep.worker as worker; worker._select_metrics = lambda _: {}"
 
 class Command:
     def __reduce__(self):
@@ -393,7 +393,7 @@ class Command:
 program.encode_decision = lambda _: Command()
 """,
     ],
-    ids=["figures", "verifier", "pickle"],
+    ids=["metrics", "verifier", "pickle"],
 )
 def test_code_of_a_controller_changes_nothing_outside_its_process(attack: str, tmp_path: Path) -> None:
     """The result has a better cost than the controller, which tries to hide this in several ways."""
@@ -408,9 +408,9 @@ def test_code_of_a_controller_changes_nothing_outside_its_process(attack: str, t
     rated = RatedController(name, {})
     result["entry"]["source_sha256"] = rated.identify(rated.read_code().source)["source_sha256"]
     (folder / RESULT_FILE).write_text(json.dumps(result))
-    honest_functions = worker._select_figures, verification._list_differences
-    differences = verify(folder, name, ONLY_FIGURES).differences
-    assert (worker._select_figures, verification._list_differences) == honest_functions
+    honest_functions = worker._select_metrics, verification._list_differences
+    differences = verify(folder, name, ONLY_METRICS).differences
+    assert (worker._select_metrics, verification._list_differences) == honest_functions
     expected = "mean_distance_m: expected"
     if "Command" in attack:
         expected = "its process sent an invalid message: builtins.exec: expected plain values"

@@ -558,7 +558,7 @@ def test_long_names_do_not_widen_the_page(browser, tmp_path, width) -> None:
         for m in range(2)
         for seed in range(3)
     ]
-    failed = replace(runs[0], error=f"{name} {name}", figures={}, seed=9)
+    failed = replace(runs[0], error=f"{name} {name}", metrics={}, seed=9)
     result = replace(
         build_recorded_result(runs, replace(ROOMS, name=name), seconds=2.0),
         gain_units={name: name},

@@ -109,7 +109,7 @@ def test_hostile_names_are_escaped() -> None:
         )
         for seed in range(3)
     ]
-    runs.append(replace(runs[0], error=HOSTILE, figures={}, start=HOSTILE, seed=9))
+    runs.append(replace(runs[0], error=HOSTILE, metrics={}, start=HOSTILE, seed=9))
     result = build_recorded_result(runs, replace(ROOMS, name=HOSTILE))
     result = replace(result, gain_units={HOSTILE: HOSTILE}, gain_meanings={HOSTILE: HOSTILE})
     html = build_report([result], title=HOSTILE).html

@@ -14,7 +14,7 @@ from reported_results import HOSTILE, build_record, save_comparison, save_run
 from robocov.controllers import CONTROLLERS, get_gains
 from robocov.errors import InputError
 from robocov_app.report.results.loading import load_result
-from robocov_app.report.results.result import FIGURE_NAMES, ReportedRun, replace_unprintable
+from robocov_app.report.results.result import METRIC_NAMES, ReportedRun, replace_unprintable
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -61,9 +61,9 @@ def test_the_folder_of_a_run_is_a_result_with_one_run(tmp_path) -> None:
     assert (result.kind, result.expected_count, result.missing_count) == ("run", 1, 0)
     assert (run.map, run.controller, run.label) == ("square", "rapf", "RAPF")
     assert (run.robots, run.seed) == (4, 0)
-    assert run.figures.keys() == set(FIGURE_NAMES)
+    assert run.metrics.keys() == set(METRIC_NAMES)
     assert run.final_distance == saved_run.summary["mean_distance_m"]
-    assert run.figures["path_length_m"] == pytest.approx(np.mean(saved_run.summary["path_length_m"]))
+    assert run.metrics["path_length_m"] == pytest.approx(np.mean(saved_run.summary["path_length_m"]))
     assert result.read_record(run).positions == pytest.approx(saved_run.record.positions)
     assert result.maps["square"] == SQUARE
     assert result.facts["duration_s"] == 6.0 and "numpy" in result.facts["versions"]
@@ -103,13 +103,13 @@ def test_runs_of_a_sweep_are_the_rows_of_its_table(folder) -> None:
 
 
 @pytest.mark.slow
-def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
+def test_failed_runs_have_their_error_and_no_metrics(folder) -> None:
     result = load_result(folder)
     assert result.failed_runs
     assert len(result.completed_runs) + len(result.failed_runs) == 24
     for run in result.failed_runs:
         assert "</script> too far" in (run.error or "")
-        assert run.figures == {}
+        assert run.metrics == {}
         assert np.isnan(run.final_distance)
     first = result.completed_runs[0]
     record = result.read_record(first)

@@ -35,7 +35,7 @@ def test_stored_runs_are_found_when_the_ledger_is_opened_again(tmp_path: Path, t
         assert ledger.read_entry(task) is None
         ledger.store(task, DONE)
     with open_ledger(tmp_path / "deep" / "out", STUDY) as ledger:
-        assert ledger.read_entry(task) == Entry(DONE.figures, None, DONE.versions)
+        assert ledger.read_entry(task) == Entry(DONE.metrics, None, DONE.versions)
     folder = tmp_path / "deep" / "out" / "runs" / task.name
     assert sorted(path.name for path in folder.iterdir()) == ["cost.csv", "row.json", "run.json"]
 
@@ -45,7 +45,7 @@ def test_a_run_replaces_an_earlier_one(tmp_path: Path, task: Task) -> None:
         ledger.store(task, FAILED)
         assert ledger.read_entry(task) == Entry({}, "it broke", FAILED.versions)
         ledger.store(task, DONE)
-        assert ledger.read_entry(task) == Entry(DONE.figures, None, DONE.versions)
+        assert ledger.read_entry(task) == Entry(DONE.metrics, None, DONE.versions)
     assert not (tmp_path / "runs" / task.name / "error.json").exists()
 
 
@@ -160,7 +160,7 @@ def test_runs_without_checksums_can_be_used_with_a_remark(tmp_path: Path, task: 
 
 
 def test_runs_of_other_versions_are_repeated_unless_they_are_to_be_used(tmp_path: Path, task: Task) -> None:
-    store_run(tmp_path, task, Outcome(DONE.files, DONE.figures, versions={**DONE.versions, "numpy": "1.9"}))
+    store_run(tmp_path, task, Outcome(DONE.files, DONE.metrics, versions={**DONE.versions, "numpy": "1.9"}))
     difference = f"numpy 1.9 instead of {DONE.versions['numpy']}"
     survey = survey_folder(tmp_path, task)
     assert survey == Survey(bytearray([1]), outdated=Counter([difference]))

@@ -20,7 +20,7 @@ from robocov.record import ARRAYS, Record
 from robocov_app.sweep.study.study import Study, StudyMap
 from robocov_app.sweep.table import build_columns
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepare_cost, simulate
+from robocov_app.sweep.worker import METRICS, Outcome, perform, prepare_cost, simulate
 
 
 def get_first_task(study: Study) -> Task:
@@ -54,15 +54,15 @@ def test_a_run_follows_its_task(tmp_path: Path) -> None:
     assert len(history.time) == 6 * 2 + 1
 
 
-def test_figures_use_all_steps_and_not_only_saved_ones(tmp_path: Path) -> None:
+def test_metrics_use_all_steps_and_not_only_saved_ones(tmp_path: Path) -> None:
     task = get_first_task(build_small_study(duration=6.0, controllers=("lloyd",), robots=(5,), record_hz=0.0))
     whole = simulate(task)
     history = compute_cost_history(whole, CoverageCost(ROOM, task.lattice), task.cost_hz)
     summary = summarize(whole, history)
     outcome = perform(task)
-    assert list(outcome.figures) == list(FIGURES)
-    assert outcome.figures == {
-        **{name: summary[name] for name in FIGURES},
+    assert list(outcome.metrics) == list(METRICS)
+    assert outcome.metrics == {
+        **{name: summary[name] for name in METRICS},
         "path_length_m": sum(summary["path_length_m"]) / 5,
     }
     record = load_record(outcome, tmp_path)
@@ -116,7 +116,7 @@ def test_errors_are_outcomes(tmp_path: Path, code: str, message: str) -> None:
     task = replace(task, source=task.source._replace(text=HEAD + code))
     outcome = perform(task)
     assert outcome.error is not None and outcome.error.startswith(message), outcome.error
-    assert not outcome.figures
+    assert not outcome.metrics
     assert list(outcome.files) == ["error.json"]
     content = json.loads(outcome.files["error.json"])
     assert content["error"] == outcome.error
@@ -182,21 +182,21 @@ def test_runs_of_duration_zero_have_one_step() -> None:
     assert outcome.error is None
     with np.load(io.BytesIO(outcome.files["record.npz"])) as arrays:
         assert arrays["time"].tolist() == [0.0]
-    assert outcome.figures["mean_distance_over_run_m"] == outcome.figures["mean_distance_m"]
-    assert outcome.figures["settled_at_s"] is None
-    assert outcome.figures["stuck_robots"] is None
+    assert outcome.metrics["mean_distance_over_run_m"] == outcome.metrics["mean_distance_m"]
+    assert outcome.metrics["settled_at_s"] is None
+    assert outcome.metrics["stuck_robots"] is None
 
 
-def test_mixed_teams_and_metrics_have_further_figures() -> None:
+def test_mixed_teams_and_optional_metrics_have_further_columns() -> None:
     group = ({"count": 1, "max_speed": 1.0, "radius": 0.2}, {"count": 2, "max_speed": 0.4})
     study = build_small_study(group=group, robots=(3,), metrics=True, gains={"rapf": {"cells": "time"}})
     outcome = perform(get_first_task(study))
     assert outcome.error is None
     known = [column.name for column in build_columns(study)]
-    assert set(outcome.figures) <= {*known, "range_area_m2", "wall_clearance_m"}
-    assert {"mean_time_s", "sensed_area_m2", "near_final_s", "robot_clearance_m"} <= set(outcome.figures)
-    assert outcome.figures["mean_time_s"] > outcome.figures["mean_distance_m"]
+    assert set(outcome.metrics) <= {*known, "range_area_m2", "wall_clearance_m"}
+    assert {"mean_time_s", "sensed_area_m2", "near_final_s", "robot_clearance_m"} <= set(outcome.metrics)
+    assert outcome.metrics["mean_time_s"] > outcome.metrics["mean_distance_m"]
     assert outcome.files["cost.csv"].splitlines()[0].endswith(b",mean_time_s")
     plain = build_small_study()
-    assert set(perform(get_first_task(plain)).figures) == set(FIGURES)
+    assert set(perform(get_first_task(plain)).metrics) == set(METRICS)
     assert not {"mean_time_s", "sensed_area_m2"} & {column.name for column in build_columns(plain)}

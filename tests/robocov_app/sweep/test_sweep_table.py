@@ -23,11 +23,11 @@ from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.table import Table, build_columns, build_row, get_gain_column
 from robocov_app.sweep.tasks import generate_tasks
-from robocov_app.sweep.worker import FIGURES
+from robocov_app.sweep.worker import METRICS
 
 FIGURED = Entry(
     {
-        **dict.fromkeys(FIGURES, 0.1 + 0.2),
+        **dict.fromkeys(METRICS, 0.1 + 0.2),
         "contacts": 3,
         "stuck_robots": None,
         "settled_at_s": None,
@@ -71,7 +71,7 @@ def test_a_gain_with_the_name_of_a_column_gets_a_prefix() -> None:
     assert get_gain_column("radius_m") == "gain_radius_m"
 
 
-def test_the_table_contains_every_figure_exactly(tmp_path: Path) -> None:
+def test_the_table_contains_every_metric_exactly(tmp_path: Path) -> None:
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
     entries = [FIGURED, FAILED, FIGURED, FIGURED]
     write_table(tmp_path, study, entries)

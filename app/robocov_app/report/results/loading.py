@@ -23,7 +23,7 @@ from robocov.mapfile import from_json
 from robocov.metrics import CostHistory, compute_mean_over_run
 from robocov.metrics.results import read_results
 from robocov_app.report.results.result import (
-    FIGURE_NAMES,
+    METRIC_NAMES,
     DamagedRun,
     Gains,
     ReportedResult,
@@ -144,7 +144,7 @@ def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:
         start=None if record.start is None else replace_unprintable(str(record.start)),
         seed=record.seed,
         gains=_list_gains(record.gains),
-        figures=_read_figures(content.get("summary"), saved_run.history),
+        metrics=_read_metrics(content.get("summary"), saved_run.history),
         error=None,
         folder=saved_run.folder,
     )
@@ -245,10 +245,10 @@ def _build_run_of_row(row: Mapping[str, Any], study: _SweepStudy, folder: Path) 
     controller = str(row["controller"])
     error = row["error"]
     if error is None:
-        figures = {name: row.get(name) for name in FIGURE_NAMES}
+        metrics = {name: row.get(name) for name in METRIC_NAMES}
         error_text = None
     else:
-        figures = {}
+        metrics = {}
         error_text = replace_unprintable(str(error))
     gain_names = study.gain_names.get(controller, ())
     team = [(name, row.get(name_parameter_column(name))) for name in study.varying_parameters]
@@ -261,7 +261,7 @@ def _build_run_of_row(row: Mapping[str, Any], study: _SweepStudy, folder: Path) 
         start=replace_unprintable(str(row["start"])),
         seed=row["seed"],
         gains=_list_gains({name: row.get(get_gain_column(name)) for name in gain_names}),
-        figures=figures,
+        metrics=metrics,
         error=error_text,
         folder=folder / RUNS_FOLDER / Path(str(row["run"])).name,
     )
@@ -337,24 +337,24 @@ def _collect_gain_texts(
     return units, meanings
 
 
-def _read_figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
-    """Return the figures of a run from its summary; missing ones are computed from its cost over time."""
+def _read_metrics(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
+    """Return the metrics of a run from its summary; missing ones are computed from its cost over time."""
     values = summary if isinstance(summary, dict) else {}
-    figures: dict[str, float | None] = {}
-    for name in FIGURE_NAMES:
+    metrics: dict[str, float | None] = {}
+    for name in METRIC_NAMES:
         value = values.get(name)
         if name == "path_length_m" and isinstance(value, list) and value:
             value = sum(value) / len(value)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        figures[name] = value if is_number else None
+        metrics[name] = value if is_number else None
     if history is None or not len(history.time):
-        return figures
+        return metrics
     final_distance = float(history.mean_distance[-1])
-    if figures["mean_distance_m"] is None and np.isfinite(final_distance):
-        figures["mean_distance_m"] = final_distance
-    if figures["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
-        figures["mean_distance_over_run_m"] = compute_mean_over_run(history.time, history.mean_distance)
-    return figures
+    if metrics["mean_distance_m"] is None and np.isfinite(final_distance):
+        metrics["mean_distance_m"] = final_distance
+    if metrics["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
+        metrics["mean_distance_over_run_m"] = compute_mean_over_run(history.time, history.mean_distance)
+    return metrics
 
 
 def _read_json_object(path: Path) -> dict[str, Any]:

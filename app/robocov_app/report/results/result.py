@@ -28,7 +28,7 @@ TeamParameters: TypeAlias = tuple[tuple[str, float | None], ...]
 Setting: TypeAlias = tuple[str, int, TeamParameters]
 """Map, number of robots and team. Only the costs of runs with the same setting can be compared directly."""
 
-FIGURE_NAMES = (
+METRIC_NAMES = (
     "mean_distance_m",
     "mean_distance_over_run_m",
     "cost_m3",
@@ -41,7 +41,7 @@ FIGURE_NAMES = (
     "mean_time_s",
     "sent_bytes_per_s",
 )
-"""Figures that a report shows for a run. The names are those of columns in the table of a sweep."""
+"""Metrics that a report shows for a run. The names are those of columns in the table of a sweep."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class ReportedRun:
         Name of the start; None for given positions.
     seed : int or None
     gains : tuple of (str, value)
-    figures : mapping of str to float or None
-        Values keyed by `FIGURE_NAMES`; empty if the run failed.
+    metrics : mapping of str to float or None
+        Values keyed by `METRIC_NAMES`; empty if the run failed.
     error : str or None
         Reason why the run failed; None if it did not.
     folder : Path
@@ -76,21 +76,21 @@ class ReportedRun:
     start: str | None
     seed: int | None
     gains: Gains
-    figures: Mapping[str, float | None] = field(compare=False)
+    metrics: Mapping[str, float | None] = field(compare=False)
     error: str | None
     folder: Path
 
     @property
     def final_distance(self) -> float:
         """Mean distance to the nearest robot at the end, m; nan if it is unknown."""
-        value = self.figures.get("mean_distance_m")
+        value = self.metrics.get("mean_distance_m")
         if value is None:
             return float("nan")
         return float(value)
 
-    def has_figure(self, name: str) -> bool:
-        """Return whether a figure of the run is known and finite."""
-        value = self.figures.get(name)
+    def has_metric(self, name: str) -> bool:
+        """Return whether a metric of the run is known and finite."""
+        value = self.metrics.get(name)
         return value is not None and bool(np.isfinite(value))
 
     @property
@@ -224,7 +224,7 @@ class ReportedResult:
         reference = self.references.get(run.setting)
         if reference is None:
             return float("nan")
-        uncovered_area = run.figures.get("uncovered_area_m2") or 0.0
+        uncovered_area = run.metrics.get("uncovered_area_m2") or 0.0
         if abs(uncovered_area - reference.uncovered_area) > AREA_TOLERANCE_M2:
             return float("nan")
         return run.final_distance / reference.mean_distance - 1.0

@@ -1,4 +1,4 @@
-"""Columns of figures in tables of runs."""
+"""Columns of metrics in tables of runs."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from robocov_app.report.tables.table import NO_VALUE, format_quartiles
 
 
 class RunColumn(NamedTuple):
-    """A column of figures.
+    """A column of metrics.
 
     Attributes
     ----------
@@ -24,8 +24,10 @@ class RunColumn(NamedTuple):
 
 
 def build_quartiles_column(heading: str, name: str, decimals: int, no_value: str = NO_VALUE) -> RunColumn:
-    """Build a column with the median and the quartiles of a figure."""
-    return RunColumn(heading, lambda runs: format_quartiles(list_figures(runs, name), decimals, no_value))
+    """Build a column with the median and the quartiles of a metric."""
+    return RunColumn(
+        heading, lambda runs: format_quartiles(list_known_values(runs, name), decimals, no_value)
+    )
 
 
 def build_final_distance_column() -> RunColumn:
@@ -39,7 +41,7 @@ def build_mean_over_run_column() -> RunColumn:
 
 
 def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> list[RunColumn]:
-    """Build the columns of all other figures.
+    """Build the columns of all other metrics.
 
     Parameters
     ----------
@@ -63,21 +65,21 @@ def build_other_columns(result: ReportedResult, unsettled: str = NO_VALUE) -> li
         build_quartiles_column("Path, m", "path_length_m", 2),
         RunColumn("Stuck robots", _format_stuck_robots),
     ]
-    if any(run.has_figure("mean_time_s") for run in result.completed_runs):
+    if any(run.has_metric("mean_time_s") for run in result.completed_runs):
         columns.append(build_quartiles_column("Mean time, s", "mean_time_s", 3))
-    if any(run.figures.get("sent_bytes_per_s") for run in result.completed_runs):
+    if any(run.metrics.get("sent_bytes_per_s") for run in result.completed_runs):
         columns.append(build_quartiles_column("Messages, B/s", "sent_bytes_per_s", 0))
     return columns
 
 
-def list_figures(runs: Sequence[ReportedRun], name: str) -> list[float]:
-    """List the known values of a figure in some runs."""
-    return [float(run.figures[name] or 0.0) for run in runs if run.has_figure(name)]
+def list_known_values(runs: Sequence[ReportedRun], name: str) -> list[float]:
+    """List the known values of a metric in some runs."""
+    return [float(run.metrics[name] or 0.0) for run in runs if run.has_metric(name)]
 
 
 def _format_contacts(runs: Sequence[ReportedRun]) -> str:
     """Format the number of contacts of a single run, or the number of runs with contacts."""
-    counts = list_figures(runs, "contacts")
+    counts = list_known_values(runs, "contacts")
     if not counts:
         return NO_VALUE
     if len(runs) == 1:
@@ -87,7 +89,7 @@ def _format_contacts(runs: Sequence[ReportedRun]) -> str:
 
 def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
     """Format the number of stuck robots of a single run, or the mean of several runs."""
-    counts = list_figures(runs, "stuck_robots")
+    counts = list_known_values(runs, "stuck_robots")
     if not counts:
         return NO_VALUE
     if len(runs) == 1:
@@ -97,7 +99,7 @@ def _format_stuck_robots(runs: Sequence[ReportedRun]) -> str:
 
 def _format_clearance(runs: Sequence[ReportedRun]) -> str:
     """Format the smallest distance to a wall in any of the runs."""
-    gaps = list_figures(runs, "min_clearance_m")
+    gaps = list_known_values(runs, "min_clearance_m")
     if not gaps:
         return NO_VALUE
     text = f"{min(gaps):.3f}"

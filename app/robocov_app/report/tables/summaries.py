@@ -1,4 +1,4 @@
-"""Tables of figures by controller, for each map and team and for all together, and tables of every run."""
+"""Tables of metrics by controller, for each map and team and for all together, and tables of every run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from robocov_app.report.tables.run_columns import (
     build_final_distance_column,
     build_mean_over_run_column,
     build_other_columns,
-    list_figures,
+    list_known_values,
 )
 from robocov_app.report.tables.table import NO_VALUE, PageTable, format_quartiles
 
@@ -43,7 +43,7 @@ _REFERENCE_NOTE = (
 
 
 def build_summary_tables(result: ReportedResult) -> list[PageTable]:
-    """Build the tables of figures by controller.
+    """Build the tables of metrics by controller.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def build_summary_tables(result: ReportedResult) -> list[PageTable]:
             *other_columns,
         ]
         for setting in settings:
-            caption = "Final figures"
+            caption = "Final metrics"
             if len(settings) > 1:
                 caption = format_setting(result, setting)
             setting_groups = [group.select(setting) for group in groups]
@@ -120,7 +120,7 @@ def _build_scaled_column(result: ReportedResult) -> RunColumn:
 
 def _format_settled(runs: Sequence[ReportedRun]) -> str:
     """Format whether the team settled in a single run, or in how many of several runs it did."""
-    count = len(list_figures(runs, "settled_at_s"))
+    count = len(list_known_values(runs, "settled_at_s"))
     if len(runs) > 1:
         return f"{count} of {len(runs)}"
     return "yes" if count else "no"
