@@ -1,4 +1,4 @@
-"""Names in texts exist: modules and attributes in pages, docstrings and assets, and the pictures of pages."""
+"""Names mentioned in the documentation exist: modules and attributes in pages, docstrings and assets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from robocov_app.figures import files
 
 ROOT = Path(__file__).parents[1]
 ROOTS = (ROOT / "coverage", ROOT / "app")
-TEXT_SUFFIXES = {".py", ".pyi", ".md", ".js", ".css", ".html", ".toml"}
+PACKAGE_FOLDERS = (ROOT / "coverage/robocov", ROOT / "app/robocov_app")
+DOCUMENT_SUFFIXES = {".py", ".pyi", ".md", ".js", ".css", ".html", ".toml"}
 LOGGERS = {"robocov.web"}
 """Names of loggers look like those of modules."""
 USERS_FILE = "mine.py"
@@ -46,11 +47,11 @@ PUBLIC = {
 DOCUMENTED = {name: value for name, value in PUBLIC.items() if callable(value)}
 
 
-def list_texts() -> Iterator[Path]:
+def list_documents() -> Iterator[Path]:
     yield from (ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "pyproject.toml", ROOT / ".ci/run")
     for folder in (*ROOTS, ROOT / ".readme"):
         for file in folder.rglob("*"):
-            if file.suffix in TEXT_SUFFIXES and "reference" not in file.parts:
+            if file.suffix in DOCUMENT_SUFFIXES and "reference" not in file.parts:
                 yield file
 
 
@@ -73,19 +74,19 @@ def resolves(name: str) -> bool:
     return False
 
 
-def test_dotted_names_in_texts_are_those_of_modules_and_attributes() -> None:
+def test_dotted_names_in_documents_are_those_of_modules_and_attributes() -> None:
     unknown = []
-    for file in list_texts():
+    for file in list_documents():
         for number, line in enumerate(file.read_text().splitlines(), 1):
             names = [name for name in DOTTED_NAME.findall(line) if name not in LOGGERS]
             unknown += [f"{file.relative_to(ROOT)}:{number}: {name}" for name in names if not resolves(name)]
     assert not unknown, "\n".join(unknown)
 
 
-def test_keys_in_texts_are_joined_by_plus_signs() -> None:
+def test_keys_in_documents_are_joined_by_plus_signs() -> None:
     """One spelling everywhere, as in Ctrl+Z."""
     found = []
-    for file in list_texts():
+    for file in list_documents():
         for number, line in enumerate(file.read_text().splitlines(), 1):
             found += [f"{file.relative_to(ROOT)}:{number}: {keys}" for keys in SPLIT_KEYS.findall(line)]
     assert not found, "\n".join(found)
@@ -129,14 +130,13 @@ def test_names_in_backticks_in_docstrings_are_names_of_the_program() -> None:
     assert not unknown, "\n".join(unknown)
 
 
-def test_paths_of_modules_in_texts_exist() -> None:
+def test_paths_of_modules_in_documents_exist() -> None:
     unknown = []
-    for file in list_texts():
+    for file in list_documents():
+        folders = (ROOT, *ROOTS, *PACKAGE_FOLDERS, *file.parents)
         paths = [path for path in MODULE_PATH.findall(file.read_text()) if Path(path).name != USERS_FILE]
-        for path in paths:
-            folders = (ROOT, *ROOTS, *file.parents, ROOTS[0] / "robocov", ROOTS[1] / "robocov_app")
-            if not any((folder / path).exists() for folder in folders):
-                unknown.append(f"{file.relative_to(ROOT)}: {path}")
+        missing = [path for path in paths if not any((folder / path).exists() for folder in folders)]
+        unknown += [f"{file.relative_to(ROOT)}: {path}" for path in missing]
     assert not unknown, "\n".join(unknown)
 
 

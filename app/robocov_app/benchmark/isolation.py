@@ -1,15 +1,15 @@
-"""A team whose robots are controlled by separate processes, each of which gets its own observations only.
+"""A team controlled by separate processes, each of which receives only the observations of its robot.
 
 During a verification, the code of a controller is never in the process that simulates the run, records it and
 computes its metrics. That process, the referee, calls an `IsolatedTeam`, which asks other processes for a
 decision in each step:
 
-- one process decides for the whole team. Its decisions are executed.
+- One process decides for the whole team. Its decisions are executed.
 - For each robot that is checked, another process receives only the observations of this robot. Its decision
   must be the same as that for the team, bit for bit. The process of the team does not know which robots are
   checked.
 
-No process receives the observations of a step before it has decided in the step before, so none can infer
+No process receives the observations of a step before it has decided on the previous step, so none can infer
 from later observations what the team did. If the decisions of a robot are the same in all steps, the run
 would have been the same if a separate process had controlled this robot.
 
@@ -22,7 +22,7 @@ shared map  The same; maps are shared by messages.
 whole map   The same, and the map.
 ==========  ===========================================================================================
 
-If the density is unknown, no process has it: the referee measures it for the robot of the process, within its
+If the density is unknown, no process has it: the referee measures it on behalf of that robot, within its
 sensing range.
 
 The rows of all other robots contain placeholders: positions drawn by the verifier, no velocity, no obstacle,
@@ -305,7 +305,7 @@ def _is_same_decision(team_decision: Decision, own_decision: Decision, robot: in
         return False
     if not _is_same_row(team_decision.goals, own_decision.goals, robot):
         return False
-    return _list_contents(team_decision, robot) == _list_contents(own_decision, robot)
+    return _list_message_contents(team_decision, robot) == _list_message_contents(own_decision, robot)
 
 
 def _is_same_row(first: FloatArray | None, second: FloatArray | None, robot: int) -> bool:
@@ -314,7 +314,7 @@ def _is_same_row(first: FloatArray | None, second: FloatArray | None, robot: int
     return bool(first[robot].tobytes() == second[robot].tobytes())
 
 
-def _list_contents(decision: Decision, robot: int) -> list[tuple[int, Any]]:
-    """Return the size and the payload of each message of a robot."""
+def _list_message_contents(decision: Decision, robot: int) -> list[tuple[int, Any]]:
+    """Return the size and payload of each message sent by a robot."""
     messages: Sequence[Message] = decision.messages[robot] if decision.messages else ()
     return [(message.size, message.payload) for message in messages]

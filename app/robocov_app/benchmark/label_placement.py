@@ -77,13 +77,30 @@ def _compute_costs(
 def _choose_candidates(
     candidates: Sequence[FloatArray], costs: Sequence[FloatArray], order: IntArray
 ) -> IntArray:
-    """Choose a box for each of n labels, and choose again until no label moves; (n,) indices of boxes."""
+    """Choose the cheapest box for each label, repeating until no choice changes.
+
+    Parameters
+    ----------
+    candidates : sequence of (k, 4) array, px
+        Possible boxes of each label.
+    costs : sequence of (k,) array
+        Cost of each of these boxes without other labels.
+    order : (n,) array
+        Indices of the labels in the order in which they choose.
+
+    Returns
+    -------
+    (n,) array
+        Index of the chosen box of each label.
+    """
     chosen = np.full(len(candidates), -1, dtype=np.intp)
     for _ in range(_MAX_ROUNDS):
         previous = chosen.copy()
         for k in order:
             others = [candidates[j][chosen[j]] for j in order if j != k and chosen[j] >= 0]
-            overlaps = _compute_overlaps(candidates[k], np.reshape(others, (-1, 4))).sum(axis=1)
+            # Without other boxes, the array must still have four columns.
+            other_boxes = np.reshape(others, (-1, 4))
+            overlaps = _compute_overlaps(candidates[k], other_boxes).sum(axis=1)
             # Costs that differ only by rounding are equal on all platforms: the first candidate wins.
             chosen[k] = np.argmin(np.round(costs[k] + _OVERLAP_COST * overlaps, 6))
         if np.array_equal(chosen, previous):

@@ -1,4 +1,4 @@
-"""Random maps that resemble real places: homes, offices, yards, plants, and halls with traffic.
+"""Random maps that resemble real places: homes, offices, yards, factories, and halls with traffic.
 
 Lengths are in meters. Coordinates are rounded to centimeters, so that they are the same on every machine.
 """
@@ -114,16 +114,19 @@ def _build_circle(center: FloatArray, radius: float) -> Obstacle:
 
 
 def _build_home(rng: np.random.Generator) -> FloorPlan:
-    """Generate a flat: a rectangle that is divided repeatedly, a door in each wall, and some furniture."""
+    """Build a home: a rectangle divided repeatedly into rooms.
+
+    Each inner wall has a door, and large rooms have a piece of furniture.
+    """
     width = rng.uniform(10.0, 14.0)
     height = rng.uniform(8.0, 11.0)
-    flat = _Flat(rng)
-    flat.divide(0.0, 0.0, width, height)
-    return FloorPlan(build_box(0.0, 0.0, width, height), [*flat.walls, *flat.furniture])
+    home = _Home(rng)
+    home.divide(0.0, 0.0, width, height)
+    return FloorPlan(build_box(0.0, 0.0, width, height), [*home.walls, *home.furniture])
 
 
-class _Flat:
-    """The walls and the furniture of a flat, which is divided into rooms."""
+class _Home:
+    """The walls and the furniture of a home, which is divided into rooms."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.walls: list[Obstacle] = []
@@ -191,7 +194,7 @@ class _Flat:
 
 
 def _build_office(rng: np.random.Generator) -> FloorPlan:
-    """Generate an office floor: offices on one side of a corridor, an open space with desks on the other."""
+    """Build an office floor: offices on one side of a corridor, an open space with desks on the other."""
     width = rng.uniform(16.0, 20.0)
     height = rng.uniform(10.0, 12.0)
     corridor_low = height * rng.uniform(0.48, 0.56)
@@ -206,7 +209,7 @@ def _build_office(rng: np.random.Generator) -> FloorPlan:
 
 
 def _build_offices(rng: np.random.Generator, width: float, low: float, high: float) -> list[Obstacle]:
-    """Generate a row of offices between two heights: walls, doors to the corridor, and some shelves."""
+    """Build a row of offices between two heights: walls, doors to the corridor, and some shelves."""
     obstacles: list[Obstacle] = []
     partitions = np.linspace(0.0, width, int(rng.integers(5, 8)))
     partitions[1:-1] += rng.uniform(-0.4, 0.4, len(partitions) - 2)
@@ -224,7 +227,7 @@ def _build_offices(rng: np.random.Generator, width: float, low: float, high: flo
 
 
 def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> list[Obstacle]:
-    """Generate the wall between the corridor and the open space, with two doors."""
+    """Build the wall between the corridor and the open space, with two doors."""
     left_door = width * rng.uniform(0.15, 0.35)
     right_door = width * rng.uniform(0.65, 0.85)
     middle = width / 2.0
@@ -237,7 +240,7 @@ def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> 
 
 
 def _build_desks(rng: np.random.Generator, width: float, depth: float) -> list[Obstacle]:
-    """Generate two rows of desks in an open space of the given width and depth."""
+    """Build two rows of desks in an open space of the given width and depth."""
     columns_x = np.arange(_FIRST_DESK_X_M, width - _LAST_DESK_MARGIN_M, rng.uniform(2.9, 3.6))
     rows_y = (_LOWER_DESKS_Y_M, depth - _UPPER_DESKS_MARGIN_M)
     corners = itertools.product(columns_x, rows_y)
@@ -254,7 +257,7 @@ def _remove_near_shapes(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
 
 
 def _build_yard(rng: np.random.Generator) -> FloorPlan:
-    """Generate a park: a convex piece of land with houses, a pond, hedges and trees."""
+    """Build a yard: a convex piece of land with houses, a pond, hedges and trees."""
     offsets = rng.uniform(-0.25, 0.25, _YARD_CORNERS)
     angles = np.sort((np.arange(_YARD_CORNERS) + offsets) * 2.0 * np.pi / _YARD_CORNERS)
     center_x, center_y = _YARD_CENTER_M
@@ -274,29 +277,29 @@ def _build_yard(rng: np.random.Generator) -> FloorPlan:
     return FloorPlan(boundary, _remove_near_shapes(clear, _YARD_GAP_M))
 
 
-def _draw_yard_point(rng: np.random.Generator) -> FloatArray:
-    """Draw a point from the rectangle around the middle of a yard."""
+def _sample_yard_point(rng: np.random.Generator) -> FloatArray:
+    """Sample a point from the rectangle around the middle of a yard."""
     return np.array([rng.uniform(3.0, 17.0), rng.uniform(2.5, 13.5)])
 
 
 def _build_house(rng: np.random.Generator) -> Obstacle:
-    center = _draw_yard_point(rng)
+    center = _sample_yard_point(rng)
     width = rng.uniform(2.0, 3.6)
     depth = rng.uniform(1.6, 2.6)
     return build_rotated_block(center, width, depth, rng.uniform(0.0, np.pi))
 
 
 def _build_pond(rng: np.random.Generator) -> Obstacle:
-    """Generate a pond: a polygon, roughly an ellipse with a wavy shore."""
+    """Build a pond: a polygon, roughly an ellipse with a wavy shore."""
     angles = np.linspace(0.0, 2.0 * np.pi, _POND_CORNERS, endpoint=False)
     radius = rng.uniform(0.9, 1.5) * (1.0 + 0.2 * np.sin(2.0 * angles + rng.uniform(0.0, 6.0)))
     shore = radius[:, None] * np.column_stack([1.4 * np.cos(angles), np.sin(angles)])
-    return PolygonObstacle(round_points(_draw_yard_point(rng) + shore))
+    return PolygonObstacle(round_points(_sample_yard_point(rng) + shore))
 
 
 def _build_hedge(rng: np.random.Generator) -> Obstacle:
-    """Generate a hedge: a wall of two equal legs with a right angle between them."""
-    start = _draw_yard_point(rng)
+    """Build a hedge: a wall of two equal legs with a right angle between them."""
+    start = _sample_yard_point(rng)
     angle = rng.uniform(0.0, np.pi)
     along = np.array((np.cos(angle), np.sin(angle)))
     across = np.array((-np.sin(angle), np.cos(angle)))
@@ -306,12 +309,12 @@ def _build_hedge(rng: np.random.Generator) -> Obstacle:
 
 
 def _build_tree(rng: np.random.Generator) -> Obstacle:
-    center = _draw_yard_point(rng)
+    center = _sample_yard_point(rng)
     return _build_circle(center, rng.uniform(0.2, 0.45))
 
 
-def _build_plant(rng: np.random.Generator) -> FloorPlan:
-    """Generate a factory hall: racks in rows, and behind a partition with a gate, machines and columns."""
+def _build_factory(rng: np.random.Generator) -> FloorPlan:
+    """Build a factory: racks in rows, and behind a partition with a gate, machines and columns."""
     width = rng.uniform(15.0, 19.0)
     height = rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
@@ -340,7 +343,7 @@ def _build_plant(rng: np.random.Generator) -> FloorPlan:
 
 
 def _build_traffic(rng: np.random.Generator) -> FloorPlan:
-    """Generate a hall with shelves, and two or three vehicles that drive back and forth in the aisles."""
+    """Build a hall with shelves, and two or three vehicles that drive back and forth in the aisles."""
     width = 16.0
     height = 11.0
     obstacles: list[Obstacle] = []
@@ -362,7 +365,7 @@ FLOOR_PLANS: dict[str, Callable[[np.random.Generator], FloorPlan]] = {
     "homes": _build_home,
     "offices": _build_office,
     "yards": _build_yard,
-    "plants": _build_plant,
+    "plants": _build_factory,
     "traffic": _build_traffic,
 }
-"""Functions that draw a plan, by the name of its kind."""
+"""Functions that build a random plan, by the name of its kind."""

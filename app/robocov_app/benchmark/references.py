@@ -213,5 +213,5 @@ def _save_maps(path: Path, maps: Mapping[str, Any]) -> None:
         lines.append(f"{json.dumps(name)}: {json.dumps(entry)}")
     head = json.dumps({"format": "robocov-benchmark-suite", "version": suite.VERSION, "search": search})
     text = head.removesuffix("}") + ', "maps": {\n' + ",\n".join(lines) + "\n}}\n"
-    with replace_file(path) as part:
-        part.write_text(text, encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

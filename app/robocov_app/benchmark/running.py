@@ -125,5 +125,5 @@ def _write_result(path: Path, result: dict[str, Any], rows: list[Row]) -> None:
     """Write a result as JSON with one line per run."""
     head = json.dumps(result, indent=1).removesuffix("\n}")
     lines = ",\n".join(json.dumps(row, allow_nan=False) for row in rows)
-    with replace_file(path) as part:
-        part.write_text(f'{head},\n "rows": [\n{lines}\n]}}\n', encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(f'{head},\n "rows": [\n{lines}\n]}}\n', encoding="utf-8")

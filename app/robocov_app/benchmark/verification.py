@@ -58,9 +58,9 @@ from robocov_app.sweep.worker import EFFORT_FILE, Outcome
 from robocov_app.terminal.interruption import Interruption
 
 MAX_SEED = 2**63 - 1
-"""Maximum seed."""
+"""Maximum seed, which fits in a signed integer of 64 bits."""
 RunKey: TypeAlias = tuple[str, str, int]
-"""Track, map and seed of a run."""
+"""Track (or `NEW_MAP`), map and seed of a run."""
 NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
 CHANGED_FRACTION = 0.05
@@ -311,7 +311,7 @@ def verify_result(
         if key in new_tasks:
             new_outcomes[key] = check.outcome
     if new_outcomes and not stop.requested:
-        gaps = _compute_new_gaps(new_maps, new_outcomes, options.workers, stop)
+        gaps = _compute_gaps_on_new_maps(new_maps, new_outcomes, options.workers, stop)
         verification.comparison = compare_gaps(result["rows"], gaps)
         verification.differences += _describe_comparison(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
@@ -470,7 +470,7 @@ def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -
     return differences
 
 
-def _compute_new_gaps(
+def _compute_gaps_on_new_maps(
     new_maps: Sequence[NewMap],
     outcomes: Mapping[RunKey, Outcome | None],
     workers: int,
@@ -481,6 +481,7 @@ def _compute_new_gaps(
     The gap of a run that failed or left an area uncovered is infinite. Maps without a placement, because the
     user interrupted the search, are left out.
     """
+    # As in the suite, the reference is a placement of the robots that are still working at the end.
     robots = suite.TRACKS[TRACK].survivors
     queries = {
         new_map.name: ReferenceQuery(
@@ -495,13 +496,15 @@ def _compute_new_gaps(
     references = dict(answer_queries(queries, workers, stop))
     gaps = []
     for new_map in new_maps:
-        outcome = outcomes.get((NEW_MAP, new_map.name, new_map.start_seed))
         reference = references.get(new_map.name)
         if reference is None:
+            # The search was interrupted before it reached this map.
             continue
+        outcome = outcomes.get((NEW_MAP, new_map.name, new_map.start_seed))
         gap = math.inf
         if outcome is not None and outcome.error is None and not outcome.metrics["uncovered_area_m2"]:
             cost = outcome.metrics["mean_distance_m"]
+            # Only failed runs have no cost.
             assert cost is not None
             gap = cost / reference.mean_distance - 1.0
         gaps.append((new_map.family, gap))

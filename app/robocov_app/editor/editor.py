@@ -52,7 +52,7 @@ class Editor(EditorContext):
     shows_panel : bool
         Whether the panel is shown.
     is_compact : bool
-        Whether the buttons of the bar and of the rail are left to the page of a phone.
+        Whether the buttons of the bar and of the rail are provided by the mobile page.
     shown : set of str
         Names of the visible layers; see `LAYERS`.
     radius : float
@@ -77,8 +77,8 @@ class Editor(EditorContext):
         Position of the pointer over the map, m.
     typed : str
         Value that is being typed for the tool.
-    moves_since : float or None
-        Time at which the animation of moving obstacles started, s; None while they are shown at rest.
+    motion_start_s : float or None
+        Time at which the animation of moving obstacles started; None while they are shown at rest.
     """
 
     error_message_s = 8.0
@@ -113,7 +113,7 @@ class Editor(EditorContext):
         self.clipboard = Clipboard()
         self.cursor: Point | None = None
         self.typed = ""
-        self.moves_since: float | None = None
+        self.motion_start_s: float | None = None
         self._measured: tuple[Sketch, float] | None = None  # sketch and radius last sent to the worker
 
     @property

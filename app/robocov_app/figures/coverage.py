@@ -210,8 +210,8 @@ def plot_coverage(
         _draw_curves(page, curves, times, arrangement.curves, distance_label)
     _draw_maps(page, snapshots, extent, limit, arrangement.panels)
     boxes = [panel.box for panel in arrangement.panels]
-    zoom = boxes[0].width / extent.width
-    page.draw_footer(handles, boxes, zoom, arrangement.footer_left)
+    pixels_per_meter = boxes[0].width / extent.width
+    page.draw_footer(handles, boxes, pixels_per_meter, arrangement.footer_left)
     return page.figure
 
 
@@ -335,13 +335,15 @@ def _draw_snapshot(
     """Draw distances, the borders of geodesic cells, the map and the robots in axes that fill a box, px."""
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
-    columns = max(round(DOTS_PER_PIXEL * box.width), 2)
-    rows = max(round(DOTS_PER_PIXEL * box.height), 2)
-    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
-    y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
-    zoom = DOTS_PER_PIXEL * box.width / (high_x - low_x)
+    x, y = _compute_pixel_centers(axes, box)
     pixels = _paint_distances(
-        snapshot.field, x, y, limit, theme, zoom=zoom, border_width=_BORDER_WIDTH * scale
+        snapshot.field,
+        x,
+        y,
+        limit,
+        theme,
+        dots_per_meter=DOTS_PER_PIXEL * box.width / (high_x - low_x),
+        border_width=_BORDER_WIDTH * scale,
     )
     image = axes.imshow(
         pixels,
@@ -357,6 +359,25 @@ def _draw_snapshot(
     robot_drawing.draw_robots(axes, positions, snapshot.team.radius, numbers, theme)
 
 
+def _compute_pixel_centers(axes: Axes, box: PageBox) -> tuple[FloatArray, FloatArray]:
+    """Return the centers of the dots of an image that fills axes in a box, px.
+
+    Returns
+    -------
+    x : (columns,) array, m
+        From left to right.
+    y : (rows,) array, m
+        From top to bottom.
+    """
+    low_x, high_x = axes.get_xlim()
+    low_y, high_y = axes.get_ylim()
+    columns = max(round(DOTS_PER_PIXEL * box.width), 2)
+    rows = max(round(DOTS_PER_PIXEL * box.height), 2)
+    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
+    y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
+    return x, y
+
+
 def _paint_distances(
     field: DistanceField,
     x: FloatArray,
@@ -364,7 +385,7 @@ def _paint_distances(
     limit: float,
     theme: Theme,
     *,
-    zoom: float,
+    dots_per_meter: float,
     border_width: float,
 ) -> NDArray[np.uint8]:
     """Return the RGB image of distances and borders, (h, w, 3).
@@ -377,13 +398,13 @@ def _paint_distances(
     limit : float, m
         End of the color scale.
     theme : Theme
-    zoom : float, dots/m
+    dots_per_meter : float
     border_width : float, px
     """
     pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * _HATCH_PX)]
     width = DOTS_PER_PIXEL * border_width
-    borders = field.compute_borders(x, y, width / zoom)
-    opacity = compute_line_opacities(borders, zoom, width)[:, None]
+    borders = field.compute_borders(x, y, width / dots_per_meter)
+    opacity = compute_line_opacities(borders, dots_per_meter, width)[:, None]
     border_pixels = (borders.rows, borders.columns)
     border_color = np.array(theme.geodesic_border)
     pixels[border_pixels] = np.rint((1.0 - opacity) * pixels[border_pixels] + opacity * border_color)

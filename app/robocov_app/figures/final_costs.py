@@ -29,7 +29,7 @@ _MARGIN_FRACTION = 0.06
 
 
 class Sample(NamedTuple):
-    """The values of several runs, one of each.
+    """One value from each of several runs.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ from robocov_app.look.labels import shorten_text
 from robocov_app.look.theme import LIGHT, Theme
 
 MAX_LEVELS = 15
-"""Maximum number of gain values with a median each; more values are taken as samples of a range."""
+"""Maximum number of gain values with a median each; above this, gains are treated as continuous."""
 MAX_NAME_CHARS = 28
 """Maximum length of a name on an axis or in a legend."""
 MAX_DRAWN_RUNS = 600
@@ -52,7 +52,7 @@ class GainResults(NamedTuple):
     label : str
     style : CurveStyle
     gains : (m,) array
-        Values of the gain; nan stands for no limit. If the gain is a text, indices of its values.
+        Values of the gain; nan stands for no limit. For a text-valued gain, indices of its values.
     values : (m,) array
     """
 
@@ -102,8 +102,9 @@ def plot_gains(
     label : str
         Label of the value axis.
     choices : sequence of str
-        Possible values of a gain that is a text; empty if the gain is a number. Then a line connects the
-        medians, the axis is logarithmic if its range is wide, and "none", for no limit, is at its right end.
+        Possible values of a text-valued gain; empty for a numeric one. For a numeric gain, a line connects
+        the medians, the axis is logarithmic if its range is wide, and "none", for no limit, is at its right
+        end.
 
     Returns
     -------
@@ -132,7 +133,7 @@ def plot_gains(
 
 @plain_style()
 def plot_gain_grid(grid: GainGrid, size: tuple[int, int]) -> Figure:
-    """Plot a grid of two gains on a separate page, see `draw_gain_grid`."""
+    """Plot a grid of two gains on a separate page. See `draw_gain_grid`."""
     axes = _create_axes(size)
     draw_gain_grid(axes, grid, LIGHT)
     return get_figure(axes)

@@ -87,13 +87,15 @@ class Upload:
         try:
             if path.exists():
                 path = find_free_path(folder, path.stem, path.suffix)
-            with replace_file(path) as part:
-                part.write_bytes(b"".join(self._pieces))
+            with replace_file(path) as temporary:
+                temporary.write_bytes(b"".join(self._pieces))
         except OSError as error:
             raise TransferError(
                 f"{self.name}: cannot be saved on the server: {describe_error(error)}"
             ) from error
         except OutputError as error:
+            # The message of the error contains a path of the server, which the user of the page must not see.
+            # Its cause has the reason alone.
             cause = error.__cause__
             reason = describe_error(cause) if isinstance(cause, OSError) else str(error)
             raise TransferError(f"{self.name}: cannot be saved on the server: {reason}") from error
@@ -106,7 +108,7 @@ def check_name(name: str) -> None:
     if not name or path.name != name or "\\" in name or name.startswith("."):
         raise TransferError("expected a file name without a folder")
     if not name.isprintable():
-        raise TransferError("expected a file name of printable characters")
+        raise TransferError("expected only printable characters in the file name")
     if len(name.encode()) > MAX_NAME_BYTES:
         raise TransferError(f"{name[:40]}…: the name is too long; expected at most {MAX_NAME_BYTES} bytes")
     if path.suffix.lower() not in UPLOAD_SUFFIXES:

@@ -20,7 +20,7 @@ from robocov_app.web.pages import Page, Pages
 from robocov_app.web.window_input import WindowInput
 
 MAX_EVENTS_PER_S = 400.0
-"""Maximum rate of events from one page. Excess events wait in the connection; none is lost."""
+"""Maximum rate of events from one page. Excess events wait in the connection; none are lost."""
 EVENTS_PER_UPLOAD = 200.0
 """Number of events that an upload counts as."""
 EVENTS_PER_PIECE = 8.0

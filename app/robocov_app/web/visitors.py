@@ -86,8 +86,8 @@ class VisitorFolders:
         # Another server may have updated the file in the meantime.
         self._names = {**_read_names(self._read()), **self._names, _hash(visitor): path.name}
         content = {"cookie": self.cookie, "visitors": self._names}
-        with replace_file(self._folder / FILE_NAME) as part:
-            part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        with replace_file(self._folder / FILE_NAME) as temporary:
+            temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _read(self) -> dict[str, Any]:
         with suppress(OSError, ValueError):

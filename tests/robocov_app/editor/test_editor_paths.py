@@ -209,13 +209,13 @@ def test_paths_are_drawn_and_obstacles_shown_in_motion(tmp_path: Path, theme: st
         driver.editor.message = ""
         driver.run_frames(1, 4.0)
         (shift,) = [
-            get_path(driver.sketch).compute_displacement(driver.editor.now - driver.editor.moves_since)
+            get_path(driver.sketch).compute_displacement(driver.editor.now - driver.editor.motion_start_s)
         ]
         assert shift[0] > 1.0
         x, y = map(round, driver.find_pixel((2.0 + float(shift[0]), 2.2)))
         assert (driver.copy_frame()[y, x] != with_path[y, x]).any()
         driver.press_key("l")
-        assert driver.editor.moves_since is None
+        assert driver.editor.motion_start_s is None
 
 
 def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:

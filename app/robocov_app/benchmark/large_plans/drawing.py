@@ -15,6 +15,8 @@ DOOR_WIDTH_M = 0.9
 """Width of most doors."""
 _MIN_WALL_PIECE_M = 0.2
 """Minimum length of a wall between doors; shorter walls are left out."""
+_GRID_M = 0.01
+"""Distance of the grid to which outlines are rounded; plans have the same resolution."""
 _QUARTER_TURN = np.array([(0.0, -1.0), (1.0, 0.0)])
 _MIRROR = np.diag([1.0, -1.0])
 
@@ -134,9 +136,11 @@ def build_outline(parts: Iterable[shapely.Geometry]) -> Ring:
     union = shapely.union_all(list(parts))
     if not isinstance(union, shapely.Polygon):
         raise ValueError(f"parts: expected connected shapes, got a {union.geom_type}")
-    # Corners that differ by rounding errors coincide on the grid of centimeters.
-    outline = shapely.simplify(shapely.set_precision(union, 0.01), 0.0).normalize()
-    outline = shapely.orient_polygons(outline)
+    # Corners that differ by rounding errors coincide on the grid.
+    outline = shapely.simplify(shapely.set_precision(union, _GRID_M), 0.0)
+    # The first corner of a union depends on the version of GEOS, but that of a normalized polygon does not.
+    # Normalizing makes the ring clockwise, so the orientation is set afterwards.
+    outline = shapely.orient_polygons(outline.normalize())
     return round_points(np.asarray(outline.exterior.coords)[:-1])
 
 

@@ -134,8 +134,8 @@ class Paths:
             if key in scene.editor.selection.items:
                 color = theme.accent
             overlay.draw_path(scene.canvas, path, color)
-            if scene.editor.moves_since is not None and paths.is_moving(path):
-                shift = path.compute_displacement(scene.editor.now - scene.editor.moves_since)
+            if scene.editor.motion_start_s is not None and paths.is_moving(path):
+                shift = path.compute_displacement(scene.editor.now - scene.editor.motion_start_s)
                 moved = shapely.transform(item.geometry, lambda points, by=shift: points + by)
                 overlay.draw_ghost(scene.canvas, moved)
 

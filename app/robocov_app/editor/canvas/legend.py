@@ -16,10 +16,11 @@ _BOUNDARY_HALF_LENGTH_PX = 9
 _START_RADIUS_PX = 5.0
 _START_WIDTH_PX = 1.6
 _ROBOT_RADIUS_PX = 6.5
-_ROBOT_RIM_PX = 1.4
+_ROBOT_RING_PX = 1.4
 _HATCHING_SIDE_PX = 12
 
-_ROBOT_EDGE_SHARE = 0.55  # of the ink in the edge of a robot
+_ROBOT_EDGE_SHARE = 0.55
+"""Fraction of the ink in the color of a robot's edge; the rest is the color of the background."""
 
 
 def build_legend_entries(
@@ -47,7 +48,7 @@ def build_legend_entries(
     rows: list[tuple[bool, str, Glyph]] = [
         (True, "obstacle", _draw_obstacle),
         (True, "boundary", _draw_boundary),
-        (has_hull_excess, "outside, in the robots' hull", _draw_hull_excess),
+        (has_hull_excess, "inside hull, outside map", _draw_hull_excess),
         (has_starts, "start", _draw_start),
         (has_team, "robot", _draw_robot),
     ]
@@ -86,7 +87,7 @@ def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
     theme = canvas.theme
     edge = mix(theme.background, theme.ink, _ROBOT_EDGE_SHARE)
     colors = overlay.DiscColors(theme.robots[0], theme.robot_ring, edge)
-    overlay.draw_disc(canvas, (x, y), _ROBOT_RADIUS_PX, colors, rim=_ROBOT_RIM_PX)
+    overlay.draw_disc(canvas, (x, y), _ROBOT_RADIUS_PX, colors, ring_width=_ROBOT_RING_PX)
 
 
 def _draw_narrow_area(canvas: Canvas, x: float, y: float) -> None:

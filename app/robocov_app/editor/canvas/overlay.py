@@ -43,7 +43,7 @@ THIN_LINE_PX = 1.2  # outline that is not chosen
 EDGE_LINE_PX = 1.5  # edges of handles, previews and text boxes
 KNOB_RADIUS_PX = 4.5
 LARGE_KNOB_RADIUS_PX = 5.5
-KNOB_RIM_PX = 1.6
+KNOB_RING_PX = 1.6
 GUIDE_LABEL_OFFSET_PX = (11, 15)  # from the end of a guide to its label
 PATH_DASH_PX = 4.0
 WAYPOINT_RADIUS_PX = 2.5
@@ -68,8 +68,8 @@ CHOSEN_RING_GAP_PX = 4  # between a badge and the ring around the chosen one
 MESSAGE_GAP_PX = 10  # between a badge and its message to the right
 MESSAGE_RISE_PX = 14  # between a badge and its message above
 MESSAGE_EDGE_PX = 8  # between a message and the edge of the view
-BADGE_RIM_PX = 1.4
-SMALL_BADGE_RIM_PX = 1.0
+BADGE_RING_PX = 1.4
+SMALL_BADGE_RING_PX = 1.0
 
 # Shares of the second color in mixes.
 GHOST_ACCENT_SHARE = 0.35
@@ -135,16 +135,16 @@ def draw_ring(canvas: Canvas, pixel: Point, radius: float, color: Color, width: 
 
 
 def draw_disc(
-    canvas: Canvas, pixel: Point, radius: float, colors: DiscColors, *, rim: float, text: str = ""
+    canvas: Canvas, pixel: Point, radius: float, colors: DiscColors, *, ring_width: float, text: str = ""
 ) -> None:
-    """Draw a disc with a text, centered at a pixel; radius and rim width in px at scale 1."""
+    """Draw a disc with an optional label, centered at a pixel; radius and ring width in px at scale 1."""
     scale = canvas.scale
     sprite = partial(
         sprites.render_disc,
         radius * scale,
         fill=colors.fill,
         ring=colors.ring,
-        ring_width=rim * scale,
+        ring_width=ring_width * scale,
         edge=colors.edge,
         text=text,
     )
@@ -181,7 +181,7 @@ def draw_handles(
         if handle.kind == "rotate":
             canvas.draw_line((x, y), (x, y + KNOB_HEIGHT_PX * canvas.scale), accent, canvas.scale_width(1.0))
             radius = LARGE_KNOB_RADIUS_PX if is_large else KNOB_RADIUS_PX
-            draw_disc(canvas, (x, y), radius, DiscColors(background, accent, accent), rim=KNOB_RIM_PX)
+            draw_disc(canvas, (x, y), radius, DiscColors(background, accent, accent), ring_width=KNOB_RING_PX)
         elif handle.kind == "scale":
             _draw_square(canvas, (x, y), background, is_large=is_large)
         else:
@@ -573,6 +573,6 @@ def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: 
     fill = get_problem_color(theme, is_error=is_error)
     colors = DiscColors(fill, theme.background, mix(fill, theme.ink, BADGE_EDGE_INK_SHARE))
     if is_small:
-        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, rim=SMALL_BADGE_RIM_PX, text="!")
+        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, ring_width=SMALL_BADGE_RING_PX, text="!")
     else:
-        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, rim=BADGE_RIM_PX, text="!")
+        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, ring_width=BADGE_RING_PX, text="!")

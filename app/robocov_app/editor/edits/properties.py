@@ -44,7 +44,7 @@ def rename(sketch: Sketch, owner: Owner, name: str) -> Change:
 def _rename_start(sketch: Sketch, previous: str, name: str) -> Change:
     require(name, "a start needs a name")
     is_free = name == previous or name not in dict(sketch.starts)
-    require(is_free, f"there is a start “{name}” already")
+    require(is_free, f"a start named “{name}” already exists")
     new_names = {previous: name}
     starts = tuple((new_names.get(key, key), start) for key, start in sketch.starts)
     description = f"{sketch.display_name(previous)} renamed to “{name}”"
@@ -53,20 +53,20 @@ def _rename_start(sketch: Sketch, previous: str, name: str) -> Change:
 
 def set_note(sketch: Sketch, selection: Selection, note: str) -> Change:
     """Set the note of the selected obstacles; an empty note removes it."""
-    require(selection.items, "select obstacles first: notes are written to them")
+    require(selection.items, "select the obstacles to annotate first")
     note = create.clean_text(note, "a note")
     obstacles = Selection(items=selection.items).describe(sketch)
     description = f"note on {obstacles}"
     if not note:
         description = f"note on {obstacles} removed"
-    return replace(_set_marks(sketch, selection, "", note=note), description=description)
+    return replace(_set_fields(sketch, selection, "", note=note), description=description)
 
 
 def group(sketch: Sketch, selection: Selection, name: str = "") -> Change:
     """Put the selected obstacles into a group with the given name, by default a new name."""
     require(len(selection.items) >= 2, "select two or more obstacles to group")
     name = create.clean_label(name) or _find_free_group(sketch)
-    return _set_marks(sketch, selection, f"grouped as “{name}”", group=name)
+    return _set_fields(sketch, selection, f"grouped as “{name}”", group=name)
 
 
 def _find_free_group(sketch: Sketch) -> str:
@@ -78,18 +78,18 @@ def ungroup(sketch: Sketch, selection: Selection) -> Change:
     """Take the selected obstacles out of their groups."""
     keys = [key for key in selection.items if sketch.get_item(key).group]
     require(keys, "select obstacles that are in a group")
-    return _set_marks(sketch, Selection.of(*keys), "ungrouped", group="")
+    return _set_fields(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
 def lock(sketch: Sketch, selection: Selection) -> Change:
-    """Lock the selected obstacles, so that they cannot be selected with the mouse."""
-    change = _set_marks(sketch, selection, "locked", locked=True)
+    """Lock and deselect the selected obstacles, so that the mouse cannot select them."""
+    change = _set_fields(sketch, selection, "locked", locked=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
 
 def hide(sketch: Sketch, selection: Selection) -> Change:
-    """Hide the selected obstacles in the editor; they stay part of the map."""
-    change = _set_marks(sketch, selection, "hidden", hidden=True)
+    """Hide and deselect the selected obstacles; they stay part of the map."""
+    change = _set_fields(sketch, selection, "hidden", hidden=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
 
@@ -97,14 +97,14 @@ def unlock_and_show_all(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected."""
     keys = [item.key for item in sketch.obstacles if not item.is_selectable]
     require(keys, "nothing is locked or hidden")
-    return _set_marks(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
+    return _set_fields(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
-def _set_marks(sketch: Sketch, selection: Selection, verb: str, **marks: Any) -> Change:
-    """Set fields of the selected obstacles, given as keyword arguments."""
+def _set_fields(sketch: Sketch, selection: Selection, action: str, **fields: Any) -> Change:
+    """Set fields of the selected obstacles, given by name; `action` ends the description of the change."""
     require(selection.items, "select obstacles first")
-    items = [replace(item, **marks) for item in selection.list_items(sketch)]
-    description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
+    items = [replace(item, **fields) for item in selection.list_items(sketch)]
+    description = f"{Selection(items=selection.items).describe(sketch)} {action}"
     return Change(sketch.with_items(items), selection, description)
 
 
@@ -118,7 +118,7 @@ def set_title(sketch: Sketch, name: str) -> Change:
 def set_description(sketch: Sketch, description: str) -> Change:
     """Set the description of the map."""
     description = create.clean_text(description, "a description")
-    return Change(replace(sketch, description=description), Selection(), "map described")
+    return Change(replace(sketch, description=description), Selection(), "description changed")
 
 
 def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
@@ -161,11 +161,11 @@ def restack(sketch: Sketch, selection: Selection, end: Literal["top", "bottom"])
     selected = tuple(item for item in sketch.obstacles if item.key in selection.items)
     others = tuple(item for item in sketch.obstacles if item.key not in selection.items)
     order = selected + others
-    verb = "sent to the bottom"
+    action = "sent to the bottom"
     if end == "top":
         order = others + selected
-        verb = "brought to the top"
-    description = f"{Selection(items=selection.items).describe(sketch)} {verb}"
+        action = "brought to the top"
+    description = f"{Selection(items=selection.items).describe(sketch)} {action}"
     return Change(replace(sketch, obstacles=order), selection, description)
 
 

@@ -50,11 +50,11 @@ def align(editor: Editor, side: transform.Side) -> None:
 
 def toggle_motion(editor: Editor) -> str:
     """Start or stop the animation of moving obstacles; return the status message."""
-    if editor.moves_since is not None:
-        editor.moves_since = None
+    if editor.motion_start_s is not None:
+        editor.motion_start_s = None
         return "obstacles are shown at time zero"
     require(paths.list_moving_obstacles(editor.sketch), "no obstacle moves: the tool Path gives one a path")
-    editor.moves_since = editor.now
+    editor.motion_start_s = editor.now
     return "obstacles move as in a run; L stops them"
 
 

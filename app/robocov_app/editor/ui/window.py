@@ -223,7 +223,7 @@ class EditorWindow(CommandWindow):
         dialog = editor.dialogs.current
         is_importing = isinstance(dialog, ImportDialog) and dialog.is_busy
         needs_redraw = any(part.ui.needs_redraw for part in self.parts)
-        if needs_redraw or editor.moves_since is not None or is_importing:
+        if needs_redraw or editor.motion_start_s is not None or is_importing:
             return None
         return FrameState(
             revision=editor.revision,

@@ -74,8 +74,8 @@ def open_folder(folder: Path, plan: Plan) -> None:
         is_empty = not any(folder.iterdir())
     path = folder / STUDY_FILE
     if is_empty:
-        with replace_file(path) as part:
-            part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
+        with replace_file(path) as temporary:
+            temporary.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
     problem = "expected an empty folder or a study of the paper"
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):

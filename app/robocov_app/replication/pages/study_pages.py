@@ -102,8 +102,8 @@ class ShownFailure(NamedTuple):
 
 def write_text(path: Path, text: str) -> None:
     """Write or replace a text file atomically."""
-    with replace_file(path) as part:
-        part.write_text(text, encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def write_claims(folder: Path, claims: Sequence[Claim]) -> None:
@@ -189,7 +189,7 @@ def _build_claims_context(plan: Plan, results: PaperResults) -> dict[str, Any]:
     return {
         "best": by_key,
         "distances": compute_grid_distances(plan),
-        "maps_in_all": map_count,
+        "map_count": map_count,
         "summaries": summarize_contenders(outcomes, participants, plan.duration),
         "maps": _tabulate_medians(outcomes),
         "failures": _show_failures(results.worst, outcomes, "rapf-shared", others),

@@ -178,5 +178,5 @@ def _save_entries(path: Path, entries: Mapping[str, Any], plan: Plan) -> None:
         "steps_per_block": STEPS_PER_BLOCK,
         "robots": entries,
     }
-    with replace_file(path) as part:
-        part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

@@ -96,5 +96,5 @@ def _save_reference(path: Path, query: ReferenceQuery, answer: ReferencePlacemen
         "agreement": answer.agreement,
         "positions_m": answer.positions,
     }
-    with replace_file(path) as part:
-        part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -74,6 +74,6 @@ class WindowDisplay:
         target = find_free_path(folder, "robocov", ".png")
         image = BytesIO()
         pygame.image.save(self.surface, image, ".png")
-        with replace_file(target) as part:
-            part.write_bytes(image.getvalue())
+        with replace_file(target) as temporary:
+            temporary.write_bytes(image.getvalue())
         return f"screenshot saved: {target}"

@@ -14,7 +14,7 @@ from robocov_app.viewer.chart.scale import ChartScale, has_headline
 from robocov_app.viewer.session.pane import Pane
 
 # Lengths in pixels at scale 1.
-MIN_CAPTION_GAP_PX = 15.0
+MIN_CAPTION_SPACING_PX = 15.0
 """Minimum distance between the centers of captions."""
 _LEFT_PX = 9
 _RIGHT_PX = 6
@@ -28,7 +28,7 @@ _MAX_PERCENT_WITH_DECIMAL = 99.95
 
 
 def draw_captions(
-    screen: pygame.Surface, frame: ChartFrame, scale: ChartScale, cut_off: Mapping[int, str]
+    screen: pygame.Surface, frame: ChartFrame, value_scale: ChartScale, cut_off_notes: Mapping[int, str]
 ) -> None:
     """Draw the captions directly onto the window, since they change more often than the cached page.
 
@@ -36,9 +36,9 @@ def draw_captions(
     ----------
     screen : pygame.Surface
     frame : ChartFrame
-    scale : ChartScale
-        Scale with which the page was drawn.
-    cut_off : mapping of int to str
+    value_scale : ChartScale
+        Scale of the value axis with which the page was drawn.
+    cut_off_notes : mapping of int to str
         Text about the area that no robot reaches, by the number of the pane; empty where there is none.
     """
     chart = screen.subsurface(pygame.Rect(frame.layout.chart).clip(screen.get_rect()))
@@ -48,21 +48,21 @@ def draw_captions(
     if not panes:
         return
     if has_headline(frame.layout, frame.timeline):
-        _draw_headline(canvas, frame, values[panes[0].number], cut_off[panes[0].number])
+        _draw_headline(canvas, frame, values[panes[0].number], cut_off_notes[panes[0].number])
         return
     # From top to bottom: the largest value is at the top of the chart.
     panes.sort(key=lambda pane: -values[pane.number])
-    gap = MIN_CAPTION_GAP_PX * frame.scale
-    if len(panes) > 1 and any(cut_off.values()):
-        gap += _NOTE_LINE_PX * frame.scale
+    spacing = MIN_CAPTION_SPACING_PX * frame.scale
+    if len(panes) > 1 and any(cut_off_notes.values()):
+        spacing += _NOTE_LINE_PX * frame.scale
     rows = spread_labels(
-        [scale.to_row(values[pane.number]) for pane in panes],
-        gap=gap,
-        low=0.5 * gap,
+        [value_scale.to_row(values[pane.number]) for pane in panes],
+        gap=spacing,
+        low=0.5 * spacing,
         high=frame.layout.chart.height - _BOTTOM_PX * frame.scale,
     )
     for row, pane in zip(rows, panes, strict=True):
-        _draw_caption(canvas, frame, pane, values, row=row, note=cut_off[pane.number])
+        _draw_caption(canvas, frame, pane, values, row=row, note=cut_off_notes[pane.number])
 
 
 def _draw_headline(canvas: Canvas, frame: ChartFrame, value: float, note: str) -> None:

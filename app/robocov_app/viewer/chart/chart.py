@@ -186,8 +186,10 @@ class Chart:
             page = self._draw_page(frame)
         screen.blit(page, self.layout.chart.position)
         if self._has_curves:
-            cut_off = {pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes}
-            draw_captions(screen, frame, self._scale, cut_off)
+            cut_off_notes = {
+                pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes
+            }
+            draw_captions(screen, frame, self._scale, cut_off_notes)
         hovered = None if self.hover is None else self.find_branch(self.hover)
         draw_branch_tree(screen, frame, self._branch_lines, hovered)
         draw_slider_state(screen, frame)

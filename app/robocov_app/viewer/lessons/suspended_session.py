@@ -18,7 +18,7 @@ class SuspendedSession:
         self._viewer = viewer
         self._workspace = viewer.files.workspace
         self._map_name = viewer.files.map_name
-        self._layers = viewer.view.layers
+        self._layers = set(viewer.view.layers)
         self._tool = viewer.tool
         self._active_pane = viewer.inspection.active_pane
         self._selected = viewer.inspection.selected
@@ -37,5 +37,6 @@ class SuspendedSession:
         viewer.toolbox.current = self._tool
         viewer.inspection.active_pane = self._active_pane
         viewer.show_session(self._workspace.session)
+        # The name is stored for the displayed map, so the session must be shown first.
         viewer.files.map_name = self._map_name
         viewer.inspection.selected = self._selected

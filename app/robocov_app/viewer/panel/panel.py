@@ -50,7 +50,7 @@ _FILE_BUTTONS = (
     PanelButton("Full screen", "fullscreen"),
 )
 _REDRAW_INTERVAL_S = 0.25  # while the simulation runs
-_NO_ROBOT_TEXT = "Click a robot, or press I, to see why it moves and why it does not."
+_NO_ROBOT_TEXT = "Click a robot, or press I, to see why it is or is not moving."
 _SLIDER_TIP = "Hold Shift while dragging for fine steps"
 _TAB_TITLES = {"show": "Layers"}
 _NO_ROBOT_REASON = "no robot is selected: click one first, or press I"

@@ -138,7 +138,7 @@ class Pane:
         return self.simulation.time
 
     def get_row(self, number: int) -> int | None:
-        """Return the row of a working robot in arrays; None for other robots."""
+        """Return the array row of a robot, or None if it is not working."""
         if number in self.numbers:
             return self.numbers.index(number)
         return None

@@ -104,8 +104,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     low = vertices.min(axis=0) - margin
     high = vertices.max(axis=0) + margin
     size = high - low
-    with replace_file(path) as part:
-        part.write_text(_build_page(environment, writer, low, high), encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(_build_page(environment, writer, low, high), encoding="utf-8")
     obstacles = [transform_numbers(obstacle, writer.round_length) for obstacle in environment.obstacles]
     boundary = Polygon([(writer.round_length(x), writer.round_length(y)) for x, y in environment.boundary])
     notes = [f"1 mm is {scale:g} m: {size[0] / scale:.6g} x {size[1] / scale:.6g} mm"]

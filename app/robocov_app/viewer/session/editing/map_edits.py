@@ -28,7 +28,7 @@ _COORDINATE_DECIMALS = 4
 
 
 def replace_obstacles(
-    environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
+    environment: Environment, first_index: int, removed_count: int, added: Iterable[Obstacle] = ()
 ) -> Environment:
     """Return a map with some of its obstacles replaced, checked like a map that is read from a file.
 
@@ -38,9 +38,9 @@ def replace_obstacles(
     ----------
     environment : Environment
         The map.
-    first : int
+    first_index : int
         Index of the first obstacle that is replaced.
-    removed : int
+    removed_count : int
         Number of obstacles that are replaced.
     added : iterable of Obstacle
         The obstacles that replace them.
@@ -55,20 +55,24 @@ def replace_obstacles(
         If the map would break a rule.
     """
     old = environment.obstacles
-    obstacles = (*old[:first], *added, *old[first + removed :])
+    obstacles = (*old[:first_index], *added, *old[first_index + removed_count :])
     starts = dict(environment.starts)
     while True:
         changed = replace(environment, obstacles=obstacles, starts=starts)
-        # Writing and reading the map checks all its rules. If obstacles cover starts, retry without these.
+        # Writing and reading the map checks all its rules. If obstacles cover starts, retry without them.
         try:
             return from_json(to_json(changed), "map")
         except MapError as error:
-            invalid = {issue.path[1] for issue in error.issues if issue.path[:1] == ("starts",)}
-            covered = [name for name in starts if name in invalid]
-            if not covered:
+            covered_starts = _find_covered_starts(error) & starts.keys()
+            if not covered_starts:
                 raise MapError(str(error).removeprefix("map: ")) from None
-            for name in covered:
+            for name in covered_starts:
                 del starts[name]
+
+
+def _find_covered_starts(error: MapError) -> set[str]:
+    """Return the names of the starts about which an error complains, because obstacles cover them."""
+    return {str(issue.path[1]) for issue in error.issues if issue.path[:1] == ("starts",)}
 
 
 def add_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:

@@ -96,8 +96,8 @@ def save_session(
         If the file cannot be written.
     """
     content = build_session_content(document, head, step, view)
-    with replace_file(path) as part:
-        part.write_text(format_session(content), encoding="utf-8")
+    with replace_file(path) as temporary:
+        temporary.write_text(format_session(content), encoding="utf-8")
 
 
 def format_session(content: Mapping[str, Any]) -> str:
