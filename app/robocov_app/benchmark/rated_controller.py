@@ -21,10 +21,12 @@ from robocov_app.sweep.study.study import Study, StudyMap
 
 ORACLE = "oracle"
 """Name of the controller that knows the reference placements; see `robocov_app.benchmark.oracle`."""
+LEARNED = "learned"
+"""Name of the controller with a trained network; see `robocov_app.benchmark.learned`."""
 STAND_IN = "rapf"
 """Controller with which a study of the benchmark is built if the code of its own must not be executed."""
-_ORACLE_FILE = "oracle.py"
-_ORACLE_NAME = f"{_ORACLE_FILE}:Oracle"
+_FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned"}
+"""Controllers that only the benchmark has, and their files in this folder."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class RatedController:
     Parameters
     ----------
     controller : str
-        Name of a controller, ``FILE.py:CLASS``, or "oracle".
+        Name of a controller, ``FILE.py:CLASS``, "oracle" or "learned".
     gains : Mapping
         Gains that differ from the defaults.
     """
@@ -115,7 +117,7 @@ class RatedController:
     @property
     def is_built_in(self) -> bool:
         """Whether the controller is part of robocov."""
-        return self.controller in CONTROLLERS or self.controller == ORACLE
+        return self.controller in CONTROLLERS or self.controller in _FILES
 
     def replace_user_code(self) -> "RatedController":
         """Return a controller that can stand for this one in studies without executing the code of a user."""
@@ -142,8 +144,8 @@ class RatedController:
 
     def _locate_controller(self) -> tuple[str, Path]:
         """Return the name of the controller, and the folder to which a relative path of its file refers."""
-        if self.controller == ORACLE:
-            return _ORACLE_NAME, Path(__file__).parent
+        if self.controller in _FILES:
+            return _FILES[self.controller], Path(__file__).parent
         return self.controller, Path()
 
     def _check_controller(self) -> None:
@@ -152,7 +154,7 @@ class RatedController:
         This is done before the maps are built, which takes seconds.
         """
         name, folder = self._locate_controller()
-        if self.controller == ORACLE:
+        if self.controller in _FILES:
             name = str(folder / name)
         try:
             make_controller(name, dict(self.gains))
@@ -171,7 +173,7 @@ class RatedController:
         -------
         dict
             Name, label, information, all gains, the gains that were set, and, for a controller in a file of
-            the user, the SHA-256 of its source code. The oracle has none, because it is part of robocov.
+            the user, the SHA-256 of its source code. Controllers that are part of robocov have none.
         """
         name = study.controllers[0]
         controller_class = study.load_controller_class(name)
@@ -196,7 +198,7 @@ class RatedController:
             Name, the gains that were set, and the SHA-256 of the source code.
         """
         source_hash = None
-        if source is not None and self.controller != ORACLE:
+        if source is not None and not self.is_built_in:
             texts = [source.text, *(module.text for module in source.modules.values())]
             source_hash = hashlib.sha256("\0".join(texts).encode()).hexdigest()
         return {

@@ -53,7 +53,8 @@ class Arguments(JsonOption):
       suite       list the tracks and maps
       references  compute missing best placements of the suite
 
-    The controller `oracle` knows the best placements and moves straight to them.
+    Two more controllers are available: `oracle` knows the best placements and moves straight to them, and
+    `learned` is a neural network that imitates a planner.
 
     Example: robocov benchmark --controller mine.py:MyController --quick --out mine
     """
@@ -66,7 +67,7 @@ class Arguments(JsonOption):
     paths: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[DIR ...]")] = ()
     """Results, for verify and page."""
     controller: str | None = None
-    """Name of a controller, FILE.py:CLASS, or oracle; with verify only for one in a file."""
+    """Name of a controller, FILE.py:CLASS, oracle or learned; with verify only for one in a file."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
     """Gains that differ from their defaults."""
     track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()

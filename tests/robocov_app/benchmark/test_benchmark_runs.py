@@ -29,6 +29,8 @@ from robocov.errors import InputError
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import place_labels
+from robocov_app.benchmark.learned import Learned
+from robocov_app.benchmark.oracle import Oracle
 from robocov_app.benchmark.page import (
     MAX_INCOMPLETE_TABLES,
     ParetoPoint,
@@ -51,6 +53,8 @@ from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.terminal.interruption import Interruption
 
 MAPS = ("blocks-a", "blocks-b")
+BENCHMARK_LABELS = {"oracle": Oracle.label, "learned": Learned.label}
+"""Labels of the controllers that only the benchmark has."""
 
 
 @pytest.fixture
@@ -129,7 +133,9 @@ def test_bundled_results_are_complete() -> None:
         # `verify` needs no file for controllers that are part of robocov.
         assert result["entry"]["source_sha256"] is None
         controller = result["entry"]["controller"]
-        if controller != "oracle":
+        if controller in BENCHMARK_LABELS:
+            assert result["entry"]["label"] == BENCHMARK_LABELS[controller]
+        else:
             assert result["entry"]["label"] == load_controller_class(controller).label
         rows = {(row["track"], row["map"], row["seed"]) for row in result["rows"]}
         assert {row for row in rows if row[0] in suite.RANKED_TRACKS["core"]} == runs
@@ -200,11 +206,15 @@ def test_labels_are_next_to_the_marks_of_a_figure() -> None:
 
 
 @pytest.mark.usefixtures("short_runs")
-def test_the_oracle_can_be_rated_and_verified(tmp_path: Path) -> None:
-    run_short_benchmark(tmp_path / "out", "oracle")
+@pytest.mark.parametrize(("controller", "information"), [("oracle", "whole map"), ("learned", "own")])
+def test_controllers_of_the_benchmark_can_be_rated_and_verified(
+    tmp_path: Path, controller: str, information: str
+) -> None:
+    run_short_benchmark(tmp_path / "out", controller)
     assert verify(tmp_path / "out", sample=1) == (1, [])
     entry = read_result(tmp_path / "out")["entry"]
-    assert entry["information"] == "whole map" and entry["label"] == "Oracle"
+    assert entry["information"] == information
+    assert entry["label"] == BENCHMARK_LABELS[controller]
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from robocov.observation import Snapshot
 from robocov_app.benchmark import suite, verification
 from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
 from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
-from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import (
@@ -153,6 +153,11 @@ ISOLATED = [
 @pytest.mark.parametrize(("controller", "track"), ISOLATED)
 def test_robots_of_built_in_controllers_decide_by_their_own_observations(controller: str, track: str) -> None:
     assert isolate(controller, track, [2]) == []
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_robots_of_the_learned_controller_decide_by_their_own_observations(track: str) -> None:
+    assert isolate(LEARNED, track, [2]) == []
 
 
 SHARING = [name for name, kind in CONTROLLERS.items() if kind.information == "shared map"]
