@@ -41,7 +41,7 @@ def format_row(controller: str, track: str) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-RIVALS = ("rapf", "frontier-median", "greedy-submodular")
+RIVALS = ("rapf", "learned", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_ROWS = [
     *((controller, track) for track in PLAN_TRACKS for controller in ("rapf", "lloyd")),
@@ -72,6 +72,7 @@ ROWS = [
     ),
     *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
     *((controller, "ideal") for controller in ("local-search", "exemplar")),
+    ("learned", "lossy"),
     *PLAN_ROWS,
     *UNKNOWN_DENSITY_ROWS,
 ]
@@ -150,3 +151,26 @@ def test_failures_agree_with_the_entries(track: str, map_name: str) -> None:
 def test_results_in_tunnels_agree_with_the_entries(controller: str) -> None:
     gap, path_length = format_gap_and_path_length(controller, "plans-small", "tunnels-7001")
     assert f"| `{controller}` | {gap} | {path_length} |\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+
+
+def compute_median_gap(controller: str, track: str) -> float:
+    """Return the median gap of a controller on a track, %."""
+    rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
+    return 100.0 * Rating(controller, track, rows, 0).gap.estimate
+
+
+def test_results_of_the_trained_policy_agree_with_the_entries() -> None:
+    text = " ".join((PAGE.parent / "learning.md").read_text(encoding="utf-8").split())
+    rows = [row for row in read_result(ENTRIES / "learned.json.gz")["rows"] if row["track"] == "ideal"]
+    rating = Rating("learned", "ideal", rows, 0)
+    assert f"the median gap of `learned` is {100.0 * rating.gap.estimate:.1f}%" in text
+    assert sum(row["contacts"] for row in rows) == 0
+    assert rating.compute_rest()[0] == 0.0
+    assert f"the median path length is {rating.compute_median('path_length_m'):.1f} m" in text
+    assert f"have a median gap of {compute_median_gap('learned', 'large-team'):.1f}%" in text
+    assert f"compared with {compute_median_gap('rapf', 'large-team'):.1f}% for RAPF" in text
+    medians = {}
+    for family, maps in suite.FAMILIES.items():
+        medians[family] = 100.0 * np.median([row["gap"] for row in rows if row["map"] in maps])
+    assert f"the median is {medians['bundled']:.1f}%" in text
+    assert f"{medians['rooms']:.1f}% on `rooms` and {medians['offices']:.1f}% in offices" in text
