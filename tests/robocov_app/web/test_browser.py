@@ -2,6 +2,7 @@
 
 import json
 import time
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -75,18 +76,38 @@ def wait_for_unchanged_picture(browser):
     return pictures[-1]
 
 
-@pytest.fixture
-def rooms(browser, tmp_path):
-    """Yield the link of a window of the map Rooms, which a page of 1280 x 720 px shows."""
-    browser.resize(1280, 720)
-    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-        browser.driver.get(link)
-        browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
-        wait_for_unchanged_picture(browser)
+@pytest.fixture(scope="module")
+def shared_rooms(tmp_path_factory):
+    """Serve a window of the map Rooms for several tests, and yield its link."""
+    folder = tmp_path_factory.mktemp("rooms")
+    with serve_window("demo", "rooms", "--paused", "--folder", str(folder)) as link:
         yield link
 
 
-def test_a_drag_moves_the_map_and_f_shows_all_of_it(browser, rooms):
+def open_page(browser, link):
+    """Show a window on a page of 1280 x 720 px."""
+    browser.resize(1280, 720)
+    browser.driver.get(link)
+    browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
+    wait_for_unchanged_picture(browser)
+
+
+@pytest.fixture
+def rooms(browser, tmp_path):
+    """Yield the link of a new window of the map Rooms, which a page of 1280 x 720 px shows."""
+    with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        open_page(browser, link)
+        yield link
+
+
+@pytest.fixture
+def unchanged_rooms(browser, shared_rooms):
+    """Show a window of the map Rooms whose session and files no test changes."""
+    open_page(browser, shared_rooms)
+
+
+@pytest.mark.usefixtures("unchanged_rooms")
+def test_a_drag_moves_the_map_and_f_shows_all_of_it(browser):
     first = read_picture(browser)
     browser.drag((60, 240), (160, 240))
     browser.wait_until(lambda: read_picture(browser) != first)
@@ -104,12 +125,14 @@ def test_a_command_is_typed_in_the_palette(browser, rooms):
     browser.wait_until(lambda: read_picture(browser) != typed)
 
 
-def test_the_window_has_the_size_of_the_page(browser, rooms):
+@pytest.mark.usefixtures("unchanged_rooms")
+def test_the_window_has_the_size_of_the_page(browser):
     browser.resize(390, 844, 3.0)
     browser.wait_until(lambda: get_canvas_size(browser) == [1170, 2532])
 
 
-def test_the_window_follows_the_color_scheme(browser, rooms):
+@pytest.mark.usefixtures("unchanged_rooms")
+def test_the_window_follows_the_color_scheme(browser):
     browser.set_preferences(color_scheme="light")
     light = wait_for_unchanged_picture(browser)
     browser.set_preferences(color_scheme="dark")
@@ -117,7 +140,8 @@ def test_the_window_follows_the_color_scheme(browser, rooms):
     browser.set_preferences(color_scheme="light")
 
 
-def test_a_page_is_reloaded_by_its_cookie(browser, rooms):
+@pytest.mark.usefixtures("unchanged_rooms")
+def test_a_page_is_reloaded_by_its_cookie(browser):
     assert "token" not in browser.driver.current_url
     browser.driver.refresh()
     browser.wait_until(lambda: get_canvas_size(browser) == [1280, 720])
@@ -233,14 +257,6 @@ def record_messages(browser):
         return [message for message in messages if message["kind"] != "shown"]
 
     return take_messages
-
-
-@pytest.fixture(scope="module")
-def shared_rooms(tmp_path_factory):
-    """Serve a window of the map Rooms for several tests, and yield its link."""
-    folder = tmp_path_factory.mktemp("rooms")
-    with serve_window("demo", "rooms", "--paused", "--folder", str(folder)) as link:
-        yield link
 
 
 @pytest.fixture
@@ -531,17 +547,41 @@ def test_a_drag_with_shift_selects_obstacles(browser, rooms):
     assert browser.read_console() == []
 
 
-@pytest.fixture
-def phone(browser, tmp_path):
-    """Show a window of the map Rooms on a phone held upright."""
+@contextmanager
+def show_on_phone(browser, link):
+    """Show a window on a phone held upright."""
     with browser.emulate_touch():
         browser.resize(390, 844, 2.0)
-        with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
-            browser.driver.get(link)
-            browser.wait_until(lambda: get_classes(browser) == {"phone"})
-            wait_for_unchanged_picture(browser)
-            yield browser
-            assert browser.read_console() == []
+        browser.driver.get(link)
+        browser.wait_until(lambda: get_classes(browser) == {"phone"})
+        wait_for_unchanged_picture(browser)
+        yield browser
+        assert browser.read_console() == []
+
+
+@pytest.fixture
+def phone(browser, tmp_path):
+    """Show a new window of the map Rooms on a phone."""
+    with (
+        serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link,
+        show_on_phone(browser, link) as phone,
+    ):
+        yield phone
+
+
+@pytest.fixture(scope="module")
+def rooms_for_fingers(tmp_path_factory):
+    """Serve a window of the map Rooms for the tests of fingers, and yield its link."""
+    folder = tmp_path_factory.mktemp("rooms")
+    with serve_window("demo", "rooms", "--paused", "--folder", str(folder)) as link:
+        yield link
+
+
+@pytest.fixture
+def shared_phone(browser, rooms_for_fingers):
+    """Show a window of the map Rooms on a phone. Other tests may have moved its map and opened its panel."""
+    with show_on_phone(browser, rooms_for_fingers) as phone:
+        yield phone
 
 
 def are_large(buttons):
@@ -549,24 +589,25 @@ def are_large(buttons):
     return all(min(button.size.values()) >= 48 for button in buttons if button.is_displayed())
 
 
-def test_a_phone_held_upright_has_the_bar_below_the_window(phone):
-    assert phone.measure("canvas") == (0, 0, 390, 792)
-    assert phone.measure("#touch")[1] == 792
+def test_a_phone_held_upright_has_the_bar_below_the_window(shared_phone):
+    assert shared_phone.measure("canvas") == (0, 0, 390, 792)
+    assert shared_phone.measure("#touch")[1] == 792
 
 
 @pytest.fixture
-def touch(phone):
+def touch(shared_phone):
     """Return a function that moves fingers through steps, and returns the messages that the page sends.
 
     Each message is reduced to its kind, the number of its button, and its horizontal position in the page.
     The panel of the window is open.
     """
-    phone.find("#panel").click()
-    phone.wait_until(lambda: phone.run_script("return scrollBox"))
-    take_messages = record_messages(phone)
+    if not shared_phone.run_script("return scrollBox"):
+        shared_phone.find("#panel").click()
+        shared_phone.wait_until(lambda: shared_phone.run_script("return scrollBox"))
+    take_messages = record_messages(shared_phone)
 
     def move_fingers(*steps):
-        phone.touch(*steps)
+        shared_phone.touch(*steps)
         messages = [message for message in take_messages() if message["kind"] in ("button", "wheel")]
         return [(message["kind"], message.get("button"), round(message["x"] / 2)) for message in messages]
 
@@ -599,11 +640,11 @@ def test_a_finger_that_moves_to_the_side_moves_a_slider_of_the_panel(touch):
     assert {kind for kind, *_ in moved} == {"button"}
 
 
-def test_the_buttons_of_a_phone_are_large(phone):
-    assert list_bar_buttons(phone) == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
-    assert are_large(phone.find_all("#touch button"))
-    phone.find("#to-more").click()
-    assert are_large(phone.find_all("#more button"))
+def test_the_buttons_of_a_phone_are_large(shared_phone):
+    assert list_bar_buttons(shared_phone) == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
+    assert are_large(shared_phone.find_all("#touch button"))
+    shared_phone.find("#to-more").click()
+    assert are_large(shared_phone.find_all("#more button"))
 
 
 def test_the_bar_of_a_phone_plays_and_pauses(phone):
