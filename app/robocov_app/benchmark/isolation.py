@@ -57,7 +57,7 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.benchmark.controller_messages import ControllerCode, Setup
 
 _MAX_ATTEMPTS = 1000
-"""Maximum number of attempts to draw random points in a region, which may be very thin."""
+"""Maximum number of attempts to sample random points in a region, which may be very thin."""
 
 
 def hide_others(observations: Observations, robot: int, substitutes: FloatArray) -> Observations:
@@ -145,8 +145,8 @@ def _freeze(array: Any) -> Any:
     return array
 
 
-def draw_substitutes(region: Region, count: int, rng: np.random.Generator) -> FloatArray:
-    """Draw random positions in a region, (count, 2) m, as placeholders for the positions of robots."""
+def sample_substitutes(region: Region, count: int, rng: np.random.Generator) -> FloatArray:
+    """Sample random positions in a region, (count, 2) m, as placeholders for the positions of robots."""
     low_x, low_y, high_x, high_y = region.bounds
     for _ in range(_MAX_ATTEMPTS):
         points = rng.uniform((low_x, low_y), (high_x, high_y), size=(16 * count, 2))
@@ -222,7 +222,7 @@ class IsolatedTeam:
 
     def begin(self, region: Region, team: Team) -> None:
         """Send all processes what they know before the first step, and wait until they are ready."""
-        self._substitutes = draw_substitutes(region, len(team), self._rng)
+        self._substitutes = sample_substitutes(region, len(team), self._rng)
         deciders: list[tuple[int | None, Decider]] = [(None, self._team), *self._robots.items()]
         for robot, decider in deciders:
             decider.begin(Setup(self._code, robot, self._environment, region, team))

@@ -85,8 +85,8 @@ class NewMapComparison:
         return self.p_value < MIN_P_VALUE
 
 
-def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator) -> list[NewMap]:
-    """Draw new maps of different families.
+def sample_new_maps(families: Sequence[str], count: int, rng: np.random.Generator) -> list[NewMap]:
+    """Sample new maps of different families.
 
     Parameters
     ----------
@@ -103,11 +103,11 @@ def draw_new_maps(families: Sequence[str], count: int, rng: np.random.Generator)
     """
     drawable = [family for family in families if family in GENERATORS or family in FLOOR_PLANS]
     chosen = rng.permutation(len(drawable))[:count].tolist()
-    return [_draw_map(drawable[k], rng) for k in sorted(chosen)]
+    return [_sample_map(drawable[k], rng) for k in sorted(chosen)]
 
 
-def _draw_map(family: str, rng: np.random.Generator) -> NewMap:
-    """Draw a map of a family; seeds for which the generator finds no map are skipped."""
+def _sample_map(family: str, rng: np.random.Generator) -> NewMap:
+    """Sample a map of a family; seeds for which the generator finds no map are skipped."""
     for _ in range(_MAX_ATTEMPTS):
         seed = int(rng.integers(suite.MIN_NEW_SEED, _MAX_MAP_SEED))
         try:

@@ -109,7 +109,7 @@ class Rating:
     is_complete : bool
         Whether the rating includes all runs of the track; only complete ratings are ranked.
     score : float
-        Mean score of the runs, see `compute_score`.
+        Mean score of the runs; see `compute_score`.
     """
 
     label: str

@@ -1,7 +1,7 @@
 """Repeated runs: the referee simulates a run and computes its metrics, and its controller decides elsewhere.
 
 A referee is the process of one run. It never imports the code of a user: its simulation gets the forces,
-goals and messages of the robots from other processes, see `robocov_app.benchmark.isolation`. Forces must be
+goals and messages of the robots from other processes; see `robocov_app.benchmark.isolation`. Forces must be
 finite numbers of the right shape, and are limited like those of any controller.
 """
 

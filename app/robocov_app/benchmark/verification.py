@@ -43,7 +43,7 @@ from robocov_app.benchmark.new_maps import (
     NewMap,
     NewMapComparison,
     compare_gaps,
-    draw_new_maps,
+    sample_new_maps,
 )
 from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
 from robocov_app.benchmark.referee import Referees, RepeatedRun, RunCheck
@@ -294,7 +294,7 @@ def verify_result(
     sampled = _sample_runs(
         rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
     )
-    new_maps = _draw_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
+    new_maps = _sample_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
     new_tasks = _index_new_tasks(stand_in, new_maps)
     checker = _RunChecker(
         code,
@@ -376,14 +376,14 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
     return tasks
 
 
-def _draw_maps(
+def _sample_maps(
     rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
 ) -> list[NewMap]:
-    """Draw new maps of the families in a result; none for the oracle, which needs their best placements."""
+    """Sample new maps of the families in a result; none for the oracle, which needs their best placements."""
     if rated.controller == ORACLE or TRACK not in studies:
         return []
     families = dict.fromkeys(suite.FAMILY_OF[study_map.name] for study_map in studies[TRACK].maps)
-    return draw_new_maps(list(families), count, rng)
+    return sample_new_maps(list(families), count, rng)
 
 
 def _index_new_tasks(rated: RatedController, new_maps: Sequence[NewMap]) -> dict[RunKey, Task]:

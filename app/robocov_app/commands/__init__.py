@@ -13,7 +13,7 @@ class Subcommand(NamedTuple):
     summary : str
         One line for the list of commands.
     uses_kernels : bool
-        Whether the command calls compiled kernels, see `robocov.compiled`.
+        Whether the command calls compiled kernels; see `robocov.compiled`.
     """
 
     module: str

@@ -60,7 +60,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     tour: bool = False
     """Play the bundled lesson, in eleven short chapters."""
     lesson: Path | None = None
-    """Play a lesson of your own, see `robocov lesson`."""
+    """Play a lesson of your own; see `robocov lesson`."""
     frames: int | None = None
     """Number of frames to render without a display, 30 per second; requires --out or --video."""
     out: Path | None = None

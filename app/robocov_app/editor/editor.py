@@ -150,7 +150,7 @@ class Editor(EditorContext):
 
     @property
     def start_name(self) -> str | None:
-        """Start at which the team is shown: the selected start, the chosen one, or the map's first one."""
+        """Start at which the team is shown: the selected, the chosen or else the first one, if any."""
         for name in (*sorted(self.selection.starts), self.start, *self.start_names):
             if name in self.start_names:
                 return name

@@ -139,7 +139,7 @@ class ValueAxis:
 def set_value_limits(
     axis: Any, values: FloatArray, value_axis: ValueAxis, margin: float = VALUE_MARGIN
 ) -> None:
-    """Set the limits and ticks of an axis, see `choose_value_limits`.
+    """Set the limits and ticks of an axis; see `choose_value_limits`.
 
     Parameters
     ----------

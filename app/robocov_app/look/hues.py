@@ -139,7 +139,7 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
     ----------
     theme : Theme
     hues : list of int
-        Hue of each robot, see `choose_robot_hues`.
+        Hue of each robot; see `choose_robot_hues`.
     scheme : {"paper", "robots"}
 
     Returns

@@ -41,7 +41,7 @@ class Theme:
     forces : dict of str to Color
         Colors of the arrows of force terms, by the name of the term.
     robots : tuple of Color
-        Hues of robots, see `hues`.
+        Hues of robots; see `hues`.
     heat : tuple of Color
         Color scale of distances, from near to far.
     density, density_strength : Color, float

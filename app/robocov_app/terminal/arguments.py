@@ -392,7 +392,7 @@ def parse_size(option: str, text: str, minimum: tuple[int, int], maximum: tuple[
 
 
 def parse_window_size(text: str | None) -> tuple[int, int] | None:
-    """Parse the value of ``--size`` for a window, see `parse_size`; None if the option is not given."""
+    """Parse the value of ``--size`` for a window; see `parse_size`; None if the option is not given."""
     if text is None:
         return None
     return parse_size("--size", text, _MIN_WINDOW_SIZE_PX, _MAX_WINDOW_SIZE_PX)

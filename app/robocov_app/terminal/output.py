@@ -192,7 +192,7 @@ def format_csv(header: str, rows: Iterable[Iterable[object]]) -> str:
 
 
 def format_csv_line(cells: Iterable[object]) -> str:
-    """Format one row of a CSV file, see `format_csv`."""
+    """Format one row of a CSV file; see `format_csv`."""
     text = io.StringIO()
     # The writer only quotes the characters of its own line ending, so it must contain both line breaks.
     csv.writer(text, lineterminator="\r\n").writerow(map(quote_cell, cells))

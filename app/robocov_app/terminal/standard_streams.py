@@ -40,7 +40,7 @@ class StandardStreams:
         Returns
         -------
         list of str
-            Labels of the streams that were closed, see `list_closed_streams`.
+            Labels of the streams that were closed; see `list_closed_streams`.
         """
         closed_labels = self.list_closed_streams()
         for name in _DESCRIPTORS:

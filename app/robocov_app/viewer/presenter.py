@@ -76,7 +76,7 @@ class Presenter(ViewerModel):
         self.show_message(f"{self.tool.title}: {self.tool.hint}")
 
     def finish_drawing(self) -> str | None:
-        """Complete the tool's drawing; return a message."""
+        """Complete the tool's drawing; return a message, or None if there was no drawing."""
         return self.tool.finish(self.session)
 
     def cancel(self) -> None:

@@ -106,7 +106,7 @@ class FrameDelivery:
                 page.has_updates.set()
 
     def _find_frame(self, page: Page) -> Frame | None:
-        """Return the newest frame for a page: of the map in its size, or of the window."""
+        """Return the newest frame of the map in a page's size, or of the window; None before the first."""
         if page.shown_map is not None:
             return self.maps.frames.get(page.shown_map)
         if page is self._pages.controlling:

@@ -20,7 +20,7 @@ from robocov.generator import GENERATORS
 from robocov.observation import Snapshot
 from robocov_app.benchmark import suite, verification
 from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
-from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, draw_new_maps
+from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, sample_new_maps
 from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
 from robocov_app.benchmark.running import run_benchmark
@@ -558,7 +558,7 @@ def test_a_few_rows_are_not_enough_for_a_significant_difference() -> None:
 
 
 def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
-    new_maps = draw_new_maps(list(suite.FAMILIES), 4, np.random.default_rng(3))
+    new_maps = sample_new_maps(list(suite.FAMILIES), 4, np.random.default_rng(3))
     assert len({new_map.family for new_map in new_maps}) == 4
     hashes = {frozen["sha256"] for frozen in suite.load_frozen_maps().values()}
     for new_map in new_maps:

@@ -24,7 +24,7 @@ class RecordedPointer(Pointer):
         return self.scale
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        self.click_counts.append(self.count_clicks(event, now))
+        self.click_counts.append(self.record_press(event, now))
         return PanGesture(self.pan, lambda event: self.clicks.append(event.button))
 
     def pan(self, dx: float, dy: float) -> None:

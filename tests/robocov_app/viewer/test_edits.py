@@ -204,7 +204,7 @@ def test_numbers_are_unique():
     session.remove_robot(4)
     assert session.add_robot((3.0, 3.0)) == 4
     for number in (1, 3):
-        with pytest.raises(ParameterError, match=f"there is a robot {number} already"):
+        with pytest.raises(ParameterError, match=f"robot {number} already exists"):
             add_numbered_robot(session, (3.0, 3.0), number)
 
 
@@ -292,7 +292,7 @@ def test_an_edit_that_is_not_possible_changes_nothing(is_playing):
         (lambda: session.remove_robot(9), "there is no robot 9"),
         (lambda: session.place_robot(9, (1.0, 1.0)), "there is no robot 9"),
         (lambda: session.drag_robot(9, (1.0, 1.0)), "there is no robot 9"),
-        (lambda: add_numbered_robot(session, (1.0, 1.0), 3), "there is a robot 3 already"),
+        (lambda: add_numbered_robot(session, (1.0, 1.0), 3), "robot 3 already exists"),
     ):
         with pytest.raises(ParameterError, match=message):
             edit()

@@ -64,8 +64,8 @@ def offset(sketch: Sketch, selection: Selection, distance: float) -> Change:
         shapes[item.key] = _offset_item(item, distance)
         require(shapes[item.key], f"nothing would be left of the {sketch.display_name(item.key)}")
     obstacles = Selection(items=selection.items).describe(sketch)
-    verb = "grown" if distance > 0 else "shrunk"
-    description = f"{obstacles} {verb} by {abs(round_length(distance)):g} m"
+    action = "grown" if distance > 0 else "shrunk"
+    description = f"{obstacles} {action} by {abs(round_length(distance)):g} m"
     return replace_obstacles(sketch, shapes, description)
 
 

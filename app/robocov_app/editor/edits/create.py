@@ -177,7 +177,7 @@ def _round_radius(radius: float, label: str) -> float:
 
 
 def find_wall(sketch: Sketch, point: Point, reach: float) -> int | None:
-    """Return the key of the wall within `reach` meters of a point."""
+    """Return the key of a wall within `reach` meters of a point; None without one."""
     for key in find_obstacles(sketch, point, reach):
         if isinstance(sketch.get_item(key).shape, env.WallObstacle):
             return key

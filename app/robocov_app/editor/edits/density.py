@@ -201,10 +201,10 @@ def _get_base(density: Density | None) -> float:
     raise _build_kind_error(density)
 
 
-def _replace_feature(sketch: Sketch, number: int, feature: Feature, verb: str) -> Change:
+def _replace_feature(sketch: Sketch, number: int, feature: Feature, action: str) -> Change:
     features = list(list_features(sketch))
     features[number] = feature
-    return _set_features(sketch, features, f"{_name_feature(feature)} {verb}")
+    return _set_features(sketch, features, f"{_name_feature(feature)} {action}")
 
 
 def _get_feature(sketch: Sketch, number: int) -> Feature:

@@ -475,11 +475,11 @@ def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bo
     return sketch.with_objects(moved)
 
 
-def _transform(sketch: Sketch, selection: Selection, affine: Affine, verb: str) -> Change:
+def _transform(sketch: Sketch, selection: Selection, affine: Affine, action: str) -> Change:
     # Undo during a drag may have removed selected objects.
     present = selection.restrict_to(sketch)
     require(present, "select something first")
-    return Change(_apply_affine(sketch, present, affine), present, f"{present.describe(sketch)} {verb}")
+    return Change(_apply_affine(sketch, present, affine), present, f"{present.describe(sketch)} {action}")
 
 
 def _apply_affine(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:

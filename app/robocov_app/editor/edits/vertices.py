@@ -199,7 +199,7 @@ def round_corners(sketch: Sketch, selection: Selection, radius: float) -> Change
     return _cut_corners(sketch, selection, compute_cut, "rounded")
 
 
-def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, verb: str) -> Change:
+def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, action: str) -> Change:
     """Cut off the selected corners of all objects, with the cut that `compute_cut` returns for each."""
     changed = sketch
     count = 0
@@ -213,9 +213,9 @@ def _cut_corners(sketch: Sketch, selection: Selection, compute_cut: ComputeCut, 
         if rings != list(sketch.list_vertex_rings(owner)):
             changed = changed.with_rings(owner, rings)
     require(count, "select corners first, of polygons, walls or the boundary")
-    description = f"corner {verb}"
+    description = f"corner {action}"
     if count > 1:
-        description = f"{count} corners {verb}"
+        description = f"{count} corners {action}"
     return Change(changed, selection.without_vertices(), description)
 
 

@@ -219,7 +219,7 @@ class Document:
         self.autosaver.close(discard=discard)
 
     def check_disk(self, now: float) -> FileState:
-        """Check whether another program has changed the file.
+        """Check whether another program has changed the file, and update `file_state`.
 
         Parameters
         ----------

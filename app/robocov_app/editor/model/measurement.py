@@ -40,7 +40,7 @@ class Measurement:
         The narrowest passage.
     impassable : MultiPolygon
         Areas to mark as impassable: in each passage that is too narrow, the largest disc that fits through
-        it; and the space that no robot can touch, see `compute_reach`.
+        it; and the space that no robot can touch; see `compute_reach`.
     cut_off : MultiPolygon
         Free space in which robots fit, but which they cannot reach from the largest part.
     vertices : int
@@ -234,7 +234,7 @@ class MeasurementCodec(Codec):
         self._known: dict[int, Item] = {}
 
     def encode(self, question: tuple[Sketch, float]) -> Question:
-        """Return a question with only those obstacles that the process has not received yet."""
+        """Return a question with the obstacles that the process has not received yet; they count as sent."""
         sketch, radius = question
         changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
         self._known = {item.key: item for item in sketch.obstacles}

@@ -163,7 +163,10 @@ class DensityTool(EditorTool):
         return "cross"
 
     def _build_change(self, context: EditorContext, start: Point, end: Point) -> Change | None:
-        """Return the change that a drag between two points, m, makes: it adds, moves or resizes a feature."""
+        """Return the change that a drag between two points, m, makes: it adds, moves or resizes a feature.
+
+        None if the feature has been deleted during the drag.
+        """
         sketch = context.sketch
         number = self._hit.feature
         if number is None:

@@ -124,7 +124,10 @@ def compute_side_position(box: Box, side: tuple[int, int]) -> Point:
 
 
 def find_handle(handles: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
-    """Return the nearest handle within `reach` meters of a point; vertices take precedence over others."""
+    """Return the nearest handle within `reach` meters of a point; None without one.
+
+    Vertices take precedence over other handles.
+    """
     nearby = [handle for handle in handles if distance(handle.position, point) <= reach]
     return min(
         nearby, key=lambda handle: (handle.kind != "vertex", distance(handle.position, point)), default=None

@@ -54,7 +54,7 @@ class MotionPathTool(EditorTool):
 
     @property
     def origin(self) -> Point | None:
-        """Last waypoint, m."""
+        """Last waypoint, m; None without a path."""
         path = self._selected.path
         if path is None:
             return None

@@ -65,7 +65,7 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
 
     @property
     def origin(self) -> Point | None:
-        """Last point of the line that is being drawn, m."""
+        """Last point of the line that is being drawn, m; None without one."""
         return None
 
     @property

@@ -76,7 +76,10 @@ class EditorPointer(Pointer):
         self.canvas.hovered = None
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        """Handle a press: start to pan, show or hide the message of a problem, or start to use the tool."""
+        """Handle a press: start to pan, show or hide the message of a problem, or start to use the tool.
+
+        None outside the sheet and on problems, where the press does not start a gesture.
+        """
         if not self.canvas.contains(event.pos):
             return None
         tool = self.editor.tool
@@ -102,13 +105,13 @@ class EditorPointer(Pointer):
         editor = self.editor
         pointer = self._build_event(event.pos)
         handle = editor.tool.press
-        if self._is_double_click(event, now):
+        if self._record_press(event, now):
             handle = editor.tool.double_click
         editor.attempt(lambda: handle(editor, pointer))
 
-    def _is_double_click(self, event: pygame.event.Event, now: float) -> bool:
-        """Return whether a press completes a double click; a third quick press is a single click again."""
-        return self.count_clicks(event, now) % 2 == 0
+    def _record_press(self, event: pygame.event.Event, now: float) -> bool:
+        """Record a press; return whether it completes a double click. A third quick one is single again."""
+        return self.record_press(event, now) % 2 == 0
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
         """Handle a click of a button that pans: a right click completes a drawing or opens the menu."""

@@ -145,7 +145,7 @@ class _FeatureReader:
         raise MapError(f"{self.source_name}: expected CircularBND, BND or Uniform, got {quote(kind)}")
 
     def _read_numbers(self, count: int, kind: str) -> list[float]:
-        """Return the next numbers, which belong to a feature of the given kind."""
+        """Read the next numbers, which belong to a feature of the given kind."""
         words = self._words[self._next : self._next + count]
         self._next += count
         numbers = [parse_number(word) for word in words]

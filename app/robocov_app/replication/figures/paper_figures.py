@@ -54,7 +54,7 @@ FIGURES_OF_VARIANTS: Mapping[str, Sequence[int]] = {
     "limited": NON_CONVEX_FIGURES,
     HALF_STEP: (4, 5),
 }
-"""The figures that are drawn in each variant, see `FigureRuns`."""
+"""The figures that are drawn in each variant; see `FigureRuns`."""
 COST_FIGURES = (3, 5, 7)
 """Figures of the cost against time; the others, except for the first, show trajectories."""
 

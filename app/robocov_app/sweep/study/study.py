@@ -109,7 +109,7 @@ class Study:
     duration, dt : float, s
         Simulated time and control period.
     radius, max_speed, max_acceleration, viscosity, sensing_range, communication_range
-        Parameters of the robots in SI units, see `robocov.Team`: a value, or a list of values that are all
+        Parameters of the robots in SI units; see `robocov.Team`: a value, or a list of values that are all
         tried. None means no limit.
     kinematics, track_width, turning_rate
         Further parameters of the robots, with one or several values as above.

@@ -204,8 +204,8 @@ class Pointer:
         is_click = self._is_click and self._is_near(self._pressed_at, event.pos)
         gesture.release(event, is_click=is_click)
 
-    def count_clicks(self, event: pygame.event.Event, now: float) -> int:
-        """Return the number of quick presses in a row here, including this one: 2 for a double click."""
+    def record_press(self, event: pygame.event.Event, now: float) -> int:
+        """Record a press, and return the number of quick presses in a row here: 2 for a double click."""
         last = self._last_press
         is_quick = now - last.time_s < DOUBLE_CLICK_S
         is_same_place = self._is_near(last.pixel, event.pos)

@@ -103,7 +103,7 @@ class Tool(Generic[ContextT, EventT]):
         return False
 
     def press(self, context: ContextT, event: EventT) -> str | None:
-        """Handle a press of the button."""
+        """Handle a press of the button; return a message or None."""
         return None
 
     def double_click(self, context: ContextT, event: EventT) -> str | None:
@@ -118,7 +118,7 @@ class Tool(Generic[ContextT, EventT]):
         return None
 
     def finish(self, context: ContextT) -> str | None:
-        """Complete the current drawing; called on Enter and on a right click."""
+        """Complete the current drawing, on Enter or a right click; return a message or None."""
         return None
 
     def cancel(self, context: ContextT) -> bool:

@@ -289,7 +289,7 @@ class Page(RowLayout):
         """Return whether the left button was just pressed over the visible part of a rectangle."""
         return self.is_event(pygame.MOUSEBUTTONDOWN) and self.is_hovered(rect)
 
-    def is_double_click(self, key: str) -> bool:
+    def record_click(self, key: str) -> bool:
         """Record a click on a widget, and return whether it is the second one of a double click."""
         now = perf_counter()
         is_second = now - self._last_click_s < DOUBLE_CLICK_S and self._last_click_key == key

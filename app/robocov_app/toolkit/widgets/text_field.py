@@ -77,7 +77,7 @@ def show_text_field(
 def _press(page: Page, key: str, text: str, rect: Rect) -> None:
     """Handle a click: start editing, or move the text cursor; a double click selects a word."""
     page.consume_event()
-    is_double = page.is_double_click(key)
+    is_double = page.record_click(key)
     if page.focus != key or page.edit is None:
         page.focus = key
         page.edit = TextEdit.select_all(text)

@@ -37,7 +37,13 @@ class SelectionActions:
         self._robots = robots
 
     def delete(self) -> str | None:
-        """Delete the selected obstacles, or remove the selected robot; return a message."""
+        """Delete the selected obstacles, or else remove the selected robot.
+
+        Returns
+        -------
+        str or None
+            Message about the obstacles; None for a robot.
+        """
         selected = self._viewer.selected_obstacles
         if not selected:
             self._robots.remove()

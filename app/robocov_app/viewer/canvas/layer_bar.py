@@ -232,6 +232,20 @@ class LayerBar(BasicFocusGroup):
 
     def _list_layer_chips(self, layers: Sequence[Layer], scenes: Sequence[Scene]) -> list[Chip]:
         """Return a chip for each layer with a symbol that is visible, or was hidden by itself."""
+        self._update_offered_layers()
+        visible = self._view.layers
+        by_name = {layer.name: layer for layer in layers}
+        chips = []
+        for name in [name for group in LAYER_GROUPS.values() for name in group]:
+            if name not in self._offered or name not in by_name:
+                continue
+            entries = build_layer_entries(by_name[name], scenes)
+            if entries:
+                chips.append(Chip("layer", f"layer:{name}", entries, is_on=name in visible))
+        return chips
+
+    def _update_offered_layers(self) -> None:
+        """Add the visible layers to the offered ones; start over if several layers have changed at once."""
         visible = self._view.layers
         preset = find_preset(visible)
         is_new_preset = preset is not None and preset is not self._preset
@@ -242,15 +256,6 @@ class LayerBar(BasicFocusGroup):
         self._preset = preset
         self._visible = set(visible)
         self._offered |= visible
-        by_name = {layer.name: layer for layer in layers}
-        chips = []
-        for name in [name for group in LAYER_GROUPS.values() for name in group]:
-            if name not in self._offered or name not in by_name:
-                continue
-            entries = build_layer_entries(by_name[name], scenes)
-            if entries:
-                chips.append(Chip("layer", f"layer:{name}", entries, is_on=name in visible))
-        return chips
 
     def _list_preset_chips(self) -> list[Chip]:
         current = find_preset(self._view.layers)

@@ -72,7 +72,7 @@ class SceneBuilder:
         return replace(scene, contacts=self._find_contacts(setup, scene))
 
     def _find_contacts(self, setup: PaneSetup, scene: Scene) -> Contacts | None:
-        """Return the contacts of a scene; None until there is a contact in the session.
+        """Return the contacts of a scene; None until a contact has been displayed in the session.
 
         From then on, the layer bar has a chip for contacts. It would be restless if it came and went.
         """

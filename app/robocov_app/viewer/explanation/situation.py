@@ -256,7 +256,7 @@ def _find_obstruction(environment: Environment, position: complex, goal: complex
 def _build_obstacle(
     environment: Environment, position: complex, sensed_point: complex | None, radius: float
 ) -> NearbyObject | None:
-    """Return the obstacle that a robot senses, or one that it touches without sensing it."""
+    """Return the obstacle that a robot senses or touches; None if there is no such obstacle."""
     point = sensed_point
     if point is None:
         center = shapely.Point(position.real, position.imag)

@@ -200,7 +200,7 @@ class LessonGuide:
         return Box(left + margin, buttons_top, width - margin, top + height - buttons_top)
 
     def find_answers(self, layout: Layout) -> LessonAnswers | None:
-        """Return the answers that can be clicked, and the part of the panel that shows them."""
+        """Return the answers that can be clicked, and the area that shows them; None without a question."""
         boxes = [area.box for area in self.click_areas if area.name.startswith(_ANSWER_PREFIX)]
         if self.shown is None or not boxes:
             return None

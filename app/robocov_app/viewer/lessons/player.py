@@ -562,7 +562,7 @@ def check_lesson(path: Path, saved: SavedSession) -> list[ChapterResult]:
     path : Path
         The file of the lesson, for messages.
     saved : SavedSession
-        The session with the lesson, see `load_lesson`.
+        The session with the lesson; see `load_lesson`.
 
     Returns
     -------

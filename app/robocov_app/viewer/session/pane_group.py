@@ -159,6 +159,7 @@ class PaneGroup:
             pane.step(self._compute_pull(pane))
         self.step += 1
         if before.follows_schedule:
+            self._release_failed_robot()
             return self._list_scheduled_events(before)
         return [*self._add_joining_robots(), *self._stop_failing_robots()]
 
@@ -177,9 +178,12 @@ class PaneGroup:
             for number in before.numbers
             if number not in now.numbers
         ]
-        if self.drag is not None and self.drag.robot not in now.numbers:
-            self.drag = None
         return events
+
+    def _release_failed_robot(self) -> None:
+        """End the drag of a robot that no longer works."""
+        if self.drag is not None and self.drag.robot not in self.panes[0].setup.numbers:
+            self.drag = None
 
     def apply(self, edit: RunEdit) -> None:
         """Apply an edit. If it raises, nothing changes.

@@ -59,7 +59,7 @@ class MapSection:
         return len(self.names) > len(layout.maps)
 
     def list_items(self, layout: StartLayout) -> list[StartItem]:
-        """Return the thumbnails that are shown."""
+        """Scroll to a valid position for a layout, and return the thumbnails that are shown."""
         self._shown_count = len(layout.maps)
         self._first = min(self._first, self._last_first)
         items: list[StartItem] = []

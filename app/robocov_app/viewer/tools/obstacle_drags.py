@@ -45,7 +45,7 @@ class ObstacleDrag(ABC):
 
     @abstractmethod
     def end(self, session: Session, inspection: Inspection) -> str | None:
-        """Apply the result, and select it; return a message."""
+        """Apply the result, and select it; return a message, or None if nothing has changed."""
 
     def is_outdated(self, session: Session) -> bool:
         """Return whether the obstacles have been changed since the drag started."""
@@ -74,7 +74,7 @@ class MoveDrag(ObstacleDrag):
         self._end = event.constrain(self._start)
 
     def build_overlay(self) -> ViewerToolOverlay | None:
-        """Return a preview of the obstacles at their new positions, and the distance."""
+        """Return the obstacles at their new positions and the distance; None if they have not moved."""
         moved = self._move()
         if not moved:
             return None
@@ -141,7 +141,7 @@ class HandleDrag(ObstacleDrag):
         self._label = f"({point[0]:.2f}, {point[1]:.2f}) m"
 
     def build_overlay(self) -> ViewerToolOverlay | None:
-        """Return a preview of the changed obstacle."""
+        """Return a preview of the changed obstacle; None if it has not changed."""
         if self._changed is None or self._changed == self._obstacle:
             return None
         return ViewerToolOverlay((self._end,), obstacles=(self._changed,), label=self._label)

@@ -79,7 +79,7 @@ class OutlineTool(ViewerTool, ABC):
         return self.finish(session)
 
     def finish(self, session: Session) -> str | None:
-        """Add the obstacle to the map, and return a message."""
+        """Add the obstacle to the map, and return a message; do nothing if it has no points."""
         points = self.outline.take_points()
         if not points:
             return None

@@ -165,7 +165,7 @@ class ViewerPointer(Pointer):
             self._canvas.zoom(factor, self.pixel)
 
     def start_gesture(self, event: pygame.event.Event, now: float) -> Gesture | None:
-        """Start a gesture on the chart, with the tool, or for panning."""
+        """Start a gesture on the chart, with the tool, or for panning; None if the press starts none."""
         if event.button == LEFT_BUTTON and self._layer_bar.press(event.pos):
             return None
         if self._is_over_time():
@@ -181,7 +181,10 @@ class ViewerPointer(Pointer):
         return PanGesture(self._canvas.camera.pan, self._click_without_tool)
 
     def _press_chart(self, pixel: Pixel) -> Gesture | None:
-        """Handle a press on the chart: switch the quantity, open a branch, or show the time at the mouse."""
+        """Handle a press on the chart: switch the quantity, open a branch, or show the time at the mouse.
+
+        Only the last of these continues as a gesture, which is returned.
+        """
         viewer = self._viewer
         chart = self._chart
         if chart.is_on_switch(pixel):
@@ -208,7 +211,7 @@ class ViewerPointer(Pointer):
             viewer.revision += 1
         is_right = event.button == RIGHT_BUTTON
         pointer = self.build_event(event.pos, pane, is_right=is_right)
-        is_double = self.count_clicks(event, now) > 1
+        is_double = self.record_press(event, now) > 1
         handle = viewer.tool.double_click if is_double else viewer.tool.press
         viewer.attempt(lambda: handle(viewer.session, pointer))
         if viewer.tool is not hand:

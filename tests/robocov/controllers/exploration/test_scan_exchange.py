@@ -19,7 +19,7 @@ from robocov.planning.scan_log import NumberedScan
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.benchmark.controller_messages import encode_payload
-from robocov_app.benchmark.isolation import draw_substitutes, hide_others
+from robocov_app.benchmark.isolation import hide_others, sample_substitutes
 
 ROOMS = Environment(
     "two rooms",
@@ -219,7 +219,7 @@ def test_what_has_not_been_delivered_changes_nothing(name: str, seed: int, loss:
         observations.append(snapshot.seen)
         decisions.append(snapshot.decision)
         simulation.step()
-    substitutes = draw_substitutes(ROOMS.region, len(CORNER), np.random.default_rng(seed))
+    substitutes = sample_substitutes(ROOMS.region, len(CORNER), np.random.default_rng(seed))
     hidden = [hide_others(seen, robot, substitutes) for seen in observations]
     for decision, repeated in zip(decisions, replay(simulation, hidden), strict=True):
         assert decision.forces[robot].tobytes() == repeated.forces[robot].tobytes()

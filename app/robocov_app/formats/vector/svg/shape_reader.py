@@ -116,7 +116,7 @@ class ShapeReader:
         return Paint(visible, self.key.find_role(written) or self.key.find_role(visible))
 
     def _get_gradient_color(self, name: str) -> str | None:
-        """Return the first color of the gradient with an id, or of the gradient to which it refers."""
+        """Return the first color of a gradient, or of one to which it refers; None if it has no colors."""
         for _ in range(_MAX_REFERENCES):
             gradient = self._elements_by_id.get(name)
             if gradient is None:

@@ -155,7 +155,7 @@ class AddRobot(RobotEdit):
         if len(numbers) >= MAX_ROBOTS:
             raise ParameterError(f"there are {MAX_ROBOTS} robots already")
         if self.robot in numbers:
-            raise ParameterError(f"there is a robot {self.robot} already")
+            raise ParameterError(f"robot {self.robot} already exists")
         return _change_robot(pane, self.robot, working_at=_find_free_position(pane, self.robot, self.at))
 
 

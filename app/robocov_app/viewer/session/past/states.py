@@ -83,7 +83,7 @@ class PaneSetup:
 
     @property
     def constant_conditions(self) -> Conditions | None:
-        """Noise and message loss, without robots that fail or join."""
+        """The conditions except for robots that fail or join; None without conditions."""
         if self.conditions is None:
             return None
         return self.conditions.drop_team_changes()
