@@ -80,7 +80,7 @@ def place_numbers(
     >>> mark = Discs(np.array([[0.0, 0.0]]), np.array([5.0]))
     >>> line = Discs(np.array([[10.0, 0.0], [12.0, 4.0]]), np.zeros(2))
     >>> place_numbers(mark, line, text_size=11.0).round(1)
-    array([[4.4, 10.7]])
+    array([[ 4.4, 10.7]])
     """
     centers = np.empty_like(marks.centers)
     number_radius = _CLEARANCE * text_size

@@ -1,6 +1,7 @@
 """Folders of the parts of a saved branch, which are listed in ``branch.json``."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def find_branch_file(folder: Path) -> Path | None:
         None if this is not the folder of a branch.
     """
     for name in (BRANCH_FILE, FORMER_BRANCH_FILE):
-        if (folder / name).is_file():
+        # Unlike Path.is_file, this is False for a path that cannot exist, such as one that is too long.
+        if os.path.isfile(folder / name):
             return folder / name
     return None
 
