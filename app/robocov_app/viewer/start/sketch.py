@@ -47,7 +47,7 @@ def draw_sketch(screen: Surface, box: Rect, theme: Theme, scale: float, *, secon
     scale : float
         Scale of the lines.
     seconds : float
-        Time since the drawing was begun; it repeats.
+        Time since the drawing was started; it repeats.
     """
     paper = box.inflate(-round(8 * scale), 0)
     paper.width = min(paper.width, round(1.5 * paper.height))
