@@ -37,7 +37,7 @@ def find_branch_file(folder: Path) -> Path | None:
     """
     for name in (BRANCH_FILE, FORMER_BRANCH_FILE):
         # Unlike Path.is_file, this is False for a path that cannot exist, such as one that is too long.
-        if os.path.isfile(folder / name):
+        if os.path.isfile(folder / name):  # noqa: PTH113
             return folder / name
     return None
 
