@@ -111,7 +111,7 @@ def test_discarding_removes_the_draft_and_keeps_files(driver: EditorDriver, tmp_
     driver.press_key("ctrl+n")
     driver.press_key("d")
     assert driver.shapes == [] and driver.editor.document.title == "Untitled"
-    assert driver.message.startswith("A new map: 10 x 10 m")
+    assert driver.message.startswith("New map, 10 m × 10 m")
     assert find_recoverable(tmp_path / "drafts") == ()
 
 

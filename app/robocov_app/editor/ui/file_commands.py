@@ -123,7 +123,7 @@ class FileCommands:
 
     def new(self) -> None:
         """Open a new map in place of the current one."""
-        message = "a new map: 10 x 10 m; the tool Boundary draws another outline"
+        message = "new map, 10 m × 10 m. Use Boundary to redraw its outline"
         self.close_document_then(lambda: self._show(Document.new(self.drafts), message))
 
     def ask_path(
@@ -410,7 +410,7 @@ def describe_opening(document: Document) -> str:
     if document.path is None:
         return f"{document.title}: opened as a copy"
     if not document.path.exists():
-        return f"a new map, {document.path.name}: 10 x 10 m; the tool Boundary draws another outline"
+        return f"new map {document.path.name}, 10 m × 10 m. Use Boundary to redraw its outline"
     return f"opened: {document.title}"
 
 

@@ -294,7 +294,7 @@ class EditorPanel(CommandPanel):
             self.show_buttons(ui, START_BUTTONS)
             ui.row()
             is_on = "robots" in self.editor.shown
-            self._draw_check(ui, "show:robots", "Show the team there", is_on=is_on)
+            self._draw_check(ui, "show:robots", "Show the robots at the start", is_on=is_on)
 
     def _draw_object_page(self, ui: Ui) -> None:
         """Draw the page "object": fields and buttons for the selection, and a list of vertices or objects."""

@@ -320,7 +320,7 @@ class LessonPage:
         self._write_title(_CLOSING_TITLE)
         right_count, answer_count = lesson.score
         if answer_count:
-            text = f"Right predictions: {right_count} of {answer_count}."
+            text = f"Correct predictions: {right_count} of {answer_count}."
             self._write_paragraph(text, self.theme.accent)
             self.y += _TITLE_GAP_PX * self.scale
         for finding in lesson.findings:
