@@ -114,7 +114,7 @@ def _replay_session(options: Arguments) -> int:
             answers.append(answer)
             if not options.json:
                 _print_branch(answer)
-    print_answer(options, answers[0] if len(answers) == 1 else {"stories": answers})
+    print_answer(options, answers[0] if len(answers) == 1 else {"branches": answers})
     return INTERRUPTED if interruption.requested else 0
 
 

@@ -68,7 +68,7 @@ def test_a_branch_is_saved_with_its_parts_costs_and_video(
     command = ["run", save_session_file(session, tmp_path), *SMALL, "--out", str(out), "--video", "--json"]
     assert main([*command, "--fps", "10", "--video-speed", "1"]) == 0
     answer = json.loads(capsys.readouterr().out)
-    assert [part["words"] for part in answer["parts"]] == ["started", "circle drawn", "robot 4 joined"]
+    assert [part["description"] for part in answer["parts"]] == ["started", "circle drawn", "robot 4 joined"]
     assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])
     last = Record.load(out / "03-robot-4-joined" / "lloyd")
     np.testing.assert_array_equal(last.positions[-1], session.timeline.panes[1].simulation.positions)

@@ -116,12 +116,13 @@ def test_a_session_is_the_same_after_undo_recovery_loading_and_run(
     assert_equal(summarize(Session.open(load_session(file))), compared)
     options = ["--lattice", "16", "--size", "320x240", "--fps", "5", "--video", "--json"]
     assert main(["run", str(file), "--all-branches", "--out", str(tmp_path / "runs"), *options]) == 0
-    stories = json.loads(capsys.readouterr().out)["stories"]
-    assert [story["parts"][-1]["words"] for story in stories] == ["robot 2 failed", "RPF compared"]
-    for story, expected in zip(stories, (failed, compared), strict=True):
-        folder = Path(story["out"]) / story["parts"][-1]["folder"]
+    saved_branches = json.loads(capsys.readouterr().out)["branches"]
+    descriptions = [branch["parts"][-1]["description"] for branch in saved_branches]
+    assert descriptions == ["robot 2 failed", "RPF compared"]
+    for branch, expected in zip(saved_branches, (failed, compared), strict=True):
+        folder = Path(branch["out"]) / branch["parts"][-1]["folder"]
         ends = [Record.load(path.parent).positions[-1].tolist() for path in folder.glob("**/record.npz")]
         # The folders of the controllers are in another order than the panes.
         assert sorted(ends) == sorted(positions.tolist() for positions in expected.positions)
-        (video,) = Path(story["out"]).glob("*.mp4")
+        (video,) = Path(branch["out"]).glob("*.mp4")
         assert video.stat().st_size > 1000
