@@ -38,8 +38,8 @@ _INFORMATION_NOTES = {
 class Arguments(JsonOption):
     """List controllers, with units, defaults and ranges of their gains.
 
-    Robots of controllers that share maps do so by messages, which conditions such as --loss, --delay and
-    --bandwidth of `robocov run` affect.
+    Controllers that share maps send messages, so --loss, --delay and --bandwidth of `robocov run` affect
+    them.
 
     In JSON, the paper's controller has "flagship": true. Controllers with the best results on the benchmark,
     given what their robots may know, have "recommended": true.

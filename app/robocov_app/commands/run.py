@@ -98,8 +98,10 @@ def _describe_run(run: Run) -> list[str]:
     lines += [
         f"  settled         {settled}",
         f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:z.3f} m)",
-        f"  path length     {sum(path_lengths) / len(path_lengths):.2f} m per robot",
     ]
+    if summary["stuck_robots"]:
+        lines.append(f"  stuck robots    {summary['stuck_robots']}   (at rest away from their goals)")
+    lines.append(f"  path length     {sum(path_lengths) / len(path_lengths):.2f} m per robot")
     if "sent_bytes_per_s" in summary:
         lines.append(f"  messages        {summary['sent_bytes_per_s']:.0f} B/s per robot")
     lines += [f"note: {note}" for note in summary.get("notes", ())]

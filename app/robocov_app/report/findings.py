@@ -128,7 +128,9 @@ def list_problems(result: ReportedResult) -> list[str]:
     if len(runs) == 1 and (runs[0].metrics.get("stuck_robots") or 0) > 1:
         stuck_problem = f"{runs[0].metrics['stuck_robots']} robots were stuck at the end"
     counts = {
-        "a robot touched a wall or another one": sum((run.metrics.get("contacts") or 0) > 0 for run in runs),
+        "a robot touched a wall or another robot": sum(
+            (run.metrics.get("contacts") or 0) > 0 for run in runs
+        ),
         stuck_problem: sum((run.metrics.get("stuck_robots") or 0) > 0 for run in runs),
         "the team had not settled by the end": sum(_is_unsettled(run) for run in runs),
     }

@@ -55,6 +55,16 @@ def test_a_run_without_figures_saves_its_numbers(tmp_path: Path) -> None:
     assert {file.name for file in out.iterdir()} == {".robocov.json", "run.json", "record.npz", "cost.csv"}
 
 
+def test_only_runs_with_stuck_robots_mention_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--controller lloyd --robots 3 --lattice 16 --no-figures --out".split()
+    assert main(["run", "trap", "--duration", "15", *options, str(tmp_path / "stuck")]) == 0
+    count = json.loads((tmp_path / "stuck" / "run.json").read_text())["summary"]["stuck_robots"]
+    assert count > 0
+    assert f"stuck robots    {count}   (at rest away from their goals)" in capsys.readouterr().out
+    assert main(["run", "square", "--duration", "1", *options, str(tmp_path / "moving")]) == 0
+    assert "stuck robots" not in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):

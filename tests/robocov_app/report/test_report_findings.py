@@ -81,7 +81,7 @@ def test_missing_failed_and_damaged_runs_are_listed() -> None:
 
 def test_problems_are_counted() -> None:
     assert list_problems(build_result(RUNS)) == [
-        "In 2 of 5 runs a robot touched a wall or another one.",
+        "In 2 of 5 runs a robot touched a wall or another robot.",
         "In 1 of 5 runs the team had not settled by the end.",
     ]
 
