@@ -59,9 +59,7 @@ COMMANDS = {
     "bench": Subcommand("bench", "measure speed, as ratios to baselines in the same run"),
     "import": Subcommand("maps.import_map", "import a map from another program"),
     "export": Subcommand("maps.export_map", "export a map as SVG, GeoJSON, WKT, ROS, MovingAI or PNG"),
-    "lesson": Subcommand(
-        "lesson", "check a lesson file, and that every chapter can be completed"
-    ),
+    "lesson": Subcommand("lesson", "check a lesson file, and that every chapter can be completed"),
     "schema": Subcommand("maps.schema", "print the JSON Schema of map files"),
     "completion": Subcommand("completion", "print a script for completion in the shell"),
     "handbook": Subcommand("handbook", "open tutorials, guides and the reference in a browser"),

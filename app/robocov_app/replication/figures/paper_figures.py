@@ -134,7 +134,7 @@ def _describe_partition(run: Record) -> str:
     mean_distance = float(np.hypot(*(centroids - positions).T).mean())
     return (
         f"The robots are at random positions in “{run.environment.name}”, on average "
-        f"{format_amount(mean_distance, 'm')} from the centers of mass of their cells."
+        f"{format_amount(mean_distance, 'm')} from the centroids of their cells."
     )
 
 
@@ -149,8 +149,8 @@ def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
     common = slice(1, min(len(rapf_cost), len(other_cost)))
     lower = float((rapf_cost[common] < other_cost[common]).mean())
     return (
-        f"Over the first {FIRST_MINUTE_S:g} s RAPF averages {rapf_mean:.3f} m, {label} "
-        f"{other_mean:.3f} m: {_describe_difference(rapf_mean, other_mean)}. RAPF's cost is lower "
+        f"Over the first {FIRST_MINUTE_S:g} s RAPF averages {rapf_mean:.3f} m, "
+        f"{_describe_difference(rapf_mean, other_mean)} {label} ({other_mean:.3f} m). RAPF's cost is lower "
         f"{format_amount(lower, '%')} of the time. RAPF stays within 5% of its last value from "
         f"{find_arrival_time(rapf.history):.0f} s on, "
         f"{label} from {find_arrival_time(other.history):.0f} s on."
@@ -162,7 +162,7 @@ def _describe_final_costs(rapf: FigureRun, other: FigureRun) -> str:
     other_cost = float(other.history.mean_distance[-1])
     return (
         f"On “{rapf.record.environment.name}” RAPF ends with a mean distance of {rapf_cost:.3f} m, "
-        f"{other.record.label} with {other_cost:.3f} m: {_describe_difference(rapf_cost, other_cost)}."
+        f"{_describe_difference(rapf_cost, other_cost)} {other.record.label} ({other_cost:.3f} m)."
     )
 
 
@@ -189,17 +189,18 @@ def describe_half_step(runs: Mapping[str, FigureRun], half_step_runs: Mapping[st
         cost_ratio = float(half.history.mean_distance[-1] / full.history.mean_distance[-1])
         change = _describe_difference(cost_ratio, 1.0)
         texts.append(
-            f"{half.record.label}'s final positions move by at most {distance}, its cost is {change}"
+            f"{half.record.label}'s final positions move by at most {distance}, its cost is {change} before"
         )
-    return f"Compared with the full control period, {'; '.join(texts)}."
+    return f"With half the control period, {'; '.join(texts)}."
 
 
 def _describe_difference(cost: float, other_cost: float) -> str:
+    """Return how a cost compares with another one, such as "3.0% less than"."""
     change = cost / other_cost - 1.0
     if abs(change) < _SAME_COST:
-        return "the same"
+        return "the same as"
     direction = "less" if change < 0 else "more"
-    return f"{format_amount(abs(change), '%')} {direction}"
+    return f"{format_amount(abs(change), '%')} {direction} than"
 
 
 def find_arrival_time(history: CostHistory) -> float:
@@ -224,7 +225,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
     }
     handles: list[Artist] = [
         robot_drawing.build_robot_handle("robot", theme.final, theme),
-        Line2D([], [], label="center of mass of its cell", **dot_style),
+        Line2D([], [], label="centroid of its cell", **dot_style),
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
         *map_drawing.build_map_handles(environment, theme)[1:],
     ]
