@@ -132,7 +132,7 @@ def plot_comparison(
 
 @dataclass(frozen=True, eq=False)
 class _Contents:
-    """What a comparison shows.
+    """Contents of a comparison figure.
 
     Attributes
     ----------

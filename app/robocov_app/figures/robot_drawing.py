@@ -68,7 +68,7 @@ def draw_robots(
 def draw_discs(
     axes: Axes, positions: FloatArray, radius: FloatArray, fills: Sequence[Color], theme: Theme
 ) -> Discs:
-    """Draw robots as discs of their true sizes, or of the least size that can be seen.
+    """Draw robots as discs of their true sizes, or of the minimum visible size.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class Command:
 
     @property
     def current_title(self) -> str:
-        """What the command does in the present state."""
+        """Title of the command in the current state."""
         if self.build_current_title is None:
             return self.title
         return self.build_current_title()
