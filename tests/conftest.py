@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 from pathlib import Path
@@ -40,21 +39,10 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
 WITHOUT_DEADLINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 # Examples are the same every time, so that a new failure is caused by the change under test. A sixth of them
 # is run, unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones.
+settings.register_profile("quick", max_examples=8, derandomize=True, database=None, **WITHOUT_DEADLINE)
 settings.register_profile("thorough", max_examples=45, derandomize=True, database=None, **WITHOUT_DEADLINE)
 settings.register_profile("explore", max_examples=500, print_blob=True, **WITHOUT_DEADLINE)
-settings.load_profile("thorough")
-
-
-# Hypothesis marks its tests in the same hook, before this one.
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.getoption("--hypothesis-profile"):
-        return
-    for test in {item.function for item in items if item.get_closest_marker("hypothesis")}:  # type: ignore[attr-defined]
-        thorough = getattr(test, "_hypothesis_internal_use_settings", None) or settings.default
-        max_examples = math.ceil(thorough.max_examples / 6)
-        test._hypothesis_internal_use_settings = settings(thorough, max_examples=max_examples)
-
+settings.load_profile("quick")
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov import k_median
 from robocov.k_median import (
@@ -33,7 +34,7 @@ def compute_cost(distance: np.ndarray, sources: np.ndarray) -> float:
     return float(distance[:, list(sources)].min(axis=1).sum())
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 10_000), k=st.integers(1, 5), fixed_count=st.integers(0, 5))
 def test_improvements_lower_the_cost_and_keep_fixed_sources(seed: int, k: int, fixed_count: int) -> None:
     distance = build_random_distances(seed)
@@ -47,7 +48,7 @@ def test_improvements_lower_the_cost_and_keep_fixed_sources(seed: int, k: int, f
     assert compute_cost(distance, after) <= compute_cost(distance, start) + 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 10_000), k=st.integers(2, 4))
 def test_the_best_swap_agrees_with_an_exhaustive_search(seed: int, k: int) -> None:
     distance = build_random_distances(seed)
@@ -74,7 +75,7 @@ def test_a_swap_must_save_more_than_the_threshold() -> None:
     assert apply_best_swap(distance, start, ~is_fixed, 0.0) is start
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 10_000), k=st.integers(2, 4), fixed_count=st.integers(0, 2))
 def test_rebuilding_lowers_the_cost_or_changes_nothing(seed: int, k: int, fixed_count: int) -> None:
     distance = build_random_distances(seed)
@@ -97,7 +98,7 @@ def test_rebuilding_finds_the_optimum_where_swaps_do_not(seed: int, monkeypatch:
     assert compute_cost(distance, improve_sources(distance, start, is_fixed, 0.0)) > 1.01 * best
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 10_000), k=st.integers(1, 4))
 def test_the_first_source_moves_to_the_best_allowed_candidate(seed: int, k: int) -> None:
     distance = build_random_distances(seed)

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import Environment
 from robocov.sensor import RangeSensor
@@ -50,7 +51,7 @@ def test_a_query_does_not_depend_on_the_others(cluttered: Environment, sensor: R
         assert np.array_equal(alone[0], together[i], equal_nan=True)
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(x=st.floats(0.2, 4.8), y=st.floats(0.2, 4.8), rays=st.integers(1, 48), reach=st.floats(0.1, 20))
 def test_scan_agrees_with_shapely(
     cluttered: Environment, sensor: RangeSensor, x: float, y: float, rays: int, reach: float

@@ -13,6 +13,7 @@ from command_calls import SHORT, read_error, read_json
 from drawn_run import ROOMS, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 import robocov
 from robocov.controllers import CONTROLLERS, get_gains
@@ -292,7 +293,7 @@ ARGUMENTS = st.one_of(
 # fmt: on
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(
     command=st.sampled_from(["run", "compare", "check", "cost", "import"]),
     arguments=st.lists(ARGUMENTS, max_size=6),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.stats import binomtest
 
 from robocov_app.figures.statistics import (
@@ -61,14 +62,14 @@ def test_intervals_of_clusters_agree_with_a_plain_loop(statistic, compute) -> No
 
 
 @given(st.lists(numbers, min_size=2, max_size=30))
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 def test_intervals_are_within_the_sample(values: list[float]) -> None:
     interval = bootstrap(values, resamples=200)
     assert min(values) <= interval.low <= interval.high <= max(values)
 
 
 @given(st.lists(numbers, min_size=2, max_size=30))
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 def test_intervals_are_reproducible(values: list[float]) -> None:
     assert bootstrap(values, resamples=200) == bootstrap(values, resamples=200)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import LOSS_STREAM, Conditions
 from robocov.conditions.communication import NEVER, Inbox, Radio
@@ -78,7 +79,7 @@ def simulate_messages(
     return known_messages
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(
     robots=st.integers(2, 5),
     loss=st.sampled_from([0.0, 0.3, 0.9, 1.0]),
@@ -226,7 +227,7 @@ LIGHT = tuple(kind for kind in CONTROLLERS.values() if kind.name not in PLANNING
 
 
 @pytest.mark.parametrize("controller_type", LIGHT, ids=lambda controller_type: str(controller_type.name))
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(n=st.integers(2, 14), seed=st.integers(0, 2**32), communication_range=st.floats(2.0, 12.0))
 def test_reports_of_true_positions_change_no_decision(
     controller_type: type, n: int, seed: int, communication_range: float
@@ -246,7 +247,7 @@ def test_reports_of_true_positions_change_no_decision(
 
 
 @pytest.mark.parametrize("controller_type", LIGHT, ids=lambda controller_type: str(controller_type.name))
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(n=st.integers(2, 14), seed=st.integers(0, 2**32))
 def test_robots_decide_by_reports_and_not_by_true_positions(controller_type: type, n: int, seed: int) -> None:
     """All other robots are elsewhere, and have received other reports: the force of one stays the same."""

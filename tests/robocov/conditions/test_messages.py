@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions
 from robocov.conditions.communication import MAX_PACKET_BYTES, POSITION_BYTES
@@ -126,7 +127,7 @@ def test_a_message_is_lost_with_any_of_its_packets() -> None:
     assert len(heard) / 500 == pytest.approx(0.8**3, abs=0.08)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=count_examples(20), deadline=None)
 @given(bandwidth=st.floats(100.0, 5e3), size=st.integers(1, 3000), rate=st.sampled_from([None, 2.0]))
 def test_the_bandwidth_limits_what_robots_send(bandwidth: float, size: int, rate: float | None) -> None:
     conditions = Conditions(bandwidth=bandwidth, message_rate=rate)
@@ -157,7 +158,7 @@ def test_robots_that_do_not_work_send_and_receive_nothing() -> None:
     assert min(time for time, _, _ in simulation.memory[2]) > 1.0
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=count_examples(15), deadline=None)
 @given(
     loss=st.sampled_from([0.0, 0.4]),
     delay=st.sampled_from([0.0, 0.35]),

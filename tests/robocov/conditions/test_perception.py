@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions
 from robocov.conditions.perception import MIN_MEASURED_DISTANCE_M, restrict_decision_to_working
@@ -73,7 +74,7 @@ def test_perfect_messages_equal_ideal_communication(communication_range: float) 
     np.testing.assert_allclose(with_messages.positions, ideal.positions, atol=2e-3)
 
 
-@settings(max_examples=8)
+@settings(max_examples=count_examples(8))
 @given(st.integers(0, 40), st.integers(0, 2**40))
 def test_copies_continue_identically(steps: int, seed: int) -> None:
     simulation = build_simulation(replace(ALL_CONDITIONS, seed=seed))

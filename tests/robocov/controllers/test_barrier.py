@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.optimize import minimize
 
 from robocov.controllers import Barrier
@@ -52,7 +53,7 @@ def list_candidates(
     return np.array(candidates)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(seed=st.integers(0, 2**32), m=st.integers(0, 9))
 def test_the_quadratic_programme_is_solved_exactly(seed: int, m: int) -> None:
     """Compare with the best of all candidates."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 import robocov as rc
 from robocov.controllers import (
@@ -119,7 +120,7 @@ def extract_row(decision: Decision, i: int) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("controller", PARAMETERS)
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 60), reach=st.floats(0.5, 6.0))
 def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: int, reach: float) -> None:
     """Changing anything that robot i neither senses nor receives changes nothing in row i, not one bit."""

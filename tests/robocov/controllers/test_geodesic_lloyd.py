@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import (
     GeodesicLloyd,
@@ -36,7 +37,7 @@ def observe(positions: np.ndarray, region: Region) -> Observations:
     return Observations(positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), region)
 
 
-@settings(max_examples=8)
+@settings(max_examples=count_examples(8))
 @given(
     seed=st.integers(0, 2**20),
     kind=st.sampled_from(["rooms", "caves", "polygons"]),

@@ -9,6 +9,7 @@ import pytest
 import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions
 from robocov.controllers import GpUcb, Lloyd
@@ -67,7 +68,7 @@ def compute_hot_cost(positions: FloatArray, density: Density) -> float:
     return float((weights * squared_distances).sum() / weights.sum())
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, SQUARE_COUNT), steps=st.integers(1, 4))
 def test_the_posterior_is_that_of_the_direct_formula(seed: int, count: int, steps: int) -> None:
     """Squares are added in several steps; the result does not depend on them."""
@@ -85,7 +86,7 @@ def test_the_posterior_is_that_of_the_direct_formula(seed: int, count: int, step
     np.testing.assert_allclose(posterior.compute_deviations() ** 2, variance, atol=1e-9)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, SQUARE_COUNT - 1))
 def test_a_measurement_never_increases_a_deviation(seed: int, count: int) -> None:
     order = np.random.default_rng(seed).permutation(SQUARE_COUNT)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Poduri, make_controller
 from robocov.environment import Environment
@@ -106,7 +107,7 @@ def compute_expected_force(
     return force
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(
     seed=st.integers(0, 2**32),
     k=st.integers(0, 4),

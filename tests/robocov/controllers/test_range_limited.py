@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Lloyd, RangeLimited
 from robocov.density import Gaussian, Gaussians
@@ -37,7 +38,7 @@ def observe(
     )
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 2**32), n=st.integers(1, 12), radius=st.floats(0.05, 8.0))
 def test_moments_of_limited_cells_agree_with_shapely(seed: int, n: int, radius: float) -> None:
     """Shapely intersects cells with a polygon of 4096 sides."""

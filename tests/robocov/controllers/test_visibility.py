@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_undetected
@@ -116,7 +117,7 @@ def test_the_gradient_is_that_of_the_probability_of_detection(
     np.testing.assert_allclose(contributions.gradient[0], expected, atol=0.06 * np.hypot(*expected) + 0.05)
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 8))
 def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ import pytest
 from cost_cases import OFFICE, build_environment
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.cost import CoverageCost
 from robocov.errors import InputError
@@ -21,7 +22,7 @@ def draw_positions(n: int, rng: np.random.Generator) -> np.ndarray:
     return COST.points[rng.choice(len(COST.points), n, replace=False)] + rng.uniform(-1e-3, 1e-3, (n, 2))
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(seeds, st.integers(1, 7), st.sampled_from([(1.0, 0.4), (1.0,), (0.3, 0.5, 0.9, 1.1)]))
 def test_times_are_the_minimum_of_path_length_over_speed(seed: int, n: int, speeds: tuple) -> None:
     """The expected distances come from the search from point to point, which shares no code with this one."""
@@ -52,7 +53,7 @@ def test_equal_speeds_only_change_the_unit(seed: int, n: int, speed: float) -> N
     np.testing.assert_allclose(timed.gradient, plain.gradient / speed, rtol=1e-10, atol=1e-12)
 
 
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(seeds)
 def test_the_gradient_is_that_of_the_value(seed: int) -> None:
     rng = np.random.default_rng(seed)

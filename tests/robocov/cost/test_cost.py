@@ -10,6 +10,7 @@ import shapely
 from cost_cases import CUP, L_ROOM, OFFICE, PILLAR, build_environment, build_ring
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
@@ -145,7 +146,7 @@ positions = st.lists(
 ).map(lambda points: [p for p in points if shapely.intersects_xy(OFFICE.free, *p)])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=count_examples(40), deadline=None)
 @given(positions.filter(bool), st.randoms(use_true_random=False))
 def test_order_and_repetition_of_robots_do_not_matter(robots, random):
     cost = CoverageCost(OFFICE, lattice=10)

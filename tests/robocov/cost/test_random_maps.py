@@ -13,6 +13,7 @@ import shapely
 from cost_cases import compute_distance_error
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from random_maps import KINDS, SIDE, build_random_map, draw_positions
 
 from robocov.cost import CoverageCost
@@ -23,7 +24,7 @@ kinds = st.sampled_from(sorted(KINDS))
 seeds = st.integers(0, 2**32)
 
 
-@settings(max_examples=120)
+@settings(max_examples=count_examples(120))
 @given(kinds, st.integers(1, 40), seeds, st.integers(1, 24), st.integers(1, 60))
 def test_distances_and_owners_agree_with_distances_from_point_to_point(kind, count, seed, lattice, robots):
     environment = build_random_map(kind, count, seed)
@@ -36,7 +37,7 @@ def test_distances_and_owners_agree_with_distances_from_point_to_point(kind, cou
     assert error < 1e-12
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(
     kinds,
     st.integers(1, 25),
@@ -58,7 +59,7 @@ def test_distances_are_exact_for_maps_of_any_size_and_position(kind, count, seed
     assert error < 1e-12 * size + 1e-15 * abs(shift)
 
 
-@settings(max_examples=50)
+@settings(max_examples=count_examples(50))
 @given(kinds, st.integers(1, 8), seeds, st.integers(1, 4))
 def test_distances_agree_with_the_brute_force(kind, count, seed, robots):
     environment = build_random_map(kind, count, seed)
@@ -79,7 +80,7 @@ def is_well_placed(environment, point):
     return brute.is_well_placed(environment.free, tuple(point), SIDE)
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(kinds, st.integers(1, 30), seeds)
 def test_robots_never_lengthen_distances_and_obstacles_never_shorten_them(kind, count, seed):
     environment = build_random_map(kind, count, seed)
@@ -99,7 +100,7 @@ def test_robots_never_lengthen_distances_and_obstacles_never_shorten_them(kind, 
     assert (emptier_cost(robots).distances[is_shared] <= distances + tolerance).all()
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(kinds, st.integers(1, 30), seeds)
 def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, seed):
     environment = build_random_map(kind, count, seed)
@@ -117,7 +118,7 @@ def test_results_do_not_depend_on_the_order_of_calls_and_robots(kind, count, see
     np.testing.assert_allclose(reversed_order.distances, first.distances, rtol=0, atol=1e-13 * SIDE)
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(st.sampled_from(["polygons", "needles", "circles", "rooms"]), st.integers(1, 30), seeds)
 def test_the_gradient_is_the_slope_of_the_value(kind, count, seed):
     environment = build_random_map(kind, count, seed)

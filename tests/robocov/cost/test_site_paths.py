@@ -12,6 +12,7 @@ import pytest
 from cost_cases import OFFICE
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
@@ -37,13 +38,13 @@ crowded_points = st.tuples(st.floats(0, 1e-9), st.floats(0, 1e-9)).map(lambda po
 points = st.one_of(lattice_points, any_points, crowded_points)
 
 
-@settings(max_examples=250)
+@settings(max_examples=count_examples(250))
 @given(st.integers(1, 33), st.lists(points, min_size=1, max_size=30))
 def test_the_first_of_the_nearest_robots_owns_a_site(side, positions):
     compute_owners(side, positions)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(
     st.integers(2, 24), st.lists(st.tuples(st.integers(0, 23), st.integers(0, 23)), min_size=1, max_size=20)
 )

@@ -9,6 +9,7 @@ from density_cases import GAUSSIANS, KINDS, POLYGONS, RASTERS, integrate_on_fine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from property_examples import count_examples
 from voronoi_cases import compute_moment_about_centroid
 
 from robocov.density import (
@@ -49,7 +50,7 @@ def test_mass_centroid_and_polar_moment_agree_with_quadrature(density):
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=count_examples(5), deadline=None)
 def test_moments_of_cells_add_up_to_those_of_the_region(density, seed, count):
     """Check masses, first moments and polar moments about one point."""
     points = np.random.default_rng(seed).uniform((0.0, 0.0), (8.0, 8.0), (count, 2))
@@ -65,7 +66,7 @@ def test_moments_of_cells_add_up_to_those_of_the_region(density, seed, count):
 
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=count_examples(4), deadline=None)
 def test_moments_obey_the_parallel_axis_theorem(density, seed):
     """Check equation (3) with moments of cells whose generator is the centroid."""
     points = np.random.default_rng(seed).uniform(1.0, 7.0, (4, 2))
@@ -77,7 +78,7 @@ def test_moments_obey_the_parallel_axis_theorem(density, seed):
 
 @pytest.mark.parametrize("density", [*GAUSSIANS.values(), RASTERS["bilinear"], POLYGONS["rooms"]])
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=count_examples(4), deadline=None)
 def test_the_gradient_of_the_locational_cost_agrees_with_finite_differences(density, seed):
     """Check (13) with φ: the gradient of the sum of polar moments is 2 M (p - C)."""
     rng = np.random.default_rng(seed)
@@ -165,7 +166,7 @@ def test_cells_without_mass_have_the_centroid_of_their_area():
 
 
 @given(x=st.floats(4.0, 60.0))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=count_examples(12), deadline=None)
 def test_centroids_far_from_a_peak_are_continuous(x):
     """If the closed form loses all digits, centroids do not jump and stay in their cells."""
     peak = Gaussians((Gaussian((0.0, 0.0), 1.0, sigma=1.0),))
@@ -190,7 +191,7 @@ def test_edges_of_areas_on_borders_of_cells_count_once():
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=count_examples(12), deadline=None)
 def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
     """The cells are cut by the areas, and later areas are on top."""
     rng = np.random.default_rng(seed)
@@ -212,7 +213,7 @@ def test_weighted_polygons_agree_with_intersections_by_shapely(seed):
 
 
 @given(seed=st.integers(0, 10_000), rows=st.integers(1, 9), columns=st.integers(1, 9))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=count_examples(12), deadline=None)
 def test_a_raster_of_cells_equals_polygons(seed, rows, columns):
     rng = np.random.default_rng(seed)
     values = rng.uniform(0.0, 3.0, (rows, columns))

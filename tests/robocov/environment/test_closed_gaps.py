@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.environment.obstacle_paths import ObstaclePath
@@ -149,7 +150,7 @@ def draw_cluttered_halls(draw: st.DrawFn) -> Environment:
     return build_hall(*obstacles)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(draw_cluttered_halls(), st.sampled_from([0.05, 0.1, 0.3]))
 def test_connections_are_those_of_a_disc(hall: Environment, radius: float) -> None:
     # Erosion by 2% more and 2% less than the radius brackets the errors of both methods.
@@ -168,7 +169,7 @@ def test_connections_are_those_of_a_disc(hall: Environment, radius: float) -> No
         assert wide_of_closed.setdefault(component, wide_part) == wide_part
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(draw_cluttered_halls())
 def test_bars_have_no_extent(hall: Environment) -> None:
     closed = hall.close_gaps(RADIUS_M)

@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
@@ -79,7 +80,7 @@ def test_another_density_has_other_masses_and_the_same_geometry() -> None:
     assert not plain.has_same_geometry(Environment("plain", SQUARE, (CircleObstacle((5.0, 5.0), 1.0),)))
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.lists(st.tuples(st.floats(-1, 11), st.floats(-1, 11), st.floats(0.05, 3)), max_size=6))
 def test_free_and_blocked_space_tile_the_region(discs: list[tuple[float, float, float]]) -> None:
     environment = Environment("x", SQUARE, tuple(CircleObstacle((x, y), r) for x, y, r in discs))

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import MultiPolygon, Point, Polygon, box
 from shapely.affinity import affine_transform
 from shapely.geometry.base import BaseGeometry
@@ -117,7 +118,7 @@ def count_parts_and_holes(space: BaseGeometry, radius: float) -> tuple[int, int]
     return len(parts), int(sum(len(part.interiors) for part in parts))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=count_examples(150))
 @given(draw_room_with_blocks())
 def test_erosion_changes_the_topology_only_at_the_gap(space: Polygon) -> None:
     gap = find_narrowest_gap(build_free_space(space))
@@ -130,7 +131,7 @@ def test_erosion_changes_the_topology_only_at_the_gap(space: Polygon) -> None:
     assert count_parts_and_holes(space, 1.002 * gap.width / 2) != original_counts
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(draw_room_with_blocks(), st.integers(0, 30), st.floats(0, 6.3), st.booleans())
 def test_the_gap_moves_with_the_map(space: Polygon, first: int, turn: float, mirrored: bool) -> None:
     gap = find_narrowest_gap(build_free_space(space))
@@ -177,7 +178,7 @@ def test_all_gaps_below_a_width_are_found() -> None:
     assert find_narrow_gaps(MultiPolygon(), 1.0) == ()
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(
     st.lists(
         st.tuples(st.integers(0, 9), st.integers(0, 5), st.integers(1, 3), st.integers(1, 3)), max_size=6

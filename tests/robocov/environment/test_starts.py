@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import DiscStart, Environment, PointsStart, Start, UniformStart
 from robocov.errors import StartError
@@ -12,7 +13,7 @@ from robocov.errors import StartError
 SQUARE = shapely.box(0, 0, 10, 10)
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(
     n=st.integers(1, 60),
     seed=st.integers(0, 2**32),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
+from property_examples import count_examples
 
 from robocov.files.array_files import ArrayCache
 
@@ -31,7 +32,7 @@ def require_equal(one, other):
         assert array.tobytes() == other[name].tobytes()
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(arrays)
 def test_saved_arrays_are_loaded_bit_for_bit(tmp_path_factory, given_arrays):
     cache = ArrayCache(tmp_path_factory.mktemp("cache"))

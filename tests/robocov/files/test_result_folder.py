@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from interrupted_results import COMPLETED, FOREIGN, NEW, NUMBERS, OLD, read_contents, write_files
+from property_examples import count_examples
 
 from robocov.errors import InputError, OutputError, RobocovError
 from robocov.files.result_folder import complete_commit, create_result, extend_result
@@ -275,7 +276,7 @@ def add_metrics(folder: Path) -> None:
         write_files(result.staging, {"metrics.csv": METRICS, "report.html": ""})
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=count_examples(60), deadline=None)
 @given(st.lists(st.one_of(st.sampled_from(FOREIGN_NAMES), st.sampled_from(sorted(ACTIONS))), max_size=12))
 def test_files_of_the_user_survive_all_actions(tmp_path_factory: Any, steps: list[str]) -> None:
     """A step is an action, or the name of a file that the user adds unless it exists. Actions may fail."""

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
@@ -79,7 +80,7 @@ def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(
     st.integers(0, 2**32),
     st.sampled_from([2, 8, 30]),
@@ -96,7 +97,7 @@ def test_no_passage_is_narrower_than_the_gap(seed: int, chambers: int, area: flo
     assert len(room.interiors) == len(free.interiors)
 
 
-@settings(max_examples=50)
+@settings(max_examples=count_examples(50))
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10)), min_size=1, max_size=8, unique=True))
 def test_tunnels_join_all_parts_without_loops(
     centers: list[tuple[float, float]],
@@ -158,7 +159,7 @@ def test_the_edge_of_the_mesh_is_above_every_level() -> None:
     assert extract_area_below(lambda x, y: x * 0.0 - 5.0, -6.0).is_empty
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(st.integers(0, 2**32), st.floats(-1.0, 1.0))
 def test_points_of_the_mesh_with_lower_values_are_in_the_area(seed: int, level: float) -> None:
     points, values = sample_random_field(REQUEST, np.random.default_rng(seed))

@@ -12,6 +12,7 @@ import pytest
 import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov import generator
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
@@ -70,7 +71,7 @@ def assert_obstacles_are_apart(environment, gap):
     assert all(boundary.contains(shape) for shape in shapes)
 
 
-@settings(max_examples=160)
+@settings(max_examples=count_examples(160))
 @given(draw_requests())
 @example({"seed": 3, "kind": "polygons", "obstacles": 6, "area": 0.2, "gap": 0.6, "side": 10.0})
 @example({"seed": 3, "kind": "blocks", "obstacles": 12, "area": 0.45, "gap": 0.5, "side": 10})
@@ -115,7 +116,7 @@ def test_maps_may_be_large(kind):
     assert len(environment.obstacles) > 50
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(draw_requests())
 def test_saved_maps_are_loaded_unchanged(tmp_path_factory, request_parameters):
     environment = generate_map(**request_parameters)

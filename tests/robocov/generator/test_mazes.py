@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import Point
 
 from robocov.environment import Environment, WallObstacle, find_narrowest_gap
@@ -24,7 +25,7 @@ def count_components(count: int, pairs: list[tuple[int, int]]) -> int:
     return len(set(group))
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32))
 def test_passages_connect_all_cells_without_loops(columns: int, rows: int, seed: int) -> None:
     passages = grow_passages((columns, rows), np.random.default_rng(seed))
@@ -63,7 +64,7 @@ def split_into_pieces(polyline: list[tuple[int, int]]) -> list[tuple]:
     return pieces
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5), st.booleans()), max_size=40))
 def test_polylines_contain_every_wall_of_a_forest_once(drawn: set[tuple[int, int, bool]]) -> None:
     forest = build_forest({((x, y), (x + 1, y) if flat else (x, y + 1)) for x, y, flat in drawn})

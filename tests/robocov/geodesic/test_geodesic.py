@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
@@ -139,7 +140,7 @@ def draw_points(data, environment, count):
     return free_points
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=count_examples(250), deadline=None)
 @given(maps, st.data())
 def test_distances_agree_with_brute_force(environment, data):
     sources = draw_points(data, environment, 2)
@@ -150,7 +151,7 @@ def test_distances_agree_with_brute_force(environment, data):
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=count_examples(150), deadline=None)
 @given(maps, st.data())
 def test_the_cost_agrees_with_brute_force(environment, data):
     robots = draw_points(data, environment, 3)
@@ -162,7 +163,7 @@ def test_the_cost_agrees_with_brute_force(environment, data):
     assert ((result.owners >= 0) == np.isfinite(result.distances)).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=count_examples(60), deadline=None)
 @given(maps, st.data())
 def test_paths_are_as_long_as_the_distance_and_stay_in_the_free_space(environment, data):
     source, *others = draw_points(data, environment, 4)
@@ -178,7 +179,7 @@ def test_paths_are_as_long_as_the_distance_and_stay_in_the_free_space(environmen
         np.testing.assert_allclose(path[[0, -1]], [source, target], rtol=0, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=count_examples(60), deadline=None)
 @given(maps, st.data())
 def test_distances_are_a_metric_no_shorter_than_the_straight_line(environment, data):
     points = np.array(draw_points(data, environment, 4))

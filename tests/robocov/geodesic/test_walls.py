@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.geodesic.integer_grid import Grid, cross
@@ -122,7 +123,7 @@ def test_points_are_inside_outside_or_on_the_boundary():
 whole = st.integers(-(2**49), 2**49)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=count_examples(300), deadline=None)
 @given(whole, whole, st.integers(-3, 3), st.integers(-3, 3), st.integers(1, 5), whole, whole)
 def test_the_side_of_a_line_is_exact(ux, uy, offset_x, offset_y, multiple, wx, wy):
     almost_parallel = (ux // 5 * multiple + offset_x, uy // 5 * multiple + offset_y)

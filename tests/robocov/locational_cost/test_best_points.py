@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.optimize import minimize, minimize_scalar
 from voronoi_cases import (
     FAMILIES,
@@ -91,7 +92,7 @@ def test_the_best_point_agrees_with_brute_force(f: Performance, name: str) -> No
     np.testing.assert_allclose(find_best_point(ring, f), minimum.x, atol=2e-4)
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(seeds, names, families, functions, st.integers(1, 12))
 def test_best_points_lie_in_their_cells_and_have_no_gradient(
     seed: int, name: str, family: Family, f: Performance, n: int
@@ -117,7 +118,7 @@ def test_best_points_lie_in_their_cells_and_have_no_gradient(
     assert (residual[is_wide] <= 1e-9 * scale[is_wide]).all()
 
 
-@settings(max_examples=80)
+@settings(max_examples=count_examples(80))
 @given(seeds, names, functions, st.integers(1, 6))
 def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n: int) -> None:
     """The cost is quasi-concave, so Newton's method ends at the optimum of the whole cell."""
@@ -135,7 +136,7 @@ def test_no_point_of_the_cell_is_better(seed: int, name: str, f: Performance, n:
         assert (costs >= min_costs - 1e-12 * np.abs(min_costs)).all()
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, names, families, st.floats(-2.0, 1.0), st.integers(1, 6))
 def test_no_point_of_a_grid_over_the_cell_is_better_for_a_sensor(
     seed: int, name: str, family: Family, height: float, n: int
@@ -180,7 +181,7 @@ def test_the_best_point_of_a_symmetric_cell_is_its_center(
             np.testing.assert_allclose(point, [shift, shift], rtol=0, atol=2e-9 * scale)
 
 
-@settings(max_examples=80)
+@settings(max_examples=count_examples(80))
 @given(seeds, st.floats(-9.0, 9.0), st.floats(0.0, 6.3), st.floats(-2.0, 2.0), st.booleans())
 def test_the_best_point_rotates_and_scales_with_its_cell(
     seed: int, size: float, turn: float, height: float, sensing: bool
@@ -296,7 +297,7 @@ def test_cells_that_are_not_convex_have_a_median() -> None:
         assert (costs > min_costs).all()
 
 
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 @given(seeds, st.floats(-3.0, 0.0), st.floats(-2.5, 1.0) | st.none())
 def test_iterations_converge_from_any_point_of_the_cell(seed: int, thin: float, height: float | None) -> None:
     """Also where the Hessian is not positive definite and where plain Newton steps would cycle."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.integrate import dblquad, quad
 from scipy.special import spence
 from voronoi_cases import (
@@ -114,7 +115,7 @@ def integrate_by_dilogarithms(ring: np.ndarray, p: np.ndarray, h: float) -> floa
     return total
 
 
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 @given(seeds, names, st.floats(-2.5, 1.0))
 def test_sensing_is_a_sum_of_dilogarithms(seed: int, name: str, size: float) -> None:
     rng = np.random.default_rng(seed)
@@ -148,7 +149,7 @@ def test_sensing_is_accurate_for_any_height_and_width(h: float, width: float) ->
     )
 
 
-@settings(max_examples=120)
+@settings(max_examples=count_examples(120))
 @given(seeds, names, functions)
 def test_gradient_and_hessian_agree_with_finite_differences(seed: int, name: str, f: Performance) -> None:
     rng = np.random.default_rng(seed)
@@ -184,7 +185,7 @@ def test_gradient_and_hessian_agree_with_finite_differences(seed: int, name: str
     np.testing.assert_allclose(hessian, curvature, rtol=0, atol=tolerance)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(seeds, names, st.integers(1, 9))
 def test_squared_distances_obey_the_parallel_axis_theorem(seed: int, name: str, n: int) -> None:
     """Check (2), (3) and (13) with integrals that do not use mass and centroid."""
@@ -218,7 +219,7 @@ def compute_total_cost(points: np.ndarray, borders: np.ndarray, region: Region, 
     return float(compute_locational_costs(cells.edges, points - cells.generators, f).sum())
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(seeds, names, functions, st.integers(2, 9), st.floats(-4.0, 0.0))
 def test_no_other_partition_is_better_than_the_voronoi_partition(
     seed: int, name: str, f: Performance, n: int, log_distance: float
@@ -235,7 +236,7 @@ def test_no_other_partition_is_better_than_the_voronoi_partition(
         assert other_cost != cost
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, st.sampled_from(["square", "pentagon", "round"]), functions, st.integers(2, 8))
 def test_boundary_terms_cancel_and_leave_equation_11(seed: int, name: str, f: Performance, n: int) -> None:
     """Check (8) to (11): the gradient of the cost with moving cells equals that with fixed cells."""

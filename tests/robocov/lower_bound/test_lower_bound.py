@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from random_maps import KINDS, build_random_map
 
 from robocov.cost import CoverageCost
@@ -81,7 +82,7 @@ def test_the_bound_is_close_to_the_optimum_on_bundled_maps(name, robots):
     assert 0.0 < bound.max_saving < 0.008
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 7))
 def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvings):
     environment = build_random_map(kind, 12, seed)
@@ -110,7 +111,7 @@ def test_no_point_of_a_triangle_has_more_profit_than_its_bound(kind, seed, halvi
 
 
 @pytest.mark.slow
-@settings(max_examples=8)
+@settings(max_examples=count_examples(8))
 @given(st.sampled_from(sorted(KINDS)), st.integers(0, 2**20), st.integers(1, 9))
 def test_no_team_costs_less_than_the_bound(kind, seed, robots):
     environment = build_random_map(kind, 10, seed)

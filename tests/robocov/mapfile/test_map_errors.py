@@ -17,6 +17,7 @@ import pytest
 from example_map import DELETED, DOCUMENT, SCHEMA, edit
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import MapError
 from robocov.mapfile import build_map_schema, from_json, list_bundled_maps, load_map, parse_map, to_json
@@ -417,13 +418,13 @@ def assert_loads_or_raises(load: Any) -> None:
         assert from_json(to_json(environment)) == environment
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=count_examples(400))
 @given(mutants())
 def test_a_changed_document_loads_or_raises(document: dict[str, Any]) -> None:
     assert_loads_or_raises(lambda: from_json(document, "m.json"))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(st.data())
 def test_a_damaged_text_loads_or_raises(data: st.DataObject) -> None:
     text = bytearray(json.dumps(DOCUMENT).encode())
@@ -435,7 +436,7 @@ def test_a_damaged_text_loads_or_raises(data: st.DataObject) -> None:
     assert_loads_or_raises(lambda: parse_map(bytes(text), "m.json"))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=8))
 def test_any_ring_on_a_grid_loads_or_raises(ring: list[tuple[int, int]]) -> None:
     document = edit("boundary", [list(point) for point in ring]) | {"obstacles": [], "starts": {}}
@@ -492,7 +493,7 @@ def test_the_schema_rejects_what_the_loader_rejects(document: dict[str, Any], ex
     assert not SCHEMA.is_valid(document), expected
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(mutants(st.sampled_from(PLAIN_JUNK)))
 def test_schema_and_loader_agree_on_structure(document: dict[str, Any]) -> None:
     try:

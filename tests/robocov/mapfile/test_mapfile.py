@@ -14,6 +14,7 @@ import pytest
 from example_map import DOCUMENT, SCHEMA, edit
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import (
     CircleObstacle,
@@ -190,7 +191,9 @@ def environments(draw: st.DrawFn) -> Environment:
     raise AssertionError(reason)
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(
+    deadline=None, max_examples=count_examples(150), suppress_health_check=[HealthCheck.filter_too_much]
+)
 @given(environments())
 def test_written_maps_are_read_unchanged(environment: Environment) -> None:
     text = dump_map(environment)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Rapf
 from robocov.environment import Environment, WallObstacle
@@ -97,7 +98,7 @@ def test_a_single_robot_has_no_clearance_to_others() -> None:
     assert metrics.algebraic_connectivity.tolist() == [0.0, 0.0]
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(st.integers(2, 9), st.floats(0.2, 4.0), st.integers(0, 2**32 - 1))
 def test_connectivity_agrees_with_the_laplacian(n: int, reach: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -8,6 +8,7 @@ import shapely
 from cost_cases import OFFICE
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.metrics.visible_area import compute_covered_areas, compute_visibility_polygons
 
@@ -30,7 +31,7 @@ def is_in_line_of_sight(free: shapely.Geometry, position: np.ndarray, targets: n
     return shapely.covers(free, shapely.linestrings(ends))
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(seeds, st.sampled_from(["office", "rooms"]))
 def test_visibility_polygons_agree_with_lines_of_sight(seed: int, name: str) -> None:
     rng = np.random.default_rng(seed)
@@ -57,7 +58,7 @@ def test_views_along_collinear_corners_are_exact() -> None:
     assert view.area == pytest.approx(2.9 * 3 + 3.1 * 1, rel=1e-12)
 
 
-@settings(max_examples=6)
+@settings(max_examples=count_examples(6))
 @given(seeds, st.integers(1, 5), st.floats(0.3, 6.0))
 def test_covered_areas_agree_with_a_fine_lattice(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)

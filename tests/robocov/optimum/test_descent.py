@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.spatial.distance import pdist
 
 from robocov.cost import CoverageCost
@@ -45,7 +46,7 @@ def are_clear(positions, radius, free):
     return bool((distance >= radius).all() and is_inside.all() and (pdist(positions) >= 2 * radius).all())
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.integers(0, 2**32), st.integers(1, 30))
 def test_robots_move_to_the_nearest_free_positions(seed, count):
     rng = np.random.default_rng(seed)
@@ -79,7 +80,7 @@ def test_robots_stay_in_their_component():
     np.testing.assert_allclose(result.positions, [[1.725, 3.0], [4.775, 3.0]], atol=0.03)
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(st.integers(0, 2**32), st.integers(1, 12))
 def test_the_result_is_a_local_minimum_not_above_the_start(seed, count):
     start = sample_starts(seed, count)

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.optimize import minimize
 from scipy.spatial.distance import pdist
 
@@ -146,7 +147,7 @@ def test_the_result_is_not_worse_than_its_seeds_or_lloyds_iteration_from_them(na
     assert best.compute_gap(min(lloyd_costs)) == min(lloyd_costs) / best.mean_distance - 1.0 >= 0.0
 
 
-@settings(max_examples=12)
+@settings(max_examples=count_examples(12))
 @given(st.integers(0, 2**20), st.sampled_from(["polygons", "blocks", "rooms"]), st.integers(1, 9))
 def test_positions_are_free_and_have_the_returned_cost(seed, kind, robots):
     environment = generate_map(seed, kind=kind, side=8.0, gap=0.4)

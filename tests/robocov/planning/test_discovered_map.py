@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import Environment
 from robocov.planning.discovered_map import (
@@ -50,7 +51,7 @@ def compute_all_centers(raster: Raster) -> np.ndarray:
     return raster.compute_centers(rows, columns)
 
 
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(seed=st.integers(0, 10_000), sensing_range=st.floats(0.5, 8.0))
 def test_known_cells_agree_with_the_environment(
     cluttered: Environment, sensor: RangeSensor, seed: int, sensing_range: float
@@ -134,7 +135,7 @@ def test_a_wall_is_removed_when_rays_have_passed_it_in_several_scans(empty: Envi
     assert np.array_equal(opened.state[is_unaffected], closed.state[is_unaffected])
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(seed=st.integers(0, 1000), reach=st.floats(0.0, 4.0))
 def test_dilated_cells_are_those_close_to_blocked_ones(seed: int, reach: float) -> None:
     is_blocked = np.random.default_rng(seed).random((14, 11)) < 0.05

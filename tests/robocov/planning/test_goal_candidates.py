@@ -6,12 +6,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_window_cases import build_map_window, build_open_room, build_random_blocks
+from property_examples import count_examples
 
 from robocov.planning.goal_candidates import choose_candidates
 from robocov.planning.lattice_graph import LatticeGraph
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(seed=st.integers(0, 1000), max_nodes=st.sampled_from([150, 600, 2400]))
 def test_no_usable_node_is_far_from_all_candidates(seed: int, max_nodes: int) -> None:
     map_window = build_map_window(build_random_blocks(seed), max_nodes=max_nodes)

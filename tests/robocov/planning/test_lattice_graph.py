@@ -15,6 +15,7 @@ from map_window_cases import (
     build_random_blocks,
     build_whole_window,
 )
+from property_examples import count_examples
 
 from robocov.planning.discovered_map import FREE, UNKNOWN, DiscoveredMap
 from robocov.planning.lattice_graph import LatticeGraph
@@ -54,7 +55,7 @@ def test_without_walls_distances_are_nearly_straight() -> None:
         assert (distances[is_reached] <= straight[is_reached] * 1.0275 + 1e-9).all()
 
 
-@settings(max_examples=12)
+@settings(max_examples=count_examples(12))
 @given(seed=st.integers(0, 1000))
 def test_distances_are_those_of_a_plain_search(seed: int) -> None:
     graph = LatticeGraph(build_map_window(build_random_blocks(seed)))
@@ -71,7 +72,7 @@ def test_distances_are_those_of_a_plain_search(seed: int) -> None:
     assert (limited[np.isfinite(limited)] <= 1.0).all()
 
 
-@settings(max_examples=12)
+@settings(max_examples=count_examples(12))
 @given(seed=st.integers(0, 1000))
 def test_shortest_paths_have_the_lengths_of_the_distances(seed: int) -> None:
     graph = LatticeGraph(build_map_window(build_random_blocks(seed)))

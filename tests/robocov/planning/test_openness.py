@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.planning.discovered_map import FREE, UNKNOWN, WALL
 from robocov.planning.openness import PRIOR_OPENNESS, WALK_LENGTH_BLOCKS, compute_openness
@@ -80,7 +81,7 @@ def test_cells_far_from_everything_known_have_the_prior_openness() -> None:
     assert openness[round(WALK_LENGTH_BLOCKS)] == pytest.approx(near, abs=0.02)
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 10_000), rows=st.integers(1, 60), columns=st.integers(1, 60))
 def test_openness_is_a_probability_and_does_not_depend_on_the_orientation(
     seed: int, rows: int, columns: int

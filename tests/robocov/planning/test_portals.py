@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import RASTER, build_map
+from property_examples import count_examples
 from scipy import ndimage
 from scipy.sparse.csgraph import connected_components
 
@@ -73,7 +74,7 @@ def test_there_are_no_portals_where_moves_connect_all_nodes():
     assert not len(build_coarse_planner(build_map()).graph.portals.paths)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([60, 120, 250]))
 def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_nodes):
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_window_cases import RASTER, build_map_window, build_random_blocks, build_wall_with_door
+from property_examples import count_examples
 
 from robocov.planning.discovered_map import dilate
 from robocov.planning.lattice_graph import LatticeGraph
@@ -21,7 +22,7 @@ def find_route_in(map_window: MapWindow, position: np.ndarray, goal: np.ndarray)
     return find_route(LatticeGraph(map_window), NodeVisibility(map_window), position, goal)
 
 
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(seed=st.integers(0, 1000))
 def test_routes_keep_their_clearance_from_walls(seed: int) -> None:
     """Between waypoints, a route keeps the clearance, up to half a cell."""

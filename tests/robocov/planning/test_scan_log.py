@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import REGION
+from property_examples import count_examples
 
 from robocov.observation import Scans
 from robocov.planning.discovered_map import DiscoveredMap
@@ -51,7 +52,7 @@ def drop_randomly(scans: list[NumberedScan], seed: int, fraction: float) -> list
     return [scan for scan, lost in zip(scans, is_lost, strict=True) if not lost]
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(
     seed=st.integers(0, 2**32),
     max_distance=st.sampled_from([0.4, 3.0]),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.observation.region import Region
 from robocov.planning.raster import Raster
@@ -11,7 +12,7 @@ from robocov.planning.window import Window
 RASTER = Raster(Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])), 0.1)
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(x=st.floats(0, 6), y=st.floats(0, 4), half_width=st.floats(0.1, 9.0), max_nodes=st.integers(4, 900))
 def test_a_window_contains_the_surroundings_of_its_center(
     x: float, y: float, half_width: float, max_nodes: int

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 import robocov as rc
 from robocov.conditions import Conditions, Failure
@@ -125,7 +126,7 @@ def test_another_controller_has_its_default_gains() -> None:
     assert scenario.replace(robots=5).robots == 5
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(
     robots=st.integers(1, 4),
     seed=st.integers(0, 2**40),

@@ -15,6 +15,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS as ALL_CONTROLLERS
@@ -91,7 +92,7 @@ def test_runs_are_the_same_in_another_process_on_any_x86_processor(
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS, ids=["rapf", "paper", "rpf", "lloyd"])
-@settings(max_examples=5)
+@settings(max_examples=count_examples(5))
 @given(branch=st.integers(0, 400), seed=st.integers(0, 100))
 def test_copies_continue_identically(
     cluttered: Environment, controller: Controller, branch: int, seed: int

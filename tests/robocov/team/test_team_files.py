@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import InputError, RobocovError
 from robocov.team import Team
@@ -56,7 +57,7 @@ def test_missing_values_of_groups_are_the_defaults(tmp_path: Path) -> None:
     assert np.isinf(team.sensing_range).all()
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(
     st.lists(
         st.fixed_dictionaries(

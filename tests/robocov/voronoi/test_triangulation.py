@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from voronoi_cases import (
     FAMILIES,
     PENTAGON,
@@ -146,7 +147,7 @@ def test_lattices_are_triangulated(side: int, name: str) -> None:
     )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(seeds, names, families, st.integers(16, 50), st.floats(-6.0, 0.0))
 def test_cells_do_not_depend_on_the_previous_triangulation(
     seed: int, name: str, family: Family, n: int, exponent: float
@@ -185,7 +186,7 @@ def move_points(points: FloatArray, region: Region, step: float, rng: np.random.
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=count_examples(40))
 @given(seeds, st.sampled_from(FAMILIES[:3]), st.integers(4, 25), st.floats(-4.0, 0.5))
 def test_a_repaired_mesh_is_delaunay(seed: int, family: Family, n: int, exponent: float) -> None:
     rng = np.random.default_rng(seed)
@@ -198,7 +199,7 @@ def test_a_repaired_mesh_is_delaunay(seed: int, family: Family, n: int, exponent
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(seeds, st.integers(16, 40))
 def test_a_triangulation_of_other_points_can_be_passed(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)

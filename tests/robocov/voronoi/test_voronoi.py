@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from voronoi_cases import (
     FAMILIES,
     PENTAGON,
@@ -43,7 +44,7 @@ def test_small_teams_are_exact(n: int, name: str) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=count_examples(300))
 @given(seeds, names, families, st.integers(1, 14))
 def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -88,7 +89,7 @@ def test_three_cells_that_meet_on_the_boundary() -> None:
     assert_same_ring(cells.polygons[1], np.array([[6.0, 3], [6, 6], [0, 6], [0, 3], [3, 0]]), 1e-12)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(seeds, names, st.sampled_from(FAMILIES[:-1]), st.integers(1, 60))
 def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -112,7 +113,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: Family, n: int) -> 
     assert (is_inside == (distance == nearest))[is_clear].all()
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(seeds, names, families, st.integers(1, 40))
 def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family: Family, n: int) -> None:
     region = REGIONS[name]
@@ -129,7 +130,7 @@ def test_polygons_are_convex_rings_about_their_mass(seed: int, name: str, family
         assert region.contains(ring, 1e-9 * region.diameter).all()
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=count_examples(120))
 @given(seeds, st.integers(1, 30))
 def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
     """Check equation (3) with moments from triangles that have the centroid as a corner."""
@@ -147,7 +148,7 @@ def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
         assert cells.polar_moments == pytest.approx(shifted, abs=1e-11)
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=count_examples(120))
 @given(seeds, st.integers(1, 40), st.floats(0.0, 6.3), st.booleans())
 def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float, mirror: bool) -> None:
     points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
@@ -161,7 +162,7 @@ def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float
     assert plain.masses[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(seeds, st.integers(2, 40))
 def test_order_of_the_robots_does_not_matter(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
@@ -198,7 +199,7 @@ def test_the_centroid_of_an_empty_cell_is_its_generator() -> None:
     assert cells.masses.sum() == pytest.approx(SQUARE.area)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(seeds, st.integers(2, 90), st.floats(0.1, 5.0))
 def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int, range_: float) -> None:
     rng = np.random.default_rng(seed)
@@ -227,7 +228,7 @@ def test_a_cell_depends_only_on_the_neighbors_to_the_last_bit(seed: int, n: int,
     assert after.polar_moments[index] == before.polar_moments[robot]
 
 
-@settings(deadline=None, max_examples=120)
+@settings(deadline=None, max_examples=count_examples(120))
 @given(seeds, st.integers(1, 12), st.floats(0.1, 6.0))
 def test_limited_cells_equal_those_of_the_neighbors_alone(seed: int, n: int, range_: float) -> None:
     points = scatter_points(PENTAGON, n, np.random.default_rng(seed))

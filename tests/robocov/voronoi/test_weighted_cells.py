@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from voronoi_cases import (
     PENTAGON,
     REGIONS,
@@ -81,7 +82,7 @@ def test_cells_tile_the_region(seed: int, name: str, family: str, speeds: str, n
     np.testing.assert_allclose(first, 0.0, atol=tolerance * region.area * region.diameter)
 
 
-@settings(max_examples=12)
+@settings(max_examples=count_examples(12))
 @given(seeds, st.sampled_from(["square", "pentagon", "triangle", "corridor"]), st.floats(1.0, 9.0))
 def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: float) -> None:
     rng = np.random.default_rng(seed)
@@ -98,7 +99,7 @@ def test_cells_agree_with_discs_cut_by_shapely(seed: int, name: str, reach: floa
             np.testing.assert_allclose(cells.centroids[i], expected.centroid.coords[0], atol=1e-4)
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, st.integers(1, 30))
 def test_each_point_is_in_the_cell_of_the_robot_that_arrives_first(seed: int, n: int) -> None:
     rng = np.random.default_rng(seed)
@@ -123,7 +124,7 @@ def test_each_point_is_in_the_cell_of_the_robot_that_arrives_first(seed: int, n:
     np.testing.assert_array_equal(painted_owner[is_clear], time.argmin(axis=1)[is_clear])
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, names, st.integers(1, 60))
 def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: str, n: int) -> None:
     rng = np.random.default_rng(seed)
@@ -134,7 +135,7 @@ def test_equal_speeds_give_the_ordinary_cells_to_the_last_bit(seed: int, name: s
     assert cells.centroids.tobytes() == ordinary.centroids.tobytes()
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, st.sampled_from(["square", "pentagon", "triangle"]), st.integers(2, 30))
 def test_nearly_equal_speeds_give_nearly_equal_cells(seed: int, name: str, n: int) -> None:
     """The circles have radii of 10^13 m here and still give the ordinary cells up to 1e-12."""
@@ -198,7 +199,7 @@ def test_robots_at_one_position_share_a_cell_if_they_are_equally_fast() -> None:
     np.testing.assert_array_equal(cells.centroids[1], cells.centroids[3])
 
 
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(seeds, st.integers(2, 20))
 def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -> None:
     """H = sum of the integrals of (|q - p| / v)² over the cells: dH/dp = 2 M (p - C) / v²."""
@@ -221,7 +222,7 @@ def test_the_cost_of_given_cells_is_minimal_at_the_centroid(seed: int, n: int) -
         assert numeric == pytest.approx(slope[i, axis], abs=1e-5 * (1.0 + abs(slope[i, axis])))
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(seeds, st.integers(2, 25), st.floats(0.5, 6.0))
 def test_a_cell_depends_only_on_the_neighbors_of_its_robot(seed: int, n: int, reach: float) -> None:
     rng = np.random.default_rng(seed)

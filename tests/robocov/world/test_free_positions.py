@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from random_maps import KINDS, build_random_map
 
 from robocov.controllers import Rapf
@@ -30,7 +31,7 @@ def compute_distances(positions):
     return distances
 
 
-@settings(max_examples=80)
+@settings(max_examples=count_examples(80))
 @given(
     kind=st.sampled_from(sorted(KINDS)),
     obstacles=st.integers(1, 12),

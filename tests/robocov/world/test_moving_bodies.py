@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Lloyd, Rapf
 from robocov.cost import CoverageCost, TimeVaryingCost
@@ -51,7 +52,7 @@ def test_a_moving_obstacle_pushes_a_robot() -> None:
     assert simulation.positions[0, 0] == pytest.approx(0.4 + 0.5 * simulation.time + 0.1, abs=3e-3)
 
 
-@settings(max_examples=8)
+@settings(max_examples=count_examples(8))
 @given(
     speed=st.sampled_from([1.0, 3.0]),
     wall_thickness=st.sampled_from([0.004, 0.02, 0.3]),

@@ -6,6 +6,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import Environment
 from robocov.mapfile import list_bundled_maps, load_map
@@ -45,7 +46,7 @@ def test_a_concave_polygon_is_not_filled() -> None:
     assert len(pieces) == 3
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.floats(0.1, 3)), min_size=1, max_size=6))
 def test_pieces_tile_unions_of_discs(discs: list[tuple[float, float, float]]) -> None:
     union = shapely.union_all(

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions, Failure, Join
 from robocov.controllers import Atlas, Barrier, IndividualControllerAdapter, OwnView, Rapf
@@ -37,7 +38,7 @@ def compute_distances(positions: np.ndarray) -> np.ndarray:
     return distances
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(
     seed=st.integers(0, 1000),
     max_force=st.floats(0.01, 500.0),

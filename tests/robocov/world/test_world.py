@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError
@@ -53,7 +54,7 @@ def test_without_viscosity_a_robot_coasts(empty: Environment) -> None:
     np.testing.assert_allclose(world.positions, [[2.5, 5.0]], rtol=1e-12)
 
 
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(seed=st.integers(0, 1000), max_force=st.floats(0.1, 500.0))
 def test_limits_hold_under_any_forces(cluttered: Environment, seed: int, max_force: float) -> None:
     rng = np.random.default_rng(seed)
@@ -147,7 +148,7 @@ def test_energy_never_grows_without_forces(cluttered: Environment) -> None:
             assert energy < 1e-6
 
 
-@settings(max_examples=12)
+@settings(max_examples=count_examples(12))
 @given(seed=st.integers(0, 10_000), branch=st.integers(0, 150))
 def test_copies_continue_identically_even_in_contact(cluttered: Environment, seed: int, branch: int) -> None:
     original = build_world(cluttered, 12, seed, start="corner")

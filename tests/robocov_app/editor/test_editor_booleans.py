@@ -6,6 +6,7 @@ import shapely
 from drawn_sketches import HALL, list_problems, valid_shapes, valid_sketches
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -29,7 +30,7 @@ WANTED = {
 }
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(
     st.lists(valid_shapes(), min_size=2, max_size=4),
     st.sampled_from(["unite", "subtract", "intersect", "divide"]),

@@ -4,6 +4,7 @@ import pytest
 from drawn_sketches import HALL, drafts, valid_sketches
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, UniformStart, WallObstacle
 from robocov.errors import MapError
@@ -17,7 +18,7 @@ BOX = PolygonObstacle(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)), (), "des
 PILLAR = CircleObstacle((6.0, 4.0), 0.5)
 
 
-@settings(max_examples=80)
+@settings(max_examples=count_examples(80))
 @given(st.one_of(drafts(), valid_sketches(min_size=1)))
 def test_copied_objects_can_be_pasted(sketch):
     everything = Selection.select_all(sketch)

@@ -10,6 +10,7 @@ from driven_editor import build_sheet, open_editor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from property_examples import count_examples
 
 from robocov.density import Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle
@@ -140,7 +141,7 @@ class TestEdits:
         sigma=st.floats(0.05, 20.0),
         weight=st.floats(0.001, 1000.0),
     )
-    @settings(max_examples=15, deadline=None)
+    @settings(max_examples=count_examples(15), deadline=None)
     def test_any_drawn_density_can_be_saved(self, center, sigma, weight):
         sketch = density_edits.add_peak(build_dense_map(), center, sigma, weight).sketch
         assert parse_sketch(dump_sketch(sketch), "again").density == sketch.density

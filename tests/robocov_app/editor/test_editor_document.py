@@ -9,6 +9,7 @@ import shapely
 from drawn_sketches import HALL, any_positions, drafts, floats, json_values, renumber, shapes, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import (
     CircleObstacle,
@@ -33,7 +34,7 @@ EMPTY = {"format": "robocov-map", "version": 1, "name": "n"}
 # writing and reading
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(st.one_of(drafts(), drafts(shapes(any_positions, floats)), valid_sketches()))
 def test_a_sketch_survives_its_document(sketch):
     document = to_document(sketch)
@@ -44,7 +45,7 @@ def test_a_sketch_survives_its_document(sketch):
     assert hash(again) == hash(sketch)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.one_of(drafts(), valid_sketches()))
 def test_a_sketch_survives_its_text(sketch):
     text = dump_sketch(sketch)
@@ -143,7 +144,7 @@ def test_a_header_is_a_draft():
 # small differences between files
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.data())
 def test_moving_a_vertex_changes_one_line(data):
     sketch = data.draw(valid_sketches(min_size=1))

@@ -5,6 +5,7 @@ import sys
 import pytest
 from drawn_sketches import HALL, drafts, renumber
 from hypothesis import HealthCheck, given, settings
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
@@ -16,7 +17,7 @@ from robocov_app.editor.model.sketch import Sketch, dump_sketch
 SKETCH = Sketch("Hall", boundary=HALL)
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=count_examples(30), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(drafts())
 def test_a_saved_sketch_can_be_read(tmp_path, sketch):
     path = tmp_path / "draft.json"

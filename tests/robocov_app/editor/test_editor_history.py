@@ -1,6 +1,7 @@
 from drawn_sketches import changes, drafts, renumber, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.geometry import DECIMALS
@@ -12,7 +13,7 @@ from robocov_app.editor.model.sketch import Sketch, to_document
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 
 
-@settings(max_examples=120)
+@settings(max_examples=count_examples(120))
 @given(st.data())
 def test_undo_is_the_exact_inverse_of_any_change(data):
     history = UndoHistory(data.draw(st.one_of(valid_sketches(min_size=2), drafts())))
@@ -40,7 +41,7 @@ def test_undo_is_the_exact_inverse_of_any_change(data):
     assert history.undo_descriptions == words
 
 
-@settings(max_examples=100)
+@settings(max_examples=count_examples(100))
 @given(st.data())
 def test_coordinates_are_rounded_to_a_tenth_of_a_millimeter(data):
     sketch = data.draw(valid_sketches(min_size=1))

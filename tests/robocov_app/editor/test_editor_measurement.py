@@ -7,6 +7,7 @@ import shapely
 from drawn_sketches import HALL, drafts, list_problems, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy import ndimage
 from shapely import MultiPolygon
 
@@ -43,7 +44,7 @@ def rasterize_reach(free: shapely.Geometry, radius: float, cell: float) -> tuple
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 @given(valid_sketches(min_size=1, max_size=6), st.sampled_from([0.1, 0.25, 0.6]))
 def test_reach_agrees_with_a_raster(sketch, radius):
     free = sketch.build_unchecked_environment().free
@@ -162,7 +163,7 @@ def test_measurements_agree_with_the_check_command(name):
     assert name in list_bundled_maps()
 
 
-@settings(max_examples=50)
+@settings(max_examples=count_examples(50))
 @given(drafts(), st.sampled_from([0.05, 0.3]))
 def test_every_draft_can_be_measured(sketch, radius):
     result = measure(sketch, radius)

@@ -12,6 +12,7 @@ from driven_editor import build_sheet, load_sketch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.outlines import Outlines, build_outline
@@ -54,7 +55,11 @@ def copy_page(page: pygame.Surface, at: View) -> np.ndarray:
     return copy_pixels(page)[top : top + height, left : left + width].copy()
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=count_examples(25),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(
     st.lists(st.tuples(st.integers(0, 5), st.integers(-40, 40), st.integers(-40, 40)), max_size=8),
     st.booleans(),

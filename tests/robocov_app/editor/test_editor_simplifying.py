@@ -6,6 +6,7 @@ import shapely
 from drawn_sketches import HALL, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -23,7 +24,7 @@ def build_wobbly_ring(count: int, seed: int, radius: float = 3.0, noise: float =
     return tuple((round(x, 4), round(y, 4)) for x, y in points.tolist())
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.integers(0, 10**6), st.integers(8, 120), st.sampled_from([0.001, 0.02, 0.1, 0.5, 2.0]))
 def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
     ring = build_wobbly_ring(count, seed)

@@ -7,6 +7,7 @@ import shapely
 from drawn_sketches import HALL, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Vertex, list_vertices
@@ -32,7 +33,7 @@ def targets() -> SnapTargets:
     return collect_snap_targets(Sketch(boundary=HALL).with_obstacles([BOX, PILLAR])[0])
 
 
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 @given(
     valid_sketches(),
     cursor,

@@ -5,6 +5,7 @@ import shapely
 from drawn_sketches import HALL, drafts, list_problems, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import (
     CircleObstacle,
@@ -37,7 +38,7 @@ def is_valid(sketch: Sketch) -> bool:
     return True
 
 
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 @given(st.one_of(drafts(), valid_sketches()))
 def test_there_is_an_error_exactly_if_the_map_is_invalid(sketch):
     found = list_problems(sketch)

@@ -5,6 +5,7 @@ import pytest
 from drawn_sketches import HALL, changes, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import properties, transform
@@ -60,7 +61,7 @@ def test_the_worker_agrees_with_the_function_after_every_change():
                 assert are_equal(result, measure(sketch, 0.2))
 
 
-@settings(max_examples=20)
+@settings(max_examples=count_examples(20))
 @given(st.data())
 def test_changes_are_enough_to_rebuild_the_sketch(data):
     measuring = SketchMeasurer()

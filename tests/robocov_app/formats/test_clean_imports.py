@@ -11,6 +11,7 @@ from fuzz_seeds import SEEDS, Case
 from fuzz_structures import STRUCTURES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import MultiPolygon, box
 
 from robocov.environment import MAX_SAGITTA_M, Environment
@@ -67,7 +68,7 @@ _CASE = st.sampled_from(MADE).flatmap(lambda name: st.tuples(st.just(name), STRU
 _CHECKS = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
 
 
-@settings(deadline=None, max_examples=12, suppress_health_check=_CHECKS)
+@settings(deadline=None, max_examples=count_examples(12), suppress_health_check=_CHECKS)
 @given(_CASE)
 def test_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
@@ -76,7 +77,7 @@ def test_generated_files_are_clean(
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=250, suppress_health_check=_CHECKS)
+@settings(deadline=None, max_examples=count_examples(250), suppress_health_check=_CHECKS)
 @given(_CASE)
 def test_many_generated_files_are_clean(
     tmp_path_factory: pytest.TempPathFactory, given_case: tuple[str, Case]
@@ -88,7 +89,7 @@ _NUMBER = st.integers(0, 10**7).map(lambda value: value / 1e6)
 _BLOCK = st.tuples(_NUMBER, _NUMBER, st.floats(0.001, 3.0), st.floats(0.001, 3.0), st.floats(0.0, 90.0))
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=_CHECKS)
+@settings(deadline=None, max_examples=count_examples(40), suppress_health_check=_CHECKS)
 @given(st.lists(_BLOCK, max_size=6), st.sampled_from([0.0, 0.02, 0.1]))
 def test_walls_move_at_most_by_the_tolerance(blocks: list[Any], tolerance: float) -> None:
     solid = [

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import MultiPolygon, Polygon, box
 
 from robocov.environment import DiscStart, UniformStart
@@ -290,7 +291,7 @@ def test_a_hole_that_leaves_its_outline_is_rounded_too() -> None:
 points = st.tuples(st.integers(0, 40), st.integers(0, 40))
 
 
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=count_examples(80))
 @given(
     st.lists(st.lists(points, min_size=3, max_size=8), min_size=1, max_size=4),
     st.sampled_from([0.0, 0.05, 0.5, 3.0]), st.sampled_from(["largest", "all"]),
@@ -317,7 +318,7 @@ def test_any_rings_give_a_map_or_a_map_error(
         assert environment.boundary_polygon.buffer(1e-3).covers(environment.free)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(st.lists(points, min_size=3, max_size=9), st.booleans(), st.sampled_from([0.0, 0.4]))
 def test_boundary_and_obstacles_preserve_the_free_space(
     ring: list[tuple[int, int]], hull: bool, margin: float
@@ -370,7 +371,7 @@ def test_a_map_that_takes_too_long_is_refused(
 _RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=count_examples(60), deadline=None)
 @given(st.lists(_RECTANGLES, max_size=6))
 def test_the_start_is_where_clearance_is_largest(blocks: list[tuple[int, int, int, int]]) -> None:
     solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])

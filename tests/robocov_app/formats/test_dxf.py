@@ -14,6 +14,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
@@ -132,7 +133,7 @@ def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
     assert shapely.distance(wall.buffer(1e-3), exact).max() == 0.0
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(
     st.tuples(st.integers(-9, 9), st.integers(-9, 9)),
     st.tuples(st.integers(-9, 9), st.integers(-9, 9)),

@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import box
 from vector_files import build_square
 
@@ -245,7 +246,7 @@ def test_a_tangle_of_lines_is_refused() -> None:
 _ROOM = st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(1, 12), st.integers(1, 12))
 
 
-@settings(max_examples=100)
+@settings(max_examples=count_examples(100))
 @given(st.lists(_ROOM, min_size=1, max_size=6), st.sampled_from(["free", "solid"]))
 def test_free_and_solid_are_complements(rooms: list[tuple[int, int, int, int]], what: str) -> None:
     frame = (build_square(-1, -1, 60, 60), "boundary")

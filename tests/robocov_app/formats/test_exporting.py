@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import Polygon
 
 from robocov.defaults import DEFAULT_RADIUS_M
@@ -88,7 +89,7 @@ def build_slanted_room(slant: float, obstacles: list[Obstacle]) -> Environment:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=count_examples(50))
 @given(
     st.floats(0, 1.5), st.lists(obstacles, max_size=5), st.sampled_from([0.05, 0.08]),
     st.sampled_from(["ros", "scale", "raw", "png-of-ros", "movingai", "image"]),

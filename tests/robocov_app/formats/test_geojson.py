@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from vector_files import build_square, read
 
 from robocov.errors import MapError
@@ -167,7 +168,7 @@ _COORDINATE = st.floats(-4e3, 4e3).map(lambda value: round(value, 4))
 _POINT = st.tuples(_COORDINATE, _COORDINATE)
 
 
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 @given(st.lists(st.lists(_POINT, min_size=3, max_size=6).map(shapely.Polygon), min_size=1, max_size=4))
 def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFactory, polygons: Any) -> None:
     text = shapely.to_geojson(shapely.MultiPolygon(polygons))

@@ -8,6 +8,7 @@ import pyproj
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions
@@ -29,7 +30,7 @@ def project_points(
     return figure.rings[0], shapes.notes
 
 
-@settings(max_examples=100)
+@settings(max_examples=count_examples(100))
 @given(
     st.floats(-180, 180),
     st.floats(-84, 84),

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import Polygon, box
 
 from robocov.environment import DiscStart, Environment, PolygonObstacle, UniformStart
@@ -165,7 +166,7 @@ def test_other_files_are_not_recognized(tmp_path: Path) -> None:
         detect_format(tmp_path / "none.json")
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=count_examples(150))
 @given(
     st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), min_size=3, max_size=14),
     st.sampled_from([0.0, 0.02, 0.5]),

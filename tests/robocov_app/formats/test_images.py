@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image, PngImagePlugin
+from property_examples import count_examples
 from raster_files import build_chunk, build_pgm, encode_png
 
 from robocov.errors import MapError
@@ -322,7 +323,7 @@ def test_invalid_pictures_are_refused(tmp_path: Path, data: bytes, expected: str
     assert "\n" not in message
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=count_examples(150))
 @given(st.integers(8, len(WHOLE) - 1), st.integers(0, 255), st.booleans())
 def test_a_changed_byte_gives_a_picture_or_a_map_error(
     tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool

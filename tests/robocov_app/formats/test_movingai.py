@@ -6,6 +6,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import MapError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
@@ -106,7 +107,7 @@ def test_invalid_files_are_refused(tmp_path: Path, text: str, expected: str) -> 
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=count_examples(150))
 @given(st.binary(max_size=12), st.integers(0, len(GRID)), st.integers(0, 6))
 def test_a_damaged_grid_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, patch: bytes, at: int, gone: int

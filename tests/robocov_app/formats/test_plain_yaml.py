@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import MapError
 from robocov_app.formats.files import MAX_YAML_BYTES as MAX_BYTES
@@ -90,7 +91,7 @@ def test_unsupported_yaml_is_refused(text: bytes, expected: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=count_examples(300))
 @given(st.one_of(st.binary(max_size=80), st.text(alphabet="ab:-[]{},&*!|>'\"#%@ \n\t01.?", max_size=60)))
 def test_any_text_is_a_mapping_or_refused(text: bytes | str) -> None:
     try:

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import Polygon, box
 
 from robocov.errors import MapError
@@ -29,7 +30,7 @@ def count_windings(ring: np.ndarray, x: float, y: float) -> float:
     return float(np.rint(turn.sum() / math.tau))
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(st.lists(_RING, min_size=1, max_size=3), st.sampled_from(["evenodd", "nonzero"]))
 def test_fills_agree_with_winding_angles(rings: list[list[tuple[int, int]]], rule: str) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
@@ -47,7 +48,7 @@ def test_fills_agree_with_winding_angles(rings: list[list[tuple[int, int]]], rul
             assert edge < 1e-9 or area.covers(shapely.Point(x, y)) == inside
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(st.lists(_RING, min_size=1, max_size=3))
 def test_holes_are_subtracted_from_the_outline(rings: list[list[tuple[int, int]]]) -> None:
     arrays = [np.array(ring, dtype=float) for ring in rings]
@@ -164,7 +165,7 @@ def test_no_part_is_lost_at_almost_coincident_edges() -> None:
     assert both.area == pytest.approx(slim.area + bow.area - overlap, rel=1e-5)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=count_examples(60), deadline=None)
 @given(st.lists(_RING, min_size=1, max_size=5))
 def test_a_union_covers_its_parts(rings: list[list[tuple[int, int]]]) -> None:
     areas = [find_enclosed_area([np.array(ring, dtype=float)], "nonzero").area for ring in rings]

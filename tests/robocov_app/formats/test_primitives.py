@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import MultiPolygon, Polygon, box
 
 from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
@@ -43,7 +44,7 @@ def build_map(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Enviro
     return build_environment(read_shapes(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=count_examples(60), suppress_health_check=[HealthCheck.too_slow])
 @example(
     # The first circle ends at the boundary, and extends from it by a little more than the tolerance.
     [CircleObstacle((0.0, 1.0), 0.21875), CircleObstacle((2.0, 2.0), 1.0)],

@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
@@ -26,7 +27,7 @@ from robocov_app.formats.geometry.cells.rasterize import (
 points = st.tuples(*[st.integers(-64, 448).map(lambda k: k / 64)] * 2)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(
     st.lists(points, min_size=3, max_size=9), st.integers(11, 130).map(lambda k: k / 100), st.integers(1, 3)
 )
@@ -91,7 +92,7 @@ _thin = st.one_of(
 )
 
 
-@settings(max_examples=80)
+@settings(max_examples=count_examples(80))
 @given(st.lists(_thin, min_size=1, max_size=6), st.floats(0.04, 0.25))
 def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], cell: float) -> None:
     environment = build_room(obstacles=tuple(things))

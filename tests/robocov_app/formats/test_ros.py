@@ -10,6 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from property_examples import count_examples
 from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, build_pgm, draw_pixels, write_ros_map
 from shapely import MultiPolygon
 
@@ -139,7 +140,7 @@ def compute_occupancy(level: int, mode: str, negate: bool, low: float, high: flo
     return -1 if mode == "trinary" else round(100 * (p - low) / (high - low))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=count_examples(100))
 @given(
     st.sampled_from(["trinary", "scale", "raw"]), st.booleans(), st.booleans(),
     st.floats(0, 1), st.floats(0, 1), st.integers(0, 255),

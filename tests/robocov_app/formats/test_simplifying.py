@@ -5,6 +5,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import MultiPolygon, Polygon, affinity
 
 from robocov_app.formats.geometry.cells.vectorize import trace_outline
@@ -173,7 +174,7 @@ def build_caves(seed: int, share: float, smooth: int, rows: int = 40, columns: i
     return free
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=count_examples(25))
 @given(ragged)
 def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, tolerance = cave
@@ -203,7 +204,7 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
         assert len(met) <= 1
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(ragged)
 def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave

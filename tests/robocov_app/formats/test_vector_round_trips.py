@@ -11,6 +11,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
 from robocov.errors import OutputError, ParameterError
@@ -89,7 +90,7 @@ _OUTLINE = st.sampled_from(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 @given(_OUTLINE, st.lists(_OBSTACLE, max_size=6), st.sampled_from(FORMATS))
 def test_any_map_survives_every_format(
     tmp_path_factory: pytest.TempPathFactory, outline: Any, obstacles: Any, how: tuple[str, dict[str, Any]]

@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
+from property_examples import count_examples
 from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
@@ -43,7 +44,7 @@ def unite_cells(free: np.ndarray) -> shapely.Geometry:
     return shapely.union_all(cells) - shapely.union_all(necks)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=count_examples(200))
 @given(grids, st.integers(1, 10))
 def test_the_outline_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> None:
     with mock.patch("robocov_app.formats.geometry.cells.vectorize._STRIP", strip):
@@ -57,7 +58,7 @@ def test_the_outline_is_the_union_of_the_cells(free: np.ndarray, strip: int) -> 
         assert not any(hole.is_ccw for hole in part.interiors)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=count_examples(100))
 @given(grids)
 def test_rings_are_apart_and_every_vertex_is_a_corner(free: np.ndarray) -> None:
     rings = shapely.get_rings(list(trace_outline(free, "grid").geoms))

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from shapely import Polygon, box
 from vector_files import read
 
@@ -235,7 +236,7 @@ _GEOMETRY = st.recursive(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 @given(_GEOMETRY, st.booleans())
 def test_coordinates_agree_with_shapely(geometry: Any, flat: bool) -> None:
     text = shapely.to_wkt(geometry, rounding_precision=-1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import ParameterError
 from robocov.observation import Observations, Scans
@@ -86,7 +87,7 @@ def test_blocks_cover_each_row() -> None:
     assert "neighbor" not in ObservationLayout(0).blocks
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 40), communication_range=st.floats(0.5, 5.0))
 def test_a_row_depends_only_on_the_knowledge_of_its_robot(
     seed: int, n: int, communication_range: float
@@ -114,7 +115,7 @@ def test_a_row_depends_only_on_the_knowledge_of_its_robot(
     assert layout.build_rows(other, team)[i].tobytes() == before.tobytes()
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(seed=st.integers(0, 2**32), n=st.integers(1, 20), sensing=st.sampled_from([0.0, 0.3, 3.0, np.inf]))
 def test_rows_stay_within_their_bounds(seed: int, n: int, sensing: float) -> None:
     """Positions may be outside the region, and distances beyond the sensing range."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.controllers import Lloyd, Rapf, make_controller
 from robocov.environment import Environment
@@ -146,7 +147,7 @@ def test_a_policy_moves_as_in_training(
     assert np.abs(record.positions[-1] - starts).max() > 0.3
 
 
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 30), communication_range=st.floats(0.5, 6.0))
 def test_a_policy_uses_only_the_knowledge_of_the_robot(seed: int, n: int, communication_range: float) -> None:
     """Changes beyond the ranges of robot i do not change its forces, not one bit."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
@@ -23,7 +24,7 @@ def sample_positions(environment: Environment, seed: int, n: int = 4) -> np.ndar
     return environment.start("uniform").sample(n, seed=seed, radius=0.3)
 
 
-@settings(max_examples=15)
+@settings(max_examples=count_examples(15))
 @given(seed=STEPS)
 def test_own_rewards_sum_up_to_the_decrease_of_the_cost(cost: CoverageCost, seed: int) -> None:
     positions = sample_positions(cost.environment, seed)

@@ -7,6 +7,7 @@ import pytest
 from color_vision import find_min_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from scipy.spatial import Delaunay
 
 from robocov.errors import ParameterError
@@ -178,7 +179,7 @@ class TestHuesOfRobots:
     def test_robots_of_small_teams_have_their_own_hues(self, n):
         assert choose_robot_hues(n).tolist() == list(range(n))
 
-    @settings(deadline=None, max_examples=40)
+    @settings(deadline=None, max_examples=count_examples(40))
     @given(st.integers(MAX_OWN_HUES + 1, 150), st.integers(0, 10_000))
     def test_adjacent_cells_of_large_teams_have_different_hues(self, n, seed):
         adjacency = find_adjacent_pairs(np.random.default_rng(seed).uniform(size=(n, 2)))
@@ -187,14 +188,14 @@ class TestHuesOfRobots:
         assert hues.max() < N_SHARED_HUES
         assert not has_conflict(hues, adjacency)
 
-    @settings(deadline=None, max_examples=30)
+    @settings(deadline=None, max_examples=count_examples(30))
     @given(st.integers(MAX_OWN_HUES + 1, 80), st.integers(0, 10_000))
     def test_hues_without_conflicts_do_not_change(self, n, seed):
         adjacency = find_adjacent_pairs(np.random.default_rng(seed).uniform(size=(n, 2)))
         hues = choose_robot_hues(n, adjacency)
         assert choose_robot_hues(n, adjacency, hues).tolist() == hues.tolist()
 
-    @settings(deadline=None, max_examples=30)
+    @settings(deadline=None, max_examples=count_examples(30))
     @given(st.integers(MAX_OWN_HUES + 1, 80), st.integers(0, 10_000))
     def test_few_hues_change_after_a_small_motion(self, n, seed):
         """A changed hue may conflict with a neighbor, which has to change too."""

@@ -11,6 +11,7 @@ from drawn_run import build_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from property_examples import count_examples
 
 from robocov_app.render.camera import Camera
 from robocov_app.render.crowding import (
@@ -34,14 +35,14 @@ def compute_all_distances(centers):
     return distances
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(points)
 def test_nearest_distances_are_those_of_all_pairs(centers):
     expected = compute_all_distances(centers).min(axis=1)
     assert compute_nearest_distances(centers) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=count_examples(100))
 @given(points, st.floats(0, 2), st.floats(0.1, 3))
 def test_radii_are_within_their_limits(centers, true_radius, low):
     radii = fit_radii(centers, np.full(len(centers), true_radius), low, 9.0)
@@ -49,7 +50,7 @@ def test_radii_are_within_their_limits(centers, true_radius, low):
     assert (radii <= max(true_radius, 9.0)).all()
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=count_examples(100))
 @given(points, st.floats(0, 2), st.floats(0.1, 3))
 def test_discs_overlap_only_if_they_cannot_be_smaller(centers, true_radius, low):
     radii = fit_radii(centers, np.full(len(centers), true_radius), low, 9.0)
@@ -135,7 +136,7 @@ def build_random_curve(n_points, seed):
     return np.cumsum(steps, axis=0)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=count_examples(60))
 @given(st.integers(2, 40), st.integers(0, 10_000))
 def test_dashes_cover_their_fraction_of_a_curve(n_points, seed):
     points = build_random_curve(n_points, seed)

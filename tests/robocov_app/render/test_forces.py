@@ -16,6 +16,7 @@ from drawn_pixels import (
 from drawn_run import build_scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from rendered_text import check_legend_symbol, render_legend_symbols
 
 from robocov.team import Team
@@ -49,7 +50,7 @@ def measure_arrow_length(scene, layer, direction):
     return (direction * (pixels[:, 0] - x)).max()
 
 
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=count_examples(25))
 @given(st.floats(0, 2 * np.pi), st.sampled_from(["velocities", "force_attraction", "force_resultant"]))
 def test_arrows_have_the_direction_of_their_vectors(angle, layer):
     direction = np.array([np.cos(angle), np.sin(angle)])
@@ -81,7 +82,7 @@ def test_arrows_of_terms_differ_in_shape():
 
 
 class TestViscosity:
-    @settings(deadline=None, max_examples=25)
+    @settings(deadline=None, max_examples=count_examples(25))
     @given(st.floats(0, 2 * np.pi))
     def test_viscosity_points_against_the_velocity(self, angle):
         direction = np.array([np.cos(angle), np.sin(angle)])

@@ -12,6 +12,7 @@ import pytest
 from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, SQUARE, build_row_scene, build_scene, record_walk
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.errors import ParameterError
 from robocov_app.look.theme import DARK, LIGHT
@@ -83,7 +84,7 @@ def test_fit_undoes_zoom_and_pan():
     assert (painter.render_frame(scene) == frame).all()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=count_examples(40))
 @given(
     factor=st.floats(-12, 14).map(lambda power: 2.0**power),
     pan_px=st.tuples(st.floats(-3000, 3000), st.floats(-3000, 3000)),
@@ -109,7 +110,7 @@ def test_all_layers_can_be_drawn_at_any_zoom(factor, pan_px, pixel):
     assert painter.render_frame(scene).shape == (240, 320, 3)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=count_examples(15))
 @given(st.floats(20, 5000), st.floats(0.5, 7.5), st.floats(0.5, 7.5))
 def test_cells_are_exact_at_high_zoom(factor, x, y):
     """Clipping edges that end far outside the view must not turn them."""

@@ -16,6 +16,7 @@ from drawn_run import ROOMS, SQUARE, record_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from property_examples import count_examples
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
@@ -133,7 +134,7 @@ class TestCostsInFrames:
         assert len(frames) == 3
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(arrays(np.uint8, st.tuples(st.integers(1, 20), st.integers(1, 20), st.just(3))))
 def test_a_png_has_all_pixels_of_its_frame(frame):
     surface = pygame.image.load(io.BytesIO(encode_png(frame)), "frame.png")
@@ -141,7 +142,7 @@ def test_a_png_has_all_pixels_of_its_frame(frame):
     assert (pixels == frame).all()
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=count_examples(30))
 @given(arrays(np.uint8, st.tuples(st.integers(1, 20), st.integers(1, 20), st.just(3))))
 def test_equal_frames_give_the_same_png(frame):
     assert encode_png(frame) == encode_png(frame.copy())

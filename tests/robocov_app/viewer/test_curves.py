@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov_app.viewer.session.past import curves as module
 from robocov_app.viewer.session.past.curves import MAX_CURVE_SAMPLES, Curve
@@ -81,7 +82,7 @@ def test_gaps_are_listed_from_the_longest_to_the_shortest():
 
 
 @given(st.lists(st.floats(-1.0, 3.0), max_size=200), st.integers(4, 40))
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 def test_times_ascend_and_samples_are_bounded(intervals, max_samples):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "MAX_CURVE_SAMPLES", max_samples)

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from sample_sessions import (
     HALL,
     LLOYD,
@@ -99,7 +100,7 @@ def test_a_robot_is_placed_in_all_panes():
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), points), min_size=1, max_size=6))
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 def test_placed_robots_overlap_nothing(placements):
     session = start_session(robots=6)
     for number, point in placements:

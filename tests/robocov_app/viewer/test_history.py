@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from sample_sessions import HALL, RAPF
 
 from robocov.environment import CircleObstacle
@@ -70,7 +71,7 @@ def test_states_are_returned_in_order():
 
 
 @given(st.integers(0, 900), st.integers(30, 120))
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 def test_the_past_is_bounded_and_becomes_coarser_with_age(steps, max_states):
     history = build_history(steps + 1, max_states * STATE_BYTES)
     assert len(history) <= max_states
@@ -94,7 +95,7 @@ def edited_runs(draw):
 
 
 @given(edited_runs())
-@settings(max_examples=200)
+@settings(max_examples=count_examples(200))
 def test_the_past_of_an_edited_run_stays_in_order(run):
     max_bytes = 80 * STATE_BYTES
     history = RunHistory(DT, max_bytes)
@@ -215,7 +216,7 @@ def test_the_newest_state_is_replaced_after_an_edit():
 
 
 @given(st.integers(1, 400), st.integers(0, 400))
-@settings(max_examples=100)
+@settings(max_examples=count_examples(100))
 def test_a_copy_has_the_size_of_its_own_states(steps, index):
     history = build_history(steps, 60 * STATE_BYTES)
     index = min(index, len(history) - 1)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from sample_sessions import (
     HALL,
     LLOYD,
@@ -100,7 +101,7 @@ def assert_same_positions(session: Session, other: Session) -> None:
 
 @pytest.mark.slow
 @given(edits, st.sampled_from([(RAPF,), (LLOYD, RAPF), (ATLAS,)]), st.booleans())
-@settings(max_examples=40)
+@settings(max_examples=count_examples(40))
 def test_every_session_is_recomputed_bit_for_bit(edits, controllers, has_moving_obstacle):
     environment = HALL
     if has_moving_obstacle:

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pointer_events import build_event
+from property_examples import count_examples
 from sample_sessions import (
     HALL,
     LLOYD,
@@ -461,7 +462,7 @@ _uses = st.tuples(
 
 
 @given(st.lists(_uses, max_size=30))
-@settings(max_examples=60)
+@settings(max_examples=count_examples(60))
 def test_tools_may_be_used_in_any_order(actions):
     session = start_session()
     tools = build_tools()

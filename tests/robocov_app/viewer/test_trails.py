@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 from sample_sessions import LLOYD, RAPF, advance_session, start_session
 
 from robocov_app.viewer.session.past import history as history_module
@@ -58,7 +59,7 @@ def test_a_row_replaces_one_of_the_same_time():
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 0.2), st.booleans()), max_size=300), st.integers(8, 64))
-@settings(max_examples=150)
+@settings(max_examples=count_examples(150))
 def test_times_ascend_and_rows_are_bounded(additions, max_rows):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "MAX_TRAIL_ROWS", max_rows // 2 * 2)

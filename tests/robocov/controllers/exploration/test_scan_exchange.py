@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from property_examples import count_examples
 
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, make_controller
@@ -206,7 +207,7 @@ def replay(simulation: Simulation, observations: list[Observations]) -> list[Any
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=3, phases=[Phase.generate])
+@settings(max_examples=count_examples(3), phases=[Phase.generate])
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.0, 0.3, 0.8]), robot=st.integers(0, 3))
 def test_what_has_not_been_delivered_changes_nothing(name: str, seed: int, loss: float, robot: int) -> None:
     """A robot decides the same, bit for bit, if all that it does not receive is replaced."""
