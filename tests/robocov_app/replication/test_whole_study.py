@@ -494,10 +494,12 @@ class TestPages:
             part = paper_page.partition(f'id="figure-{number}"')[2].partition("</section>")[0]
             for variant in ("", "best", "limited"):
                 runs = paper.figures[variant]
-                finals = [
+                rapf_cost, rpf_cost = (
                     runs[f"{case}/{controller}"].history.mean_distance[-1] for controller in ("rapf", "rpf")
-                ]
-                assert "{:.3f} m, RPF with {:.3f} m".format(*finals) in remove_escapes(part)
+                )
+                text = remove_escapes(part)
+                assert f"RAPF ends with a mean distance of {rapf_cost:.3f} m, " in text
+                assert f" RPF ({rpf_cost:.3f} m)." in text
             assert part.count("<img") == (4 if number == 4 else 3)
 
     def test_the_protocol_states_all_parameters(self, paper_page, paper):
