@@ -16,6 +16,7 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
+from property_examples import count_examples
 from sample_sessions import (
     HALL,
     LLOYD,
@@ -325,7 +326,7 @@ def apply_edit(session, name, point, index) -> None:
 
 
 @given(st.lists(edits, max_size=15))
-@settings(max_examples=25)
+@settings(max_examples=count_examples(25))
 def test_undo_and_redo_of_all_edits_restore_map_and_robots(edits):
     session = start_session(RAPF, LLOYD)
     for name, point, index in edits:
@@ -349,7 +350,7 @@ def test_undo_and_redo_of_all_edits_restore_map_and_robots(edits):
     steps=st.integers(1, 30),
     steps_back=st.integers(0, 30),
 )
-@settings(max_examples=30)
+@settings(max_examples=count_examples(30))
 def test_a_branch_after_any_edits_is_the_same_bit_for_bit(edits, controllers, steps, steps_back):
     session = start_session(*controllers)
     for name, point, index in edits:
