@@ -159,7 +159,7 @@ class ViewerLauncher:
         if drafts:
             offer_recovery(window.viewer, window.dialogs, drafts)
         elif self.offers_lesson and settings_file is not None and not settings_file.exists():
-            window.dialogs.ask(build_lesson_offer(window.viewer, window.lesson.toggle))
+            window.dialogs.ask(build_lesson_offer(window.lesson.toggle))
 
     def _open_window(self, settings: ViewerSettings) -> ViewerWindow:
         """Open the window with the settings; warn if it is too small for the requested scale."""

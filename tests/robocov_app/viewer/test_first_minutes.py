@@ -194,28 +194,29 @@ def test_new_users_are_offered_the_lesson_once(monkeypatch: pytest.MonkeyPatch, 
             assert window.dialogs.current is None
             assert (window.lesson.player is not None) is starts_lesson
             window.run_frame(0.5)
-            assert (window.viewer.session.displayed.time > 0.0) is starts_lesson
+            assert window.viewer.session.displayed.time > 0.0, "the robots move without another key"
         with build_visible_launcher(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.current is None
 
 
-def test_the_first_click_on_play_after_the_offer_starts_the_session(
+def test_the_button_behind_the_offer_pauses_once_the_offer_is_closed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     launcher = build_visible_launcher(monkeypatch, tmp_path, offers_lesson=True)
     launcher.session.playback.is_playing = True
     with launcher.window() as window:
         window.run_frame(0.0)
-        play = window.top_bar.ui.find("button", "pause")
-        assert play is not None
+        button = window.top_bar.ui.find("button", "pause")
+        assert button is not None
+        assert button.text == "Pause"
         states = []
         # The first click only closes the dialog.
         for _ in range(2):
             for kind in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
-                pygame.event.post(pygame.event.Event(kind, pos=play.rect.center, button=1))
+                pygame.event.post(pygame.event.Event(kind, pos=button.rect.center, button=1))
             window.run_frame(0.0)
             states.append((window.dialogs.is_open, window.viewer.session.playback.is_playing))
-        assert states == [(False, False), (False, True)]
+        assert states == [(False, True), (False, False)]
 
 
 def test_drafts_are_offered_and_the_session_waits_for_the_answer(
@@ -242,6 +243,10 @@ def test_drafts_are_offered_and_the_session_waits_for_the_answer(
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.run_frame(0.0)
             assert window.viewer.session.displayed.numbers == numbers
+            is_recovered = key == pygame.K_r
+            assert window.viewer.session.playback.is_playing is not is_recovered
+            says_how_to_play = window.viewer.message.endswith("It is paused: press Space or Play to continue.")
+            assert says_how_to_play is is_recovered
             # After a draft was discarded, the next one is offered.
             assert (window.dialogs.current is not None) is (remaining_drafts == 1)
             assert len(find_recoverable_drafts(tmp_path / "drafts")) == remaining_drafts

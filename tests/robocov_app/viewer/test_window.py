@@ -169,7 +169,7 @@ def test_an_invalid_folder_is_reported(tmp_path: Path) -> None:
 
 
 def test_playing_removes_the_hint_to_play(driver: Driver) -> None:
-    driver.viewer.show_message("Press Play, or Space, to let the robots move.")
+    driver.viewer.show_message("It is paused: press Space or Play to continue.")
     driver.press_key("space")
     assert driver.viewer.message == ""
 

@@ -169,8 +169,11 @@ def test_a_session_that_another_one_replaces_can_be_recovered(tmp_path: Path) ->
     viewer.session.fail_robot(3)
     message = viewer.files.recover()
     assert viewer.session.displayed.numbers == (1, 3)
-    assert message.endswith("Your unsaved session is kept: Ctrl+Shift+O opens it.")
-    viewer.files.recover()
+    assert message.endswith(
+        "It is paused: press Space or Play to continue. Your unsaved session is kept: Ctrl+Shift+O opens it."
+    )
+    viewer.view.is_compact = True
+    assert "It is paused: tap Play to continue." in viewer.files.recover()
     assert viewer.session.displayed.numbers == (1, 2)
     viewer.files.workspace.close()
 

@@ -217,6 +217,8 @@ class FileActions:
         hints: list[str] = []
         if saved.lesson is not None:
             hints.append("F2 plays its lesson.")
+        else:
+            hints.append(self._describe_pause())
         if keeps_draft:
             hints.append(_KEPT_SESSION_HINT)
         message = f"session opened: {path}"
@@ -234,10 +236,16 @@ class FileActions:
         seconds = self._viewer.session.playback.seek_seconds
         workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seconds)
         keeps_draft = self._replace_workspace(workspace, view)
-        message = f"recovered: {describe_draft(draft)}"
+        message = f"recovered: {describe_draft(draft)}. {self._describe_pause()}"
         if keeps_draft:
-            message += f". {_KEPT_SESSION_HINT}"
+            message += f" {_KEPT_SESSION_HINT}"
         return message
+
+    def _describe_pause(self) -> str:
+        """Return a hint that an opened session is paused, and how to play it."""
+        if self._viewer.view.is_compact:
+            return "It is paused: tap Play to continue."
+        return "It is paused: press Space or Play to continue."
 
     def _add_recent(self, path: Path) -> None:
         name = str(path.absolute())

@@ -21,8 +21,6 @@ from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
 from robocov_app.viewer.session.setup.scenario import require_space_for_pane
 
-_START_HINT = "Press Play, or Space, to let the robots move."
-
 
 def build_file_dialog(viewer: Presenter) -> Choice:
     """Return the dialog that opens a session or a map."""
@@ -85,31 +83,23 @@ def build_comparison_dialog(viewer: Presenter) -> Choice:
     return create_list_choice(title, lambda: options, add)
 
 
-def build_lesson_offer(viewer: Presenter, start_lesson: Callable[[], None]) -> Question:
-    """Return the dialog that offers the lesson to a new user, and pause the session.
+def build_lesson_offer(start_lesson: Callable[[], None]) -> Question:
+    """Return the dialog that offers the lesson to a new user.
 
-    Without the lesson, the session stays paused: whoever saw the button *Play* behind the dialog presses it
-    next, and must not pause the robots by that.
+    The session waits while the dialog is open, and runs if the user declines, as after every other start.
     """
-    resume = _pause(viewer)
-    explore = partial(viewer.show_message, _START_HINT)
-
-    def play_lesson() -> None:
-        resume()
-        start_lesson()
-
     text = (
         "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
         "and what helps, in a few minutes. Reopen it any time with F2."
     )
-    answers = [Answer("Start the lesson", play_lesson), Answer("Explore on my own", explore)]
-    return Question("Welcome to robocov", text, answers, explore)
+    answers = [Answer("Start the lesson", start_lesson), Answer("Explore on my own")]
+    return Question("Welcome to robocov", text, answers)
 
 
 def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft]) -> None:
-    """Open a dialog that offers to recover unsaved work, and pause the session.
+    """Open a dialog that offers to recover unsaved work.
 
-    The session stays paused if no draft is recovered.
+    The session waits while the dialog is open, and runs if no draft is recovered.
 
     Parameters
     ----------
@@ -122,38 +112,20 @@ def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft])
     """
     newest = drafts[0]
     others = drafts[1:]
-    resume = _pause(viewer)
-    show_start_hint = partial(viewer.show_message, _START_HINT)
 
     def recover() -> None:
-        resume()
         viewer.attempt(partial(viewer.files.recover, newest))
 
     def discard() -> None:
         remove_draft(newest.folder)
         if others:
-            resume()
             offer_recovery(viewer, dialogs, others)
-        else:
-            show_start_hint()
 
     question = create_recovery_question(
         f"{describe_draft(newest)}.",
         other_count=len(others),
         recover=recover,
         discard=discard,
-        postpone=show_start_hint,
+        postpone=lambda: None,
     )
     dialogs.ask(question)
-
-
-def _pause(viewer: Presenter) -> Callable[[], None]:
-    """Pause the session; return a function that resumes it if it was playing."""
-    session = viewer.session
-    was_playing = session.playback.is_playing
-    session.playback.is_playing = False
-
-    def resume() -> None:
-        session.playback.is_playing = was_playing
-
-    return resume
