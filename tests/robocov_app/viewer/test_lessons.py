@@ -126,6 +126,37 @@ def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsy
         assert before.displayed.numbers == (1, 2)
 
 
+def test_the_keys_of_answers_do_not_leave_the_lesson_without_an_open_question(tmp_path: Path) -> None:
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        layers = set(driver.viewer.view.layers)
+        states = []
+
+        def press_all_keys() -> None:
+            for key in "1234":
+                driver.press_key(key)
+                assert driver.viewer.message == "No question is open"
+            states.append(lesson.state)
+
+        press_all_keys()
+        driver.run_frames(40)
+        press_all_keys()
+        driver.press_key("right")
+        driver.press_key("1")
+        press_all_keys()
+        assert states == ["playing", "ended", "playing"]
+        assert lesson.answer == 1, "the first answer counts"
+        assert driver.viewer.view.layers == layers
+        driver.run_frames(30)
+        assert lesson.state == "task"
+        assert "centroids" not in driver.viewer.view.layers
+        driver.press_key("2")
+        assert lesson.state == "task"
+        assert "centroids" in driver.viewer.view.layers, "during a task, layers can be switched"
+
+
 def test_the_end_is_reported_and_the_selection_restored(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False

@@ -174,11 +174,18 @@ class LessonGuide:
         return False
 
     def handle_key(self, character: str) -> bool:
-        """Answer the question by a number key; return whether the key was an answer."""
-        player = self.player
-        if player is None or player.state is not LessonState.ASKING or character not in _ANSWER_KEYS:
+        """Answer the question by a number key; return whether the lesson has used the key.
+
+        While no question is open, the keys of answers do nothing: pressed too late or twice, they would switch
+        layers and leave the lesson. During a task they switch layers, which does not leave it.
+        """
+        player = self.shown
+        if player is None or player.state is LessonState.TASK or character not in _ANSWER_KEYS:
             return False
-        player.reply(int(character))
+        if player.state is LessonState.ASKING:
+            player.reply(int(character))
+        else:
+            self._viewer.show_message("no question is open")
         return True
 
     def click(self, pixel: tuple[int, int]) -> bool:
