@@ -14,6 +14,7 @@ from driven_window import Driver, open_viewer
 
 from robocov_app.toolkit.window.input import COMMAND_EVENT
 from robocov_app.viewer.lessons.player import LessonPlayer, LessonState
+from robocov_app.viewer.window.status import suggest_actions
 
 RATIO = 2.0
 PORTRAIT = (780, 1584)
@@ -151,6 +152,32 @@ def test_a_whole_lesson_is_done_by_taps_alone(phone: Driver) -> None:
     assert len(player.first_answers) == sum(
         chapter.question is not None for chapter in player.lesson.chapters
     )
+
+
+def test_hints_on_a_phone_name_buttons_instead_of_keys(upright_phone: Driver) -> None:
+    phone = upright_phone
+    run_page_command(phone, "tour")
+    player = get_player(phone)
+    messages = []
+    while player.state is not LessonState.ASKING:
+        player.skip(1)
+    run_page_command(phone, "pause")
+    messages.append(phone.viewer.message)
+    player.reply(1)
+    while player.state is not LessonState.ENDED:
+        player.advance(1.0)
+        phone.viewer.session.playback.step()
+    run_page_command(phone, "pause")
+    messages.append(phone.viewer.message)
+    run_page_command(phone, "cancel")
+    messages.append(phone.viewer.message)
+    assert messages == [
+        "Answer first: tap your answer",
+        "This chapter stays until you tap Next",
+        "The lesson has ended; Lesson plays it again",
+    ]
+    phone.viewer.session.timeline.is_settled = True
+    assert suggest_actions(phone.viewer).startswith("The team has settled. Try:\ndraw a wall in a doorway · ")
 
 
 def test_answers_are_large_enough_for_fingers(upright_phone: Driver) -> None:

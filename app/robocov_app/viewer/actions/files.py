@@ -10,6 +10,7 @@ from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
+from robocov_app.viewer.key_hints import explain_lesson_start, explain_pause, explain_recovery
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.files.session_file import SUFFIX, load_session, save_session
 from robocov_app.viewer.session.files.workspace import (
@@ -21,7 +22,6 @@ from robocov_app.viewer.session.files.workspace import (
 from robocov_app.viewer.session.session import Session
 
 MAX_RECENT_FILES = 9
-_KEPT_SESSION_HINT = "Your unsaved session is kept: Ctrl+Shift+O opens it."
 
 
 class FileActions:
@@ -216,11 +216,11 @@ class FileActions:
         self._add_recent(path)
         hints: list[str] = []
         if saved.lesson is not None:
-            hints.append("F2 plays its lesson.")
+            hints.append(explain_lesson_start(self._viewer.view))
         else:
-            hints.append(self._describe_pause())
+            hints.append(explain_pause(self._viewer.view))
         if keeps_draft:
-            hints.append(_KEPT_SESSION_HINT)
+            hints.append(self._describe_kept_session())
         message = f"session opened: {path}"
         if hints:
             message += f". {' '.join(hints)}"
@@ -236,16 +236,14 @@ class FileActions:
         seconds = self._viewer.session.playback.seek_seconds
         workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seconds)
         keeps_draft = self._replace_workspace(workspace, view)
-        message = f"recovered: {describe_draft(draft)}. {self._describe_pause()}"
+        message = f"recovered: {describe_draft(draft)}. {explain_pause(self._viewer.view)}"
         if keeps_draft:
-            message += f" {_KEPT_SESSION_HINT}"
+            message += f" {self._describe_kept_session()}"
         return message
 
-    def _describe_pause(self) -> str:
-        """Return a hint that an opened session is paused, and how to play it."""
-        if self._viewer.view.is_compact:
-            return "It is paused: tap Play to continue."
-        return "It is paused: press Space or Play to continue."
+    def _describe_kept_session(self) -> str:
+        """Return a hint that the session before the opened one is kept as a draft."""
+        return f"Your unsaved session is kept: {explain_recovery(self._viewer.view)}"
 
     def _add_recent(self, path: Path) -> None:
         name = str(path.absolute())

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
+from robocov_app.viewer.key_hints import explain_lesson_repetition, explain_recovery, explain_staying
 from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.maps import find_bundled_name
@@ -34,7 +35,6 @@ _DEFAULT_NEXT_STEPS = (
     "Let a robot fail (D), and watch its neighbors.",
     "Compare two controllers on a map of your own (K).",
 )
-_DRAFT_MESSAGE = "What you have changed is kept: Ctrl+Shift+O opens it."
 BASE_LAYERS = frozenset(
     {
         "cells",
@@ -423,16 +423,20 @@ class LessonPlayer:
             self._workspace.ignore_edits()
         return self._workspace.close()
 
+    def _describe_draft(self) -> str:
+        """Return a hint that the user's edits after taking over are kept as a draft."""
+        return f"What you have changed is kept: {explain_recovery(self._viewer.view)}"
+
     def end(self) -> None:
         """End the lesson, and restore the session from before it."""
         viewer = self._viewer
         keeps_draft = self._close_workspace()
         self._suspended.restore()
-        message = "the lesson has ended; F2 plays it again"
+        message = f"the lesson has ended; {explain_lesson_repetition(viewer.view)}"
         if self._suspended.has_work:
             message = "the lesson has ended; your session from before is back"
         if keeps_draft:
-            message += f". {_DRAFT_MESSAGE}"
+            message += f". {self._describe_draft()}"
         viewer.show_message(message)
         self._fit_view()
         self.is_done = True
@@ -442,7 +446,7 @@ class LessonPlayer:
         self.is_held = not self.is_held
         self.session.playback.is_playing = False
         if self.is_held:
-            return "this chapter stays until Space or →"
+            return explain_staying(self._viewer.view)
         return "on to the next chapter"
 
     def _enter_state(self, state: LessonState) -> None:
@@ -462,7 +466,7 @@ class LessonPlayer:
         self._viewer.files.workspace = self._workspace
         _show_start(self._viewer, self.session, self.chapter)
         if keeps_draft:
-            self._viewer.show_message(_DRAFT_MESSAGE)
+            self._viewer.show_message(self._describe_draft())
         self._fit_view()
         if self.chapter.question is None:
             self._enter_state(LessonState.PLAYING)

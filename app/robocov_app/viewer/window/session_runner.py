@@ -1,6 +1,7 @@
 """Advances the session of the window with real time, and reports why it stops."""
 
 from robocov.errors import RobocovError
+from robocov_app.viewer.key_hints import explain_record_end
 from robocov_app.viewer.model import ViewerModel, simplify_message
 
 STEP_RATE_WEIGHT = 0.1  # weight of the newest frame in the moving average of the step rate
@@ -67,4 +68,4 @@ class SessionRunner:
         if timeline.is_settled:
             viewer.show_message(f"settled at {viewer.session.displayed.time:.1f} s")
         elif timeline.is_at_record_end and timeline.is_live and not viewer.has_error_message:
-            viewer.show_message("the record ends here; Space continues by simulating")
+            viewer.show_message(explain_record_end(viewer.view))

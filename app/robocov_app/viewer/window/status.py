@@ -17,15 +17,15 @@ MIN_UNCOVERED_AREA_M2 = 0.05
 _MAX_SITE_DISTANCE = 1.5  # in lattice spacings: a point farther than this from all sites is not free
 
 _SUGGESTIONS = {
-    "obstacle": "draw a wall in a doorway (W)",
-    "hand": "drag a robot",
-    "failure": "let one fail (D)",
-    "pane": "compare controllers (K)",
-    "law": "change the controller (O)",
-    "density": "paint where it matters (G)",
-    "robot": "let one more join (A)",
+    "obstacle": ("draw a wall in a doorway", "W"),
+    "hand": ("drag a robot", ""),
+    "failure": ("let one fail", "D"),
+    "pane": ("compare controllers", "K"),
+    "law": ("change the controller", "O"),
+    "density": ("paint where it matters", "G"),
+    "robot": ("let one more join", "A"),
 }
-"""Suggestions to the user, by the kind of edit that they lead to."""
+"""Suggestions to the user, by the kind of edit that they lead to, each with its key."""
 
 
 def list_facts(
@@ -130,7 +130,11 @@ def suggest_actions(viewer: ViewerModel) -> str:
     tried = {node.kind for node in timeline.document.nodes}
     if len(timeline.panes) > 1:
         tried.add("pane")
-    suggestions = [text for kind, text in _SUGGESTIONS.items() if kind not in tried]
+    suggestions: list[str] = []
+    for kind, (text, key) in _SUGGESTIONS.items():
+        if kind not in tried:
+            has_key = bool(key) and not viewer.view.is_compact
+            suggestions.append(f"{text} ({key})" if has_key else text)
     if not suggestions:
         return ""
     return f"The team has settled. Try:\n{' · '.join(suggestions[:MAX_SUGGESTIONS])}"

@@ -1,0 +1,52 @@
+"""Hints on how to continue: by a key at a computer, by a button of the page on a phone."""
+
+from robocov_app.viewer.view import ViewState
+
+
+def explain_pause(view: ViewState) -> str:
+    """Return a hint that an opened session is paused."""
+    if view.is_compact:
+        return "It is paused: tap Play to continue."
+    return "It is paused: press Space or Play to continue."
+
+
+def explain_recovery(view: ViewState) -> str:
+    """Return a hint on how to open unsaved work that is kept."""
+    if view.is_compact:
+        return "More, Commands, Recover a session opens it."
+    return "Ctrl+Shift+O opens it."
+
+
+def explain_lesson_start(view: ViewState) -> str:
+    """Return a hint on how to play the lesson of an opened file."""
+    if view.is_compact:
+        return "Lesson plays its lesson."
+    return "F2 plays its lesson."
+
+
+def explain_lesson_repetition(view: ViewState) -> str:
+    """Return a hint on how to play a lesson again that has ended."""
+    if view.is_compact:
+        return "Lesson plays it again"
+    return "F2 plays it again"
+
+
+def explain_answering(view: ViewState) -> str:
+    """Return a hint on how to answer the question of a lesson."""
+    if view.is_compact:
+        return "answer first: tap your answer"
+    return "answer first: press the number of your answer, or click it"
+
+
+def explain_staying(view: ViewState) -> str:
+    """Return a hint on how to continue after a chapter of a lesson that stays."""
+    if view.is_compact:
+        return "this chapter stays until you tap Next"
+    return "this chapter stays until Space or →"
+
+
+def explain_record_end(view: ViewState) -> str:
+    """Return a hint on how to simulate beyond the end of a record."""
+    if view.is_compact:
+        return "the record ends here; Play continues by simulating"
+    return "the record ends here; Space continues by simulating"
