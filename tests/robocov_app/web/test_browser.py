@@ -1,11 +1,14 @@
 """Served windows in a real browser: input, passing of control, phones, and saved files."""
 
+import io
 import json
 import time
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
+import pygame
 import pytest
 from driven_browser import CHROMIUM, DRIVER, Browser
 from served_window import serve_window
@@ -19,6 +22,10 @@ MAPS = Path(__file__).parents[3] / "maps"
 ENTER = "\ue007"
 DOWNLOADS_HEIGHT = 32
 """Height of the bar of saved files on pages without touch, CSS px."""
+STRIP_PX = 4
+"""Width of the strips next to a covered part of the page in which nothing of it may show."""
+MAX_NOISE = 6
+"""Maximum difference of the colors of an empty area, which the compression of pictures causes."""
 MAX_EDITS = 10
 """Maximum number of edits that a test of the editor undoes at its end."""
 EMPTY_MAP = json.dumps(
@@ -411,6 +418,45 @@ def test_answers_of_a_lesson_are_plain_text_on_pages_that_watch(browser, tmp_pat
         assert height == browser.run_script("return arguments[0].scrollHeight", answers), "all is visible"
         teacher.pass_control(2)
         browser.wait_until(lambda: not answers.is_displayed())
+
+
+@pytest.mark.parametrize("size", [(1000, 640), (1137, 701), (1700, 1000)])
+def test_nothing_of_the_answers_shows_on_pages_that_watch_in_another_size(browser, tmp_path, size):
+    browser.resize(*size)
+    with (
+        serve_window("demo", "--tour", "--folder", str(tmp_path)) as link,
+        connect_page(link) as teacher,
+    ):
+        teacher.report_page(1280, 720)
+        browser.driver.get(read_watch_link(link))
+        browser.wait_until(lambda: browser.find("#spectator").is_displayed())
+        answers = browser.find("#answers")
+        for _ in range(2):  # The third chapter asks a question.
+            teacher.press_key("ArrowRight")
+        browser.wait_until(answers.is_displayed)
+        assert measure_contrast_around_answers(browser) <= MAX_NOISE
+        browser.run_script("arguments[0].style.visibility = 'hidden'", answers)
+        assert measure_contrast_around_answers(browser, inset=8) > MAX_NOISE, "the picture has frames there"
+
+
+def measure_contrast_around_answers(browser, inset=0):
+    """Return the maximum difference of colors in narrow strips to the left, to the right and below answers.
+
+    With an inset, the strips are that many pixels further inside.
+    """
+    left, top, width, height = map(round, browser.measure("#answers"))
+    screenshot = pygame.image.load(io.BytesIO(browser.driver.get_screenshot_as_png()))
+    inner = pygame.Rect(left, top, width, height).inflate(-2 * inset, -2 * inset)
+    strips = (
+        pygame.Rect(inner.left - STRIP_PX, inner.top, STRIP_PX, inner.height),
+        pygame.Rect(inner.right, inner.top, STRIP_PX, inner.height),
+        pygame.Rect(inner.left, inner.bottom, inner.width, STRIP_PX),
+    )
+    contrasts = []
+    for strip in strips:
+        pixels = pygame.surfarray.array3d(screenshot.subsurface(strip)).astype(int)
+        contrasts.append(int(np.ptp(pixels.reshape(-1, 3), axis=0).max()))
+    return max(contrasts)
 
 
 def test_a_request_for_control_is_visible_above_the_invitation(browser, tmp_path):
