@@ -22,7 +22,7 @@ from robocov_app.toolkit.window.display import (
     prefers_reduced_motion,
 )
 from robocov_app.toolkit.window.exceptions import ExceptionLog
-from robocov_app.toolkit.window.layout import MIN_SIZE_PX
+from robocov_app.toolkit.window.layout import MIN_SIZE_PX, explain_reduced_scale
 from robocov_app.toolkit.window.window_settings import WindowSettings, limit_window_size
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.messages import NO_DISPLAY
@@ -176,14 +176,19 @@ class ViewerLauncher:
         except BaseException:
             costs.close()
             raise
-        if self.scale is not None and window.layout.scale < self.scale:
-            width = round(MIN_SIZE_PX[0] * self.scale)
-            height = round(MIN_SIZE_PX[1] * self.scale)
-            viewer.show_message(
-                f"scale {self.scale:g} needs a window of {width} × {height}; using {window.layout.scale:g}"
-            )
+        if not self.served:  # In a browser, the page chooses the scale.
+            self._report_scale(window)
         window.panel.show_tab(settings.tab)
         return window
+
+    def _report_scale(self, window: ViewerWindow) -> None:
+        """Report if the window is too small for the requested scale; a dialog may cover its message."""
+        message = explain_reduced_scale(self.scale, window.screen.get_size())
+        if not message:
+            return
+        echo(f"robocov: {message}", to_stderr=True)
+        if not self.headless:
+            window.viewer.show_message(message)
 
     def _build_presenter(self, costs: Costs, settings: ViewerSettings) -> Presenter:
         """Build the state of the window from the settings and the options that override them."""

@@ -240,9 +240,15 @@ def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def open_launched_editor(
-    folder: Path, path: Path | None = None, **more: object
+    folder: Path, path: Path | None = None, scale: float = 1.0, **more: object
 ) -> AbstractContextManager[EditorWindow]:
-    return EditorLauncher(path, folder, size=(900, 600), scale=1.0, **more).window()
+    return EditorLauncher(path, folder, size=(900, 600), scale=scale, **more).window()
+
+
+def test_a_scale_for_which_the_window_is_too_small_is_reported(folders: Path, capsys) -> None:
+    with open_launched_editor(folders, scale=1.5) as window:
+        assert window.editor.message == "Scale 1.5 needs a window of 1350 × 900; using 1"
+    assert capsys.readouterr().err == "robocov: scale 1.5 needs a window of 1350 × 900; using 1\n"
 
 
 def test_settings_are_remembered(folders: Path) -> None:

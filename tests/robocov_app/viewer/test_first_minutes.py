@@ -258,15 +258,27 @@ def test_the_lesson_is_not_offered_with_a_file(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_a_scale_enlarges_the_window_or_is_reduced_with_a_message(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(opening, "fit_to_screen", lambda size: (min(size[0], 1500), min(size[1], 1000)))
     with build_visible_launcher(monkeypatch, tmp_path, scale=1.5).window() as window:
         assert window.layout.scale == 1.5
         assert window.screen.get_size() == (1350, 900)
+    assert capsys.readouterr().err == ""
     with build_visible_launcher(monkeypatch, tmp_path, scale=2.0).window() as window:
         assert window.layout.scale == 1.625
         assert window.viewer.message == "Scale 2 needs a window of 1800 × 1200; using 1.625"
+    # A dialog may cover the message in the window.
+    assert capsys.readouterr().err == "robocov: scale 2 needs a window of 1800 × 1200; using 1.625\n"
+
+
+def test_frames_without_a_display_do_not_show_that_the_scale_is_reduced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    launcher = ViewerLauncher(start_session(RAPF), "hall", tmp_path, size=(1280, 720), scale=1.5, headless=True)
+    with launcher.window() as window:
+        assert window.viewer.message == ""
+    assert capsys.readouterr().err == "robocov: scale 1.5 needs a window of 1350 × 900; using 1.125\n"
 
 
 def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:

@@ -94,3 +94,16 @@ def test_the_start_page_is_visible_before_the_viewer_is_prepared(
     with StartLauncher("light", (900, 600), 1.0, tmp_path) as start:
         assert start.choose() is None
     assert steps == ["drawn", "preparation starts", "answers"]
+
+
+def test_the_start_page_reports_that_it_is_too_small_for_the_scale(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setenv("DISPLAY", ":0")
+    messages = []
+    monkeypatch.setattr(StartPage, "run", lambda page: messages.append(page.model.message))
+    monkeypatch.setattr(Preparation, "start", lambda preparation: None)
+    with StartLauncher("light", (1280, 720), 1.5, tmp_path) as start:
+        start.choose()
+    assert messages == ["Scale 1.5 needs a window of 1350 × 900; using 1.125"]

@@ -28,9 +28,11 @@ from robocov_app.storage.settings import (
     load_settings,
     save_changed_settings,
 )
+from robocov_app.terminal.output import echo
 from robocov_app.toolkit.dialogs import create_recovery_question
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.window.exceptions import ExceptionLog
+from robocov_app.toolkit.window.layout import explain_reduced_scale
 from robocov_app.toolkit.window.window_settings import limit_window_size
 
 NO_DISPLAY = (
@@ -156,10 +158,19 @@ class EditorLauncher:
         window.guard.log = ExceptionLog(drafts)
         window.guard.is_enabled = not self.headless
         window.panel.show_tab(settings.tab)
+        if not self.served:  # In a browser, the page chooses the scale.
+            self._report_scale(window)
         if editor.document.path is not None:
             window.documents.remember(editor.document.path)
         offer_recovery(window, find_recoverable(drafts))
         return window
+
+    def _report_scale(self, window: EditorWindow) -> None:
+        """Report if the window is too small for the requested scale; a dialog may cover its message."""
+        message = explain_reduced_scale(self.scale, window.screen.get_size())
+        if message:
+            echo(f"robocov: {message}", to_stderr=True)
+            window.editor.show_message(message)
 
     def _choose_size(self, settings: EditorSettings) -> tuple[int, int]:
         """Return the size of the window, px: the given size, or the saved size limited to the display."""

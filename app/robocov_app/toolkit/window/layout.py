@@ -318,6 +318,29 @@ def find_max_scale(size: tuple[int, int], *, is_compact: bool = False) -> float:
     return max(scale, _MIN_SCALE)
 
 
+def explain_reduced_scale(requested: float | None, size: tuple[int, int]) -> str:
+    """Return a message that a window is too small for the requested scale; empty if it is large enough.
+
+    Parameters
+    ----------
+    requested : float or None
+        The requested scale; None for any scale.
+    size : (width, height), px
+        Size of the window.
+
+    Returns
+    -------
+    str
+    """
+    max_scale = find_max_scale(size)
+    if requested is None or requested <= max_scale:
+        return ""
+    min_width, min_height = MIN_SIZE_PX
+    width = round(min_width * requested)
+    height = round(min_height * requested)
+    return f"scale {requested:g} needs a window of {width} × {height}; using {max_scale:g}"
+
+
 def is_inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
     """Return whether a pixel is in a box."""
     left, top, width, height = box

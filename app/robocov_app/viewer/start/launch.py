@@ -8,6 +8,7 @@ from typing import Self
 
 from robocov_app.storage.settings import find_settings_file, load_settings
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
+from robocov_app.toolkit.window.layout import explain_reduced_scale
 from robocov_app.toolkit.window.window_settings import WindowSettings
 from robocov_app.viewer.messages import NO_DISPLAY
 from robocov_app.viewer.start.cards import StartChoice
@@ -91,7 +92,8 @@ class StartLauncher:
             folder=self._folder,
             can_open_viewer=lambda: self._preparation.is_ready,
         )
-        page.model.show_message(message or self._message, is_error=bool(message))
+        reduced_scale = explain_reduced_scale(self._requested_scale, page.screen.get_size())
+        page.model.show_message(message or self._message or reduced_scale, is_error=bool(message))
         if not self._has_started:
             # The page is visible by now; importing the viewer would have delayed it.
             self._has_started = True
