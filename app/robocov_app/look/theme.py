@@ -30,7 +30,7 @@ class Theme:
         Colors behind maps and curves, and behind the controls of windows.
     ink, faint : Color
         Colors of primary and of secondary texts.
-    grid, boundary, obstacle, obstacle_edge, cell_edge, robot_ring, velocity, unreached : Color
+    grid, boundary, obstacle, obstacle_edge, cell_edge, robot_ring, velocity, unreached, warning : Color
         Colors of these elements. `unreached` is free space that no robot can reach.
     start, final, trajectory : Color
         The article's green, blue and red.
@@ -78,6 +78,7 @@ class Theme:
     robots: tuple[Color, ...]
     heat: tuple[Color, ...]
     unreached: Color
+    warning: Color
     density: Color
     density_strength: float
     fine_grid_share: float
@@ -102,14 +103,9 @@ class Theme:
         return self.trajectory
 
     @property
-    def warning(self) -> Color:
-        """Color of warnings."""
-        return self.others[1]
-
-    @property
     def cut_off(self) -> Color:
         """Color of the hatching on areas that no robot can reach from the start."""
-        return self.forces["repulsion_robots"]
+        return self.others[0]
 
     @property
     def moving_obstacle(self) -> Color:
@@ -180,6 +176,7 @@ _COLORS = {
     "trajectory": ("D62222", "FF6B63"),
     "velocity": ("1F5FE0", "5B9BFF"),
     "unreached": ("E3DED4", "332E28"),
+    "warning": ("B86A00", "FFC04D"),
     "density": ("B4550A", "FFB45A"),
 }
 _CONTROLLERS = {

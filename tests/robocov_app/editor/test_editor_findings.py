@@ -12,7 +12,7 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.canvas.canvas import list_map_facts
 from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.look.theme import DARK, LIGHT
+from robocov_app.look.theme import DARK, LIGHT, Theme
 from robocov_app.toolkit.sentence_case import to_sentence_case
 
 NARROW = (WallObstacle(((0, 5), (4.9, 5)), 0.1), WallObstacle(((5.05, 5), (10, 5)), 0.1))
@@ -38,17 +38,18 @@ def draw_without_message(driver: EditorDriver) -> np.ndarray:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Path, theme: str) -> None:
-    red = (LIGHT if theme == "light" else DARK).trajectory
+    amber = (LIGHT if theme == "light" else DARK).warning
     with open_editor(tmp_path, build_sheet(*NARROW), theme=theme) as driver:
+        driver.press_key("alt+5")  # The badge of the warning has the same color.
         measurement = driver.editor.measurement
         assert measurement.gap.width == pytest.approx(0.15) and not measurement.impassable.is_empty
         at = driver.find_pixel((4.975, 5))
-        assert count_pixels(draw_without_message(driver), at, red, 6) > 15
+        assert count_pixels(draw_without_message(driver), at, amber, 6) > 15
         driver.run_command("radius 0.05")
-        assert count_pixels(draw_without_message(driver), at, red, 6) == 0
+        assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
         driver.run_command("radius 0.1")
         driver.press_key("alt+1")
-        assert count_pixels(draw_without_message(driver), at, red, 6) == 0
+        assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
 
 
 def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:
@@ -80,6 +81,29 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         assert driver.editor.problem is problems[-1]
         point = problems[-1].geometry.representative_point()
         assert driver.window.canvas.contains(driver.find_pixel((point.x, point.y)))
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_warnings_differ_from_errors_in_color_and_shape(tmp_path: Path, theme: Theme) -> None:
+    shapes = []
+    with open_editor(tmp_path, build_sheet(CROSSED, CircleObstacle((30, 30), 1.0)), theme=theme.name) as driver:
+        driver.window.canvas.fit()
+        driver.run_frames(1)
+        picture = draw_without_message(driver)
+        for color, other_color in ((theme.error, theme.warning), (theme.warning, theme.error)):
+            problems = driver.editor.problems
+            (problem,) = [problem for problem in problems if problem.is_error is (color == theme.error)]
+            point = problem.geometry.representative_point()
+            x, y = driver.find_pixel((point.x, point.y))
+            badge = (x, y - STEM_PX)
+            assert count_pixels(picture, badge, color, 7) > 40
+            assert count_pixels(picture, badge, other_color, 7) < 3
+            upper_half = count_pixels(picture, (x, y - STEM_PX - 5), color, 3)
+            lower_half = count_pixels(picture, (x, y - STEM_PX + 5), color, 3)
+            shapes.append(lower_half / upper_half)
+    disc, triangle = shapes
+    assert disc < 1.2
+    assert triangle > 1.3, "the triangle is wider at its lower side"
 
 
 def test_the_strip_shows_the_name_and_whether_it_is_a_draft(tmp_path: Path) -> None:

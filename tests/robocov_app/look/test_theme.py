@@ -65,7 +65,7 @@ class TestContrast:
         assert compute_contrast(choose_text_color(theme.obstacle), theme.obstacle) >= 4.5
 
     def test_marks_and_curves_stand_out_on_the_background(self, theme):
-        colors = [theme.start, theme.final, theme.trajectory, theme.others[0], theme.velocity]
+        colors = [theme.start, theme.final, theme.trajectory, theme.others[0], theme.velocity, theme.warning]
         colors += [*theme.controllers.values(), *theme.forces.values()]
         for color in colors:
             assert compute_contrast(color, theme.background) >= 3.0

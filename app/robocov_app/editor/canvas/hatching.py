@@ -51,7 +51,7 @@ def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] 
         areas.append(_HatchedArea(cut_off, view.theme.cut_off, CUT_OFF_STRENGTH))
     if not measurement.impassable.is_empty:
         impassable = build_outline(measurement.impassable)
-        areas.append(_HatchedArea(impassable, view.theme.error, 1.0))
+        areas.append(_HatchedArea(impassable, view.theme.warning, 1.0))
     if not areas:
         return None
     bounds = total_bounds([area.outline.geometry for area in areas])

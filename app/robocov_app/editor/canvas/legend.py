@@ -91,7 +91,7 @@ def _draw_robot(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _draw_narrow_area(canvas: Canvas, x: float, y: float) -> None:
-    _draw_hatching(canvas, x, y, canvas.theme.error)
+    _draw_hatching(canvas, x, y, canvas.theme.warning)
 
 
 def _draw_cut_off_area(canvas: Canvas, x: float, y: float) -> None:

@@ -68,6 +68,11 @@ CHOSEN_RING_GAP_PX = 4  # between a badge and the ring around the chosen one
 MESSAGE_GAP_PX = 10  # between a badge and its message to the right
 MESSAGE_RISE_PX = 14  # between a badge and its message above
 MESSAGE_EDGE_PX = 8  # between a message and the edge of the view
+WARNING_SIDE_RADII = 1.75  # side of the triangle of a warning, relative to the radius of a badge
+WARNING_HEIGHT_RADII = 1.55
+WARNING_TEXT_RADII = 1.5
+WARNING_TEXT_DROP_RADII = 0.18  # from the middle of the triangle down to that of its text
+WARNING_CORNER_PX = 1.5  # radius of the corners
 BADGE_RING_PX = 1.4
 SMALL_BADGE_RING_PX = 1.0
 
@@ -426,11 +431,11 @@ def draw_typed_text(canvas: Canvas, text: str, pixel: Point) -> None:
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap, in the color of errors if robots with a radius, m, do not fit through it."""
+    """Draw the narrowest gap, in the color of warnings if robots with a radius, m, do not fit through it."""
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.start
     if gap.width < 2 * radius:
-        color = canvas.theme.error
+        color = canvas.theme.warning
     # A line along the gap, and a short one across it at each end.
     for line_start, line_end in (
         (start, end),
@@ -568,11 +573,43 @@ def _draw_problem_message(canvas: Canvas, problem: Problem, badge: Point) -> Non
 
 
 def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: bool = False) -> None:
-    """Draw the badge of a problem, a disc with an exclamation mark, at a pixel."""
+    """Draw the badge of a problem at a pixel: an exclamation mark in a disc or, for a warning, a triangle."""
     theme = canvas.theme
     fill = get_problem_color(theme, is_error=is_error)
     colors = DiscColors(fill, theme.background, mix(fill, theme.ink, BADGE_EDGE_INK_SHARE))
-    if is_small:
-        draw_disc(canvas, (x, y), SMALL_BADGE_RADIUS_PX, colors, ring_width=SMALL_BADGE_RING_PX, text="!")
+    radius = SMALL_BADGE_RADIUS_PX if is_small else BADGE_RADIUS_PX
+    ring_width = SMALL_BADGE_RING_PX if is_small else BADGE_RING_PX
+    if is_error:
+        draw_disc(canvas, (x, y), radius, colors, ring_width=ring_width, text="!")
     else:
-        draw_disc(canvas, (x, y), BADGE_RADIUS_PX, colors, ring_width=BADGE_RING_PX, text="!")
+        _draw_warning_triangle(canvas, (x, y), radius, colors, ring_width)
+
+
+def _draw_warning_triangle(
+    canvas: Canvas, center: Point, radius: float, colors: DiscColors, ring_width: float
+) -> None:
+    """Draw a triangle with an exclamation mark; radius of its circumcircle and ring width in px at scale 1."""
+    x, y = center
+    scale = canvas.scale
+    side_px = WARNING_SIDE_RADII * radius * scale
+    height_px = WARNING_HEIGHT_RADII * radius * scale
+    corners = [
+        (x, y - height_px / 2),
+        (x + side_px / 2, y + height_px / 2),
+        (x - side_px / 2, y + height_px / 2),
+    ]
+    ring_px = ring_width * scale
+    sketch = sprites.Sketch.from_points(corners, WARNING_CORNER_PX * scale + 2 * ring_px)
+    if sketch is None:
+        return
+    outline = [*corners, corners[0]]
+    corner_px = 2 * WARNING_CORNER_PX * scale
+    # Round corners: a wide line around the triangle, in the colors of the edge, of the ring and of the inside.
+    sketch.draw_path(outline, colors.edge, corner_px + 4 * ring_px)
+    sketch.draw_path(outline, colors.ring, corner_px + 2 * ring_px)
+    sketch.draw_path(outline, colors.fill, corner_px)
+    sketch.fill_polygon(corners, colors.fill)
+    sketch.draw_on(canvas.surface)
+    text_y = y + WARNING_TEXT_DROP_RADII * radius * scale
+    size = WARNING_TEXT_RADII * radius
+    canvas.draw_text("!", (x, text_y), size=size, color=colors.ring, bold=True, anchor="middle")
