@@ -86,7 +86,9 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_warnings_differ_from_errors_in_color_and_shape(tmp_path: Path, theme: Theme) -> None:
     shapes = []
-    with open_editor(tmp_path, build_sheet(CROSSED, CircleObstacle((30, 30), 1.0)), theme=theme.name) as driver:
+    with open_editor(
+        tmp_path, build_sheet(CROSSED, CircleObstacle((30, 30), 1.0)), theme=theme.name
+    ) as driver:
         driver.window.canvas.fit()
         driver.run_frames(1)
         picture = draw_without_message(driver)

@@ -245,7 +245,9 @@ def test_drafts_are_offered_and_the_session_waits_for_the_answer(
             assert window.viewer.session.displayed.numbers == numbers
             is_recovered = key == pygame.K_r
             assert window.viewer.session.playback.is_playing is not is_recovered
-            says_how_to_play = window.viewer.message.endswith("It is paused: press Space or Play to continue.")
+            says_how_to_play = window.viewer.message.endswith(
+                "It is paused: press Space or Play to continue."
+            )
             assert says_how_to_play is is_recovered
             # After a draft was discarded, the next one is offered.
             assert (window.dialogs.current is not None) is (remaining_drafts == 1)
@@ -275,7 +277,9 @@ def test_a_scale_enlarges_the_window_or_is_reduced_with_a_message(
 def test_frames_without_a_display_do_not_show_that_the_scale_is_reduced(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    launcher = ViewerLauncher(start_session(RAPF), "hall", tmp_path, size=(1280, 720), scale=1.5, headless=True)
+    launcher = ViewerLauncher(
+        start_session(RAPF), "hall", tmp_path, size=(1280, 720), scale=1.5, headless=True
+    )
     with launcher.window() as window:
         assert window.viewer.message == ""
     assert capsys.readouterr().err == "robocov: scale 1.5 needs a window of 1350 × 900; using 1.125\n"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
 import pygame
 import pytest
+from driven_editor import EditorDriver, open_editor
 from driven_window import Driver, open_viewer
 
 from robocov_app.toolkit.commands import help_page
@@ -64,6 +66,22 @@ def test_all_keys_are_shown_in_readable_text(
                 title = command.title.partition(":")[0]
                 assert any(title.startswith(start) for start in starts), title
         assert min(drawn_texts.values()) >= MIN_TEXT_PX
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1920, 1080)])
+@pytest.mark.parametrize("open_window", [open_viewer, open_editor], ids=["viewer", "editor"])
+def test_no_title_is_shortened(
+    open_window: Callable[..., AbstractContextManager[Driver | EditorDriver]],
+    size: tuple[int, int],
+    tmp_path: Path,
+    drawn_texts: dict[str, int],
+) -> None:
+    with open_window(tmp_path, size=size) as driver:
+        driver.press_key("f1")
+        driver.press_key("end")
+        driver.press_key("home")
+    assert len(drawn_texts) > 100
+    assert [text for text in drawn_texts if len(text) > 1 and text.endswith("…")] == []
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (390, 844)])

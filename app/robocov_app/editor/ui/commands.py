@@ -144,7 +144,7 @@ def _build_file_group(
     group = EditorCommandGroup("File", editor)
     group.add("new", "New map", documents.new, "ctrl+n")
     group.add("open", "Open a map", ask_map, "ctrl+o")
-    group.add("recent", "Open a recent or bundled map", documents.ask_recent, "ctrl+shift+o")
+    group.add("recent", "Recent and bundled maps", documents.ask_recent, "ctrl+shift+o")
     group.add("save", "Save", documents.save, "ctrl+s")
     group.add("save:as", "Save as", documents.ask_name, "ctrl+shift+s")
     group.add("export", "Export to another format", documents.ask_export, "ctrl+e")
@@ -187,11 +187,11 @@ def _build_edit_group(editor: Editor, window: EditorWindowActions) -> EditorComm
     group.add("name", "Name the selection", window.edit_name, "f2")
     nudge = partial(actions.nudge, editor, 1)
     nudge_far = partial(actions.nudge, editor, FAR_STEPS)
-    group.add_arrows("{}", "Nudge by the grid (all arrows)", nudge, "{}")
-    group.add_arrows("{}:far", "Nudge ten times as far (all arrows)", nudge_far, "shift+{}")
+    group.add_arrows("{}", "Nudge (all arrows)", nudge, "{}")
+    group.add_arrows("{}:far", "Nudge ten times as far", nudge_far, "shift+{}")
     group.add("finish", "Finish drawing", finish, "return", "enter")
     remove_last = partial(actions.remove_last, editor)
-    group.add("back", "Remove the last point, or delete", remove_last, "backspace", repeats=True)
+    group.add("back", "Remove point, or delete", remove_last, "backspace", repeats=True)
     group.add("cancel", "Cancel; select nothing; close", partial(actions.cancel, editor), "escape")
     group.add("menu", "Context menu (right click)", window.open_menu, "menu", "shift+f10")
     return group
@@ -247,7 +247,7 @@ def _build_combine_group(editor: Editor) -> EditorCommandGroup:
     group.add_edit("subtract", "Subtract the upper ones", boolean.subtract, "alt+s")
     group.add_edit("intersect", "Keep their common area", boolean.intersect, "alt+i")
     group.add_edit("divide", "Divide", boolean.divide, "alt+d")
-    group.add("clip", "Cut off outside the boundary", clip, "alt+b")
+    group.add("clip", "Clip to the boundary", clip, "alt+b")
     group.add_edit("join", "Join walls end to end", vertices.join_walls, "alt+j")
     group.add_edit("polygons", "Convert to polygons", properties.convert_to_polygons, "alt+p")
     group.add_edit("boundary:of", "Make it the boundary", properties.convert_to_boundary)
@@ -267,14 +267,19 @@ def _build_vertex_group(editor: Editor, window: EditorWindowActions) -> EditorCo
     group.add("bevel", "Cut corners off", bevel, "shift+b")
     group.add("round", "Round corners", round_corners, "shift+r")
     group.add("split", "Cut a wall in two here", partial(actions.split_wall, editor), "shift+c")
-    group.add("extend", "Extend the wall to the cursor", partial(actions.extend_wall, editor), "shift+w")
+    group.add("extend", "Extend wall to the cursor", partial(actions.extend_wall, editor), "shift+w")
     group.add("fill", "Fill the hole", partial(actions.fill_hole, editor), "shift+f")
     group.add_edit(
         "simplify", "Remove redundant vertices", vertices.simplify, "shift+p", value=SIMPLIFY_TOLERANCE_M
     )
-    group.add_edit("straighten", "Straighten nearly level edges", vertices.straighten, "shift+l")
     group.add_edit(
-        "path:repeat", "Switch the path between a loop and back and forth", paths.toggle_repeat, "shift+o"
+        "straighten",
+        "Straighten edges: those that are nearly level or upright",
+        vertices.straighten,
+        "shift+l",
+    )
+    group.add_edit(
+        "path:repeat", "Close or open the path: a loop, or back and forth", paths.toggle_repeat, "shift+o"
     )
     group.add_edit("path:none", "Remove an obstacle's path", paths.remove_path, "alt+o")
     group.add("wider", "Wider walls", widen, "]", repeats=True)
@@ -287,7 +292,7 @@ def _build_grid_group(editor: Editor) -> EditorCommandGroup:
     group = EditorCommandGroup("Snap", editor)
     group.add("grid:finer", "Finer grid", editor.refine_grid, "-", repeats=True)
     group.add("grid:coarser", "Coarser grid", editor.coarsen_grid, "=", "+", repeats=True)
-    group.add("snap:all", "Snap to everything, or to nothing", editor.toggle_all_snaps, "0")
+    group.add("snap:all", "Snap to all or nothing", editor.toggle_all_snaps, "0")
     return group
 
 
@@ -313,11 +318,16 @@ def _build_view_group(
     group.add("panel", "Hide or show the panel", editor.toggle_panel, "h")
     group.add("tab", "Next page of the panel", window.show_next_tab, "ctrl+tab")
     group.add("fullscreen", "Full screen", window.toggle_fullscreen, "f11")
-    group.add("path:play", "Start or stop moving obstacles", partial(actions.toggle_motion, editor), "l")
+    group.add(
+        "path:play",
+        "Start or stop motions: of obstacles with a path",
+        partial(actions.toggle_motion, editor),
+        "l",
+    )
     show_next_problem = partial(actions.show_next_problem, editor)
     group.add("problem:next", "Go to the next problem", show_next_problem, "f8", "n", repeats=True)
     fix_problem = partial(actions.fix_problem, editor)
-    group.add("problem:fix", "Fix the problem that is shown", fix_problem, "shift+f8")
+    group.add("problem:fix", "Fix the shown problem", fix_problem, "shift+f8")
     return group
 
 
@@ -328,10 +338,10 @@ def _build_robot_group(editor: Editor) -> EditorCommandGroup:
         editor.apply(create.add_uniform_start(editor.sketch))
 
     group = EditorCommandGroup("Robots", editor)
-    group.add("start:uniform", "A start anywhere in the free space", add_uniform_start, "shift+u")
+    group.add("start:uniform", "Start anywhere: in the whole free space", add_uniform_start, "shift+u")
     group.add("start:next", "Select the next start", partial(actions.select_next_start, editor), "shift+n")
     make_default = partial(actions.make_default_start, editor)
-    group.add("start:default", "Make the selected start the default", make_default, "shift+d")
+    group.add("start:default", "Set as default start", make_default, "shift+d")
     group.add("more", "Add a robot", partial(editor.add_robots, 1), "shift+=", "shift++", repeats=True)
     group.add("fewer", "Remove a robot", partial(editor.add_robots, -1), "shift+-", repeats=True)
     return group

@@ -164,7 +164,7 @@ class FileCommands:
         def choose(option: Option) -> None:
             self.editor.carry_out(lambda: self.open(find_map_file(option.text)))
 
-        self.editor.dialogs.ask(create_list_choice("Open a recent or bundled map", lambda: options, choose))
+        self.editor.dialogs.ask(create_list_choice("Recent and bundled maps", lambda: options, choose))
 
     def open(self, path: Path) -> None:
         """Open a map, or import a file of another format. If the map is open already, it is reloaded.

@@ -108,7 +108,7 @@ def _list_file_commands(actions: ViewerWindowActions) -> list[Command]:
     group.add("screenshot", "Screenshot", actions.save_screenshot, "f12")
     group.add(
         "video",
-        "Start or stop recording a video",
+        "Start or stop a video",
         actions.toggle_recording,
         "f9",
         build_current_title=actions.describe_recording,
