@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pygame
@@ -13,7 +14,8 @@ import pytest
 from robocov.mapfile import load_map
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.commands.menu import Menu
-from robocov_app.viewer.canvas.layer_chips import build_layer_entries
+from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.viewer.canvas.layer_chips import build_layer_entries, measure_chip
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
 from robocov_app.viewer.session.session import Session
@@ -24,12 +26,12 @@ from robocov_app.viewer.window.window import ViewerWindow
 
 @contextmanager
 def open_window(
-    tmp_path: Path, *controllers: str, size: tuple[int, int] = (1280, 720)
+    tmp_path: Path, *controllers: str, size: tuple[int, int] = (1280, 720), n_frames: int = 10
 ) -> Iterator[ViewerWindow]:
     choices = tuple(ControllerChoice(name) for name in controllers or ("rapf",))
     session = Session(SessionScenario(load_map("square"), choices))
     with ViewerLauncher(session, "square", tmp_path, size=size, headless=True, lattice=32).window() as window:
-        for _ in range(10):
+        for _ in range(n_frames):
             window.run_frame(1 / 30)
         yield window
 
@@ -113,6 +115,22 @@ def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], pres
         assert all(first.right < second.left for first, second in itertools.pairwise(boxes))
         assert all(box.right <= left + width for _, box in window.layer_bar.rows)
         assert all(box.bottom <= size[1] for _, box in window.layer_bar.rows)
+
+
+@pytest.mark.parametrize("width", range(900, 1921, 75))
+@pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
+def test_no_chip_lacks_a_text_for_which_there_is_space(preset, width: int, tmp_path: Path) -> None:
+    with open_window(tmp_path, size=(width, 720), n_frames=1) as window:
+        window.do(f"preset:{preset.name}")
+        window.run_frame(1 / 30)
+        canvas = create_flat_canvas(window.screen, window.theme, window.layout.scale)
+        placed = window.layer_bar.chips
+        spaces = [second.left - first.right for (_, first), (_, second) in itertools.pairwise(placed)]
+        free_width = max(spaces) - min(spaces)
+        for chip, box in placed:
+            if not chip.has_text:
+                missing_width = measure_chip(canvas, replace(chip, has_text=True)) - box.width
+                assert missing_width > free_width, chip.command
 
 
 def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path) -> None:

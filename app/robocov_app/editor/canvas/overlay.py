@@ -588,7 +588,7 @@ def draw_badge(canvas: Canvas, x: float, y: float, *, is_error: bool, is_small: 
 def _draw_warning_triangle(
     canvas: Canvas, center: Point, radius: float, colors: DiscColors, ring_width: float
 ) -> None:
-    """Draw a triangle with an exclamation mark; radius of its circumcircle and ring width in px at scale 1."""
+    """Draw a triangle with an exclamation mark; radius of the badge and ring width in px at scale 1."""
     x, y = center
     scale = canvas.scale
     side_px = WARNING_SIDE_RADII * radius * scale
@@ -604,7 +604,7 @@ def _draw_warning_triangle(
         return
     outline = [*corners, corners[0]]
     corner_px = 2 * WARNING_CORNER_PX * scale
-    # Round corners: a wide line around the triangle, in the colors of the edge, of the ring and of the inside.
+    # Wide lines around the triangle, for the edge, for the ring and for the inside, have round corners.
     sketch.draw_path(outline, colors.edge, corner_px + 4 * ring_px)
     sketch.draw_path(outline, colors.ring, corner_px + 2 * ring_px)
     sketch.draw_path(outline, colors.fill, corner_px)

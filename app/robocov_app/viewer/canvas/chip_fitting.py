@@ -29,8 +29,8 @@ def fit_chips(
 
     Symbols that need no explanation are left out first, then a button replaces the presets. Then the chips of
     standard layers lose their texts and are left out, from the last one, so that symbols that are new to the
-    user keep their texts. Everything that is left out is also in the menu of layers, and chips without text
-    have a tip.
+    user keep their texts. Texts that fit into the space that is left return. Everything that is left out is
+    also in the menu of layers, and chips without text have a tip.
 
     Parameters
     ----------
@@ -55,7 +55,8 @@ def fit_chips(
     *_, unknown_symbols = _drop_known_symbols(chips)
     for remaining in _shorten(unknown_symbols, standard_commands):
         if fits([*remaining, *button]):
-            return FittedChips(remaining, button)
+            shown = _restore_texts(remaining, lambda chips: fits([*chips, *button]))
+            return FittedChips(shown, button)
     return FittedChips([], button)
 
 
@@ -66,6 +67,19 @@ def _drop_known_symbols(chips: Sequence[Chip]) -> Iterator[list[Chip]]:
     for name in _DROPPED_FIRST:
         remaining = [chip for chip in remaining if chip.command != f"layer:{name}"]
         yield remaining
+
+
+def _restore_texts(chips: Sequence[Chip], fits: Callable[[Sequence[Chip]], bool]) -> list[Chip]:
+    """Give chips without texts their texts again, from the first one, as long as the bar has space.
+
+    A long text may have been left out last, so that shorter ones fit into its place.
+    """
+    shown = list(chips)
+    for index, chip in enumerate(chips):
+        candidate = [*shown[:index], replace(chip, has_text=True), *shown[index + 1 :]]
+        if fits(candidate):
+            shown = candidate
+    return shown
 
 
 def _shorten(chips: Sequence[Chip], standard_commands: set[str]) -> Iterator[list[Chip]]:

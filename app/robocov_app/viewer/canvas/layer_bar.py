@@ -37,8 +37,8 @@ PRESETS_COMMAND = "presets"
 """Command that opens the menu of the presets."""
 
 # Lengths in pixels at scale 1.
-_MARGIN_PX = 10.0
-_CHIP_GAP_PX = 5.0
+_MARGIN_PX = 8.0
+_CHIP_GAP_PX = 4.0
 _FOCUS_MARGIN_PX = 3.0  # between a chip and the ring around it
 _MENU_COLUMN_PX = 192.0
 _MIN_MENU_COLUMN_PX = 158.0

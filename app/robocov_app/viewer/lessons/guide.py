@@ -177,8 +177,8 @@ class LessonGuide:
     def handle_key(self, character: str) -> bool:
         """Answer the question by a number key; return whether the lesson has used the key.
 
-        While no question is open, the keys of answers do nothing: pressed too late or twice, they would switch
-        layers and leave the lesson. During a task they switch layers, which does not leave it.
+        While no question is open, the keys of answers do nothing: pressed too late or twice, they would
+        switch layers and leave the lesson. During a task they switch layers, which does not leave it.
         """
         player = self.shown
         if player is None or player.state is LessonState.TASK or character not in _ANSWER_KEYS:
