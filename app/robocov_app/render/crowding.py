@@ -87,6 +87,11 @@ def fit_mark_size(points: FloatArray, low: float, high: float) -> float:
     return float(np.clip(np.median(distances), low, high))
 
 
+def measure_spacing(points: FloatArray) -> float:
+    """Return the median distance of points to their nearest neighbors; inf for fewer than two points."""
+    return fit_mark_size(points, 0.0, np.inf)
+
+
 def select_spaced_rows(points: FloatArray, spacing: float) -> list[int]:
     """Select points, in their order, that are at least `spacing` from all selected ones.
 

@@ -117,6 +117,9 @@ class Scene:
         Rows of the robots in the memory of the controller, which may contain further robots; by default
         0 to n - 1.
     contacts : Contacts or None
+    spacing : float or None, m
+        Distance between neighbors that decides on the size of all discs, so that several scenes next to each
+        other have discs of the same size; by default that of the robots of this scene.
     """
 
     environment: Environment
@@ -144,6 +147,7 @@ class Scene:
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
     memory_rows: IntArray | None = None
     contacts: Contacts | None = None
+    spacing: float | None = None
 
     def get_failed_radius(self, number: int) -> float:
         """Return the radius of a failed robot, m; if it is unknown, that of the first working robot."""

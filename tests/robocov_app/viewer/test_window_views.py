@@ -9,6 +9,8 @@ import pytest
 from driven_window import MIDDLE, Driver, open_viewer
 from sample_sessions import RAPF, RPF
 
+from robocov_app.render.crowding import measure_spacing
+from robocov_app.render.layers.robots import compute_drawn_radii
 from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 # time line
@@ -145,3 +147,17 @@ def test_panes_share_the_camera(tmp_path: Path) -> None:
         assert first.camera.zoom == second.camera.zoom
         assert first.camera.center == second.camera.center
         assert np.allclose(driver.window.canvas.to_world(driver.pixel, 1), MIDDLE, atol=0.02)
+
+
+def test_robots_have_the_same_size_in_all_panes(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, RAPF, RPF, size=(1280, 720)) as driver:
+        driver.viewer.session.playback.is_playing = True
+        driver.run_frames(60)
+        canvas = driver.window.canvas
+        radii = set()
+        for pane, scene in enumerate(canvas.scenes):
+            pane_canvas = canvas._build_canvas(driver.window.screen, pane, scene)
+            radii |= set(compute_drawn_radii(pane_canvas, scene).tolist())
+        positions = [scene.now.positions for scene in canvas.scenes]
+        assert measure_spacing(positions[0]) != pytest.approx(measure_spacing(positions[1]))
+        assert len(radii) == 1

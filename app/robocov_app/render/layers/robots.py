@@ -11,7 +11,7 @@ from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry, Sprite
-from robocov_app.render.crowding import fit_radii, is_crowd, round_to_half
+from robocov_app.render.crowding import fit_radii, is_crowd, measure_spacing, round_to_half
 from robocov_app.render.layers.layer import build_legend
 from robocov_app.render.scene import Scene
 
@@ -64,6 +64,7 @@ def compute_drawn_radii(canvas: Canvas, scene: Scene) -> FloatArray:
     """Compute the radii at which robots are drawn.
 
     Discs are large enough for readable numbers. In a crowd they are smaller, but never below the true radius.
+    Robots of the same radius have discs of the same size.
 
     Parameters
     ----------
@@ -83,10 +84,18 @@ def compute_drawn_radii(canvas: Canvas, scene: Scene) -> FloatArray:
 def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> FloatArray:
     if scene.snapshot is None:
         return np.empty(0)
-    centers = camera.to_pixels(scene.snapshot.positions)
     true_radii = scene.team.radius * camera.zoom
-    radii = fit_radii(centers, true_radii, MIN_RADIUS_PX * scale, READABLE_RADIUS_PX * scale)
+    radii = np.maximum(true_radii, _compute_readable_radius(scene, camera, scale))
     return np.asarray(round_to_half(np.minimum(radii, _MAX_RADIUS_PX)))
+
+
+def _compute_readable_radius(scene: Scene, camera: Camera, scale: float) -> float:
+    """Return the radius of the discs of robots that are not larger, px; about half of them do not overlap."""
+    spacing = scene.spacing
+    if spacing is None:
+        spacing = measure_spacing(scene.now.positions)
+    half_spacing_px = 0.5 * spacing * camera.zoom
+    return float(np.clip(half_spacing_px, MIN_RADIUS_PX * scale, READABLE_RADIUS_PX * scale))
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:

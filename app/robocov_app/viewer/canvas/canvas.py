@@ -1,5 +1,6 @@
 """The canvas: a painted pane for each controller, one camera for all panes, and overlays of tools."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from robocov_app.look.colors import mix
 from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import Theme
 from robocov_app.render.canvas import Canvas
+from robocov_app.render.crowding import measure_spacing
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.layers.robots import compute_drawn_radii
@@ -174,27 +176,33 @@ class ViewerCanvas:
         """Draw all panes."""
         session = self.viewer.session
         self._adopt_environment()
-        self._scenes = []
         panes = session.timeline.panes
+        scenes = []
         # A pane that was just added has no painter and no box in the layout yet.
-        for pane, painter, box in zip(panes, self._painters, self.layout.panes, strict=False):
-            # The caption of a pane is always visible.
-            fixed_layers = {"caption"}
-            if not self._has_controls:
-                fixed_layers.add("status")
-            fixed_layers &= {layer.name for layer in painter.layers}
-            painter.visible = self.viewer.view.layers | fixed_layers
-            painter.top_strip = 0.0
-            has_layer_bar = self._has_controls and "legend" in self.viewer.view.layers
-            if len(panes) == 1 and has_layer_bar:
-                painter.top_strip = BAR_HEIGHT_PX + _BAR_GAP_PX
-            scene = self._scene_builder.build(pane, painter)
+        for pane, painter in zip(panes, self._painters, strict=False):
+            self._choose_visible_layers(painter, pane_count=len(panes))
+            scenes.append(self._scene_builder.build(pane, painter))
+        self._scenes = _share_spacing(scenes)
+        shown = zip(self._scenes, self._painters, self.layout.panes, strict=False)
+        for index, (scene, painter, box) in enumerate(shown):
             surface = screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
-            self._draw_overlay(surface, len(self._scenes), scene)
-            self._scenes.append(scene)
+            self._draw_overlay(surface, index, scene)
         if len(self._scenes) > 1:
             self._draw_frames(screen)
+
+    def _choose_visible_layers(self, painter: Painter, *, pane_count: int) -> None:
+        """Set the visible layers of a pane's painter, and the strip above the map for the layer bar."""
+        # The caption of a pane is always visible.
+        fixed_layers = {"caption"}
+        if not self._has_controls:
+            fixed_layers.add("status")
+        fixed_layers &= {layer.name for layer in painter.layers}
+        painter.visible = self.viewer.view.layers | fixed_layers
+        painter.top_strip = 0.0
+        has_layer_bar = self._has_controls and "legend" in self.viewer.view.layers
+        if pane_count == 1 and has_layer_bar:
+            painter.top_strip = BAR_HEIGHT_PX + _BAR_GAP_PX
 
     def _adopt_environment(self) -> Environment:
         """Pass the displayed map to the painters; show all of it if it is a different map or has grown.
@@ -257,3 +265,11 @@ class ViewerCanvas:
     def scenes(self) -> list[Scene]:
         """The scene drawn last in each pane."""
         return self._scenes
+
+
+def _share_spacing(scenes: list[Scene]) -> list[Scene]:
+    """Return scenes whose robots have discs of the same size, which suits the one with the least space."""
+    if len(scenes) < 2:
+        return scenes
+    spacing = min(measure_spacing(scene.now.positions) for scene in scenes)
+    return [replace(scene, spacing=spacing) for scene in scenes]
