@@ -348,6 +348,7 @@ def open_cache_folder() -> Path | None:
     parent = root if configured else root / "kernels"
     folder = open_private_folder(parent / _compute_installation_digest())
     if folder is not None:
+        # If the time of the last use cannot be stored, the folder may be removed early and is built again.
         with suppress(OSError):
             os.utime(folder)
         _remove_unused_versions(folder.parent)
@@ -376,7 +377,7 @@ def _remove_unused_versions(parent: Path) -> None:
     cutoff_time = time.time() - _MIN_UNUSED_DAYS * 24 * 3600
     versions: list[tuple[float, Path]] = []
     for folder in parent.glob("robocov-*"):
-        with suppress(OSError):
+        with suppress(OSError):  # Another process may have removed the folder.
             versions.append((folder.stat().st_mtime, folder))
     for last_use_time, folder in sorted(versions, reverse=True)[_MIN_KEPT_VERSIONS:]:
         if last_use_time < cutoff_time:

@@ -25,11 +25,11 @@ _MIN_SAVING = 1e-9
 search ends."""
 _MAX_ROUNDS = 60
 """Maximum number of rounds of `improve_sources`; usually a few are enough."""
-_MIN_SAVING_OF_ROUND = 1e-4
+_MIN_ROUND_SAVING = 1e-4
 """Fraction of the cost that a round of `improve_sources` must save."""
 _REMOVAL_SIZES = (2, 3)
 """Numbers of sources that `rebuild_sources` removes at the same time."""
-_MAX_REBUILT = 4
+_MAX_IMPROVED_CANDIDATES = 4
 """Number of sets of sources, those of the lowest costs, to which `rebuild_sources` applies Lloyd's
 iteration."""
 
@@ -243,9 +243,9 @@ def improve_sources(
         return after_lloyd
     best = after_lloyd
     for _ in range(_MAX_ROUNDS):
-        changed = apply_best_swap(table, best, is_fixed, _MIN_SAVING_OF_ROUND)
+        changed = apply_best_swap(table, best, is_fixed, _MIN_ROUND_SAVING)
         if changed is best and removals:
-            changed = rebuild_sources(table, best, is_fixed, _MIN_SAVING_OF_ROUND)
+            changed = rebuild_sources(table, best, is_fixed, _MIN_ROUND_SAVING)
         if changed is best:
             break
         best = run_lloyd(table, changed, is_fixed)
@@ -309,8 +309,8 @@ def compute_costs_with_column(table: FloatArray, distances: FloatArray) -> Float
 def rebuild_sources(table: FloatArray, sources: IntArray, is_fixed: BoolArray, threshold: float) -> IntArray:
     """Replace two or three sources at the same time.
 
-    Every pair and every triple of sources is removed and then replaced greedily, one source after another.
-    Lloyd's iteration improves the few sets of sources with the lowest costs.
+    Every pair and every triple of sources that are not fixed is removed and then replaced greedily, one
+    source after another. Lloyd's iteration improves the few sets of sources with the lowest costs.
 
     Parameters
     ----------
@@ -338,13 +338,13 @@ def rebuild_sources(table: FloatArray, sources: IntArray, is_fixed: BoolArray, t
             candidates.append((cost, rebuilt))
     candidates.sort(key=lambda candidate: candidate[0])
     best = sources
-    best_cost = _compute_cost(table, sources) * (1.0 - threshold)
-    for _, candidate in candidates[:_MAX_REBUILT]:
+    cost_to_beat = _compute_cost(table, sources) * (1.0 - threshold)
+    for _, candidate in candidates[:_MAX_IMPROVED_CANDIDATES]:
         improved = run_lloyd(table, candidate, is_fixed)
         cost = _compute_cost(table, improved)
-        if cost < best_cost:
+        if cost < cost_to_beat:
             best = improved
-            best_cost = cost
+            cost_to_beat = cost
     return best
 
 

@@ -133,7 +133,7 @@ def call_density_kernels() -> None:
 def call_path_kernels() -> None:
     """Call the kernels of shortest paths."""
     path = Geodesics(_DIVIDED_MAP).find_path(np.array([0.5, 0.5]), np.array([5.0, 0.5]))
-    assert len(path) > 2, "the path leads around the end of the wall"
+    assert len(path) > 2, "expected a path around the end of the wall, got a straight one"
 
 
 def call_controller_kernels() -> None:
@@ -145,11 +145,13 @@ def call_controller_kernels() -> None:
 
 
 def call_planning_kernels() -> None:
-    """Call the kernels of routes around walls, those of large maps included."""
+    """Call the kernels of routes around walls, including those for large maps."""
     raster = planning_raster.Raster(Region(np.array(_SQUARE)), cell_size=0.1)
     state = np.full(raster.shape, FREE, dtype=np.uint8)
+    # A wall with a gap of 0.3 m, wide enough for the clearance.
     state[:34, 30] = WALL
     state[37:, 30] = WALL
+    # So few nodes give a stride above 1, as on a large map.
     middle = np.array([3.0, 3.0])
     window = Window.build_around(raster, middle, half_width=math.inf, max_nodes=16)
     planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)
@@ -289,7 +291,9 @@ class _BackgroundCompilation:
 
     def _poll(self) -> None:
         """Read which kernels have been compiled."""
+        # This is determined before the list is read, because the process completes the list before it ends.
         has_ended = self._process is None or self._process.poll() is not None
+        # There may be no list yet.
         with suppress(OSError, ValueError):
             self._compiled = json.loads(self._list_file.read_text(encoding="utf-8"))
         if has_ended:
@@ -328,6 +332,7 @@ def _save_compiled_list(folder: Path) -> None:
     path = folder / _COMPILED_LIST
     with FileLock(folder / "list.lock"):
         compiled: dict[str, list[str]] = {}
+        # There may be no list yet.
         with suppress(OSError, ValueError):
             compiled = json.loads(path.read_text(encoding="utf-8"))
         for name, types in list_compiled_kernels().items():

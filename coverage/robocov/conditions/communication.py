@@ -270,7 +270,7 @@ class Radio:
         true_positions: FloatArray,
         is_working: BoolArray,
     ) -> Inbox:
-        """Send the positions of the robots, and deliver the positions that arrive in this step.
+        """Return the inbox after the robots sent their positions, and the positions due in this step arrived.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ class Radio:
     def receive_messages(
         self, inbox: Inbox | None, step: int, observations: Observations
     ) -> tuple[Inbox | None, Observations]:
-        """Deliver the controller messages that arrive in a step.
+        """Return the inbox and the observations after the controller messages due in a step have arrived.
 
         Parameters
         ----------
@@ -387,7 +387,9 @@ class Radio:
         true_positions: FloatArray,
         is_working: BoolArray,
     ) -> tuple[Inbox | None, int]:
-        """Send controller messages at the end of a step, within the limits of the conditions.
+        """Return the inbox after controller messages were sent at the end of a step, and their total size.
+
+        Messages beyond the limits of the conditions wait in the queues of the senders.
 
         Parameters
         ----------
@@ -430,8 +432,9 @@ class Radio:
         return inbox, sent_bytes
 
     def _allocate_bandwidth_to_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
-        """Add the bytes of one sending period to the credits, and subtract the positions that are sent.
+        """Return the inbox after the robots sent their positions, and which of them had the credits to do so.
 
+        The bytes of one sending period are added to the credits, and those of sent positions subtracted.
         The credits of a robot never exceed the bytes of one period. A robot whose last transmission was its
         position does not send it again while messages wait.
 
@@ -452,7 +455,7 @@ class Radio:
         return replace(inbox, outbox=Outbox(outbox.queues, available, sent_position)), is_sender
 
     def _take_from_queues(self, outbox: Outbox) -> tuple[Outbox, list[tuple[Message, ...]]]:
-        """Remove the messages that are sent now from the queues.
+        """Return the outbox without the messages that are sent now, and these messages.
 
         Returns
         -------
@@ -482,7 +485,7 @@ class Radio:
     def _transmit(
         self, sender: int, messages: Sequence[Message], step: int, is_linked: BoolArray
     ) -> list[Transmission]:
-        """Send the messages of one robot to the robots in range, whose mask is `is_linked`, (n,) bool."""
+        """Return the transmissions of a robot's messages to the robots in the mask `is_linked`, (n,)."""
         arrival_step = step + max(1, self._latency_steps)
         is_received = np.broadcast_to(is_linked, (len(messages), len(is_linked)))
         if self._conditions.loss:

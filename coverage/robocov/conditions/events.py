@@ -201,7 +201,8 @@ def _build_event(path: str, kind: type[Event], value: Any) -> Event:
 
 
 def _check_position(path: str, value: Any) -> tuple[float, float]:
-    """Return x and y of a position, or raise a ParameterError unless they are finite numbers."""
+    """Return a position as two floats; raise a ParameterError if it is not a pair of finite numbers."""
+    # A value that is not a pair leads to the error below.
     with suppress(TypeError, ValueError):
         x, y = value
         if all(is_number(coordinate) and math.isfinite(coordinate) for coordinate in (x, y)):

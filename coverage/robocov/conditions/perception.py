@@ -24,7 +24,9 @@ MIN_MEASURED_DISTANCE_M = 1e-3
 
 
 class Perception:
-    """Computes the observations of robots under given conditions. Only robot i knows row i.
+    """Computes the observations of robots under given conditions.
+
+    Row i of each array is known only to robot i.
 
     Parameters
     ----------
@@ -72,28 +74,34 @@ class Perception:
         observations : Observations
             The observations under the conditions.
         inbox : Inbox or None
-            Messages after the positions of the step were exchanged.
+            Messages after the positions of the step were exchanged; unchanged if communication is ideal.
         """
         step = round(ideal.time / self._dt)
         positions = self._add_position_noise(step, ideal.positions)
         obstacle_points = self._add_sensing_noise(step, ideal, positions)
         if not is_working.all():
             obstacle_points = np.where(is_working[:, None], obstacle_points, np.nan)
-        obstacle_points.setflags(write=False)
-        observations = replace(
-            ideal,
-            positions=positions,
-            obstacle_points=obstacle_points,
-            scans=self._add_scanning_noise(step, ideal.scans),
-        )
+            obstacle_points.setflags(write=False)
+        density = ideal.density
+        density_sensor = ideal.density_sensor
         if self._conditions.hides_density:
-            observations.density = None
-            observations.density_sensor = DensitySensor.build(
+            density = None
+            density_sensor = DensitySensor.build(
                 ideal.density,
                 positions=ideal.positions,
                 known_positions=positions,
                 sensing_ranges=self._sensing_ranges,
             )
+        observations = replace(
+            ideal,
+            positions=positions,
+            obstacle_points=obstacle_points,
+            scans=self._add_scanning_noise(step, ideal.scans),
+            density=density,
+            density_sensor=density_sensor,
+        )
+        # Under ideal communication, the inbox contains at most controller messages, and neighbors know each
+        # other's positions.
         if inbox is None or not self._conditions.uses_messages:
             neighbors = ideal.neighbors.restrict_to_working(is_working)
             return replace(observations, neighbors=neighbors), inbox
@@ -136,7 +144,9 @@ class Perception:
             has_direction = distance > 0.0
             divisor = np.where(has_direction, distance, 1.0)
             offset *= np.where(has_direction, measured / divisor, 1.0)[:, None]
-        return np.asarray(positions + offset)
+        measured_points = np.asarray(positions + offset)
+        measured_points.setflags(write=False)
+        return measured_points
 
     def _add_scanning_noise(self, step: int, scans: Scans | None) -> Scans | None:
         """Return the scans with noise on the rays that meet an obstacle."""

@@ -330,11 +330,11 @@ class Lattice:
     """Sample points of a region, basis functions, and squares with one measurement each."""
 
     samples: FloatArray
-    """(k, 2) m"""
+    """(k, 2) Sample points, in meters."""
     sample_area: float
     """Area that each sample represents, m²."""
     centers: FloatArray
-    """(m, 2) m, centers of the basis functions."""
+    """(m, 2) Centers of the basis functions, in meters."""
     width: float
     """Standard deviation of the basis functions, m."""
     functions: FloatArray

@@ -35,11 +35,11 @@ class NeighborReports(NamedTuple):
     """Reported positions of near robots at one time."""
 
     time: float
-    """s"""
+    """Simulation time, s."""
     pairs: IntArray
-    """(m,) One number for each pair of a robot and a neighbor: robot * n + neighbor, ascending."""
+    """(k,) One number for each pair of a robot and a neighbor: robot * n + neighbor, ascending."""
     positions: FloatArray
-    """(m, 2) m, reported position of the neighbor in each pair."""
+    """(k, 2) Reported position of the neighbor in each pair, m."""
 
 
 class HalfPlanes(NamedTuple):
@@ -48,7 +48,7 @@ class HalfPlanes(NamedTuple):
     normals: FloatArray
     """(n, k, 2) Unit normals; nan for no constraint."""
     limits: FloatArray
-    """(n, k) m/s²"""
+    """(n, k) Maximum acceleration along each normal, m/s²."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

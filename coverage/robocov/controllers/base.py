@@ -165,7 +165,7 @@ def get_information(controller: Any) -> Information:
 
 
 def inform_controller(controller: Controller, environment: Environment) -> Controller:
-    """Give the map to a controller that uses the whole map; return any other controller unchanged.
+    """Return a controller that knows the map if it uses the whole map, or else the same controller.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ class Memory:
     """Memory of the robots of many built-in controllers."""
 
     team: Team
-    """A robot knows its own body and limits."""
+    """The robots. Each robot knows only its own body and limits."""
     returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     triangulation: Mesh | None = None

@@ -78,7 +78,7 @@ class Ascent:
     rest_position: FloatArray
     """(2,) m, position near which the robot has been since `rest_start`."""
     rest_start: float
-    """Time since which it has been near that position, s."""
+    """Time since which the robot has been near that position, s."""
     mode: Mode = Mode.GRADIENT
     boost_count: int = 0
     """Number of boosts so far."""
@@ -90,7 +90,7 @@ class Ascent:
     """Time at which the last boost began, s."""
 
     def update(self, position: FloatArray, time: float, value: float, limits: BoostLimits) -> Ascent:
-        """Update the state of the ascent, including its mode, after a scan.
+        """Return the ascent after a scan, which may be in another mode.
 
         In mode `GRADIENT`, a robot that has come to rest is at a local optimum, and leaves it. In mode
         `BOOSTED`, it changes to `GRADIENT` when it has come to rest or the boost has lasted long enough. In
@@ -107,6 +107,7 @@ class Ascent:
         Returns
         -------
         Ascent
+            The updated ascent; the same object if nothing changes.
         """
         ascent = self
         if math.dist(position, self.rest_position) > _REST_RADIUS_M:
@@ -125,16 +126,21 @@ class Ascent:
         return ascent
 
     def _follow_trail(self, position: FloatArray) -> Ascent:
-        """Remove the last point of the trail when it is reached; follow the gradient when none remains."""
+        """Return the ascent of a robot that goes back along its trail.
+
+        A point at the end of the trail is removed when the robot reaches it. When none remains, the robot
+        follows its gradient again.
+        """
         trail = self.trail
         if math.dist(position, trail[-1]) < _TRAIL_SPACING_M:
             trail = trail[:-1]
         return replace(self, trail=trail, mode=Mode.RETURN if trail else Mode.GRADIENT)
 
     def _leave_optimum(self, position: FloatArray, time: float, value: float, max_boosts: int) -> Ascent:
-        """Leave a local optimum with a boost, or return to the previous optimum if that was better.
+        """Return the ascent of a robot that leaves a local optimum.
 
-        A robot that has had its maximum number of boosts stays.
+        It leaves with a boost, or returns to the previous optimum if that was better. A robot that has had
+        its maximum number of boosts stays.
         """
         if self.trail and value < self.best_value:
             # A robot that returns is not boosted again.
@@ -165,12 +171,12 @@ class BoostingMemory(Memory):
 
 
 class Contributions(NamedTuple):
-    """Contribution of each robot to the objective, and its gradient with respect to the robot's position."""
+    """Contribution of each robot to the objective H, and its gradients."""
 
     value: FloatArray
-    """(n,) m²"""
+    """(n,) m², part of H that the team would lose without the robot."""
     gradient: FloatArray
-    """(n, 2) m"""
+    """(n, 2) m, gradient of `value` with respect to the position of the robot."""
     boosted_gradient: FloatArray
     """(n, 2) m, gradient of the boosted objective, which leads out of local optima."""
 
@@ -333,12 +339,14 @@ class Boosting(BaseController):
         Contributions
         """
         directions = compute_ray_directions(view.distances.shape[1])
+        # A point can only be within range of two robots if these are no farther apart than twice the range.
         pairs = seen.find_neighbors(2.0 * float(max_distances.max()))
         samples = self._sample_views(seen, view, pairs, directions, max_distances)
         edges = find_occlusion_edges(view, directions, max_distances, self.jump)
         boosted_weight = self._compute_boosted_weight(samples)
         boosted_gradient = self._compute_gradient(boosted_weight, samples, view, edges, max_distances)
         if self.boost == "neighbors":
+            # The offsets have the length d, hence the exponent γ + 1 for a repulsion of κ / d^γ.
             repulsion = self.kappa / np.maximum(pairs.distances, _MIN_DISTANCE_M) ** (self.gamma + 1.0)
             boosted_gradient = boosted_gradient + sum_by_robot(
                 pairs.robots, repulsion[:, None] * pairs.offsets, len(max_distances)
@@ -372,7 +380,9 @@ class Boosting(BaseController):
         spacings = view.distances / _SAMPLES_PER_RAY
         areas = depths * (spacings * sector_angle)[:, :, None]
         wall_distances = np.where(view.is_hit, view.distances, np.inf)
-        undetected = compute_undetected(depths, wall_distances, directions, pairs, max_distances, self.decay)
+        undetected = compute_miss_probabilities(
+            depths, wall_distances, directions, pairs, max_distances, self.decay
+        )
         return _ViewSamples(
             depths=depths,
             areas=areas,
@@ -416,7 +426,7 @@ class Boosting(BaseController):
 
 
 @kernel
-def compute_undetected(
+def compute_miss_probabilities(
     depths: FloatArray,
     wall_distances: FloatArray,
     directions: FloatArray,
@@ -435,8 +445,8 @@ def compute_undetected(
     directions : (rays, 2) array
         Unit vectors along the rays.
     pairs : NeighborPairs
-        Pairs of a robot and a neighbor. The neighbor detects points within its own distance, unless a wall in
-        the robot's view blocks the line of sight from the neighbor to the point.
+        Pairs of a robot and a neighbor. The neighbor detects points within its own maximum distance, unless a
+        wall in the robot's view blocks the line of sight from the neighbor to the point.
     max_distances : (n,) array, m
         Maximum distance at which each robot detects points.
     decay : float, 1/m
@@ -445,14 +455,17 @@ def compute_undetected(
     Returns
     -------
     (n, rays, k) array
+        Probability that no neighbor detects the point; 1 without neighbors.
     """
     undetected = np.ones(depths.shape)
     for pair in range(len(pairs.robots)):
         robot = pairs.robots[pair]
-        # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
+        # All coordinates are relative to the robot. `pairs.offsets` leads from the neighbor to the robot,
+        # hence the minus signs.
         neighbor_x = -pairs.offsets[pair, 0]
         neighbor_y = -pairs.offsets[pair, 1]
         neighbor_range = max_distances[pairs.neighbors[pair]]
+        # `is_path_clear` does not test the end of the path, which is the neighbor's position for every point.
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):

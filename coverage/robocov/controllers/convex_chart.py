@@ -132,7 +132,7 @@ class _PiecewiseAffineMap(NamedTuple):
     images: FloatArray
     """(t, 3, 2) Images of the corners."""
     jacobians: FloatArray
-    """(t, 2, 2)"""
+    """(t, 2, 2) Matrices of the derivatives of the images with respect to the position."""
 
     @classmethod
     def build(cls, corners: FloatArray, images: FloatArray) -> _PiecewiseAffineMap:
@@ -244,7 +244,7 @@ def _find_edges(points: FloatArray, triangles: IntArray, starts: FloatArray, end
 
 
 def _find_indices(points: FloatArray, selected: FloatArray) -> IntArray:
-    """Return the indices of selected points, (m, 2) m, among (k, 2) m sorted ones."""
+    """Return the indices of selected points, (s, 2), among sorted points, (k, 2), both in meters."""
     # After rounding, each selected point equals one of `points`. The unique rows of both together are
     # therefore `points` again, and the inverse indices of the selected points are their indices in `points`.
     rounded = np.round(selected / _ROUNDING_M) * _ROUNDING_M

@@ -5,10 +5,10 @@ far as the conditions of the communication allow:
 
 - *Parameters.* All m parameters of its estimate, in one message of 4 + 8 m bytes. A receiver uses the newest
   parameters from each neighbor until newer ones arrive, or until it forgets the neighbor.
-- *Measurements.* At most `MAX_SENT_MEASUREMENTS` of the measurements that it knows, its own and received
-  ones, in messages of 4 + 10 k bytes for k measurements. Measurements that it has not sent yet come first,
-  then those that it sent longest ago. In this way, measurements in lost messages are sent again, and robots
-  that meet later receive all measurements.
+- *Measurements.* At most `MAX_SENT_MEASUREMENTS` of the measurements that the robot knows, its own and
+  received ones, in messages of 4 + 10 k bytes for k measurements. Measurements that it has not sent yet come
+  first, then those that it sent longest ago. In this way, measurements in lost messages are sent again, and
+  robots that meet later receive all measurements.
 """
 
 from __future__ import annotations
@@ -99,7 +99,9 @@ class ParameterExchange:
         return means
 
     def send(self, seen: Observations, parameters: FloatArray) -> tuple[ParameterExchange, MessageLists]:
-        """Send the parameters of all robots that have not sent theirs yet, and can send messages now.
+        """Return the exchange after sending, and messages with the parameters that can be sent now.
+
+        Each robot sends its parameters once in a learning period, as soon as it can send messages.
 
         Parameters
         ----------
@@ -112,6 +114,7 @@ class ParameterExchange:
         exchange : ParameterExchange
             The exchange after these messages have been sent.
         messages : sequence of sequence of Message
+            The messages of each robot; empty if no robot sends any.
         """
         if not self.is_unsent.any():
             return self, ()
@@ -134,7 +137,7 @@ class Measurements(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementExchange:
-    """Times at which robots last sent each measurement, and the numbers that they may still send. Immutable.
+    """When robots last sent each measurement, and how many measurements each may still send. Immutable.
 
     Attributes
     ----------
@@ -156,7 +159,7 @@ class MeasurementExchange:
         )
 
     def start_period(self, measurements: FloatArray) -> MeasurementExchange:
-        """Return the exchange at the start of a learning period.
+        """Return the exchange at the start of a learning period, with new allowances.
 
         Parameters
         ----------
@@ -167,7 +170,9 @@ class MeasurementExchange:
         return replace(self, allowances=np.minimum(known_counts, MAX_SENT_MEASUREMENTS))
 
     def send(self, seen: Observations, measurements: FloatArray) -> tuple[MeasurementExchange, MessageLists]:
-        """Send measurements, as many as the allowances and the communication permit.
+        """Return the exchange after sending, and messages with measurements.
+
+        Each robot sends as many measurements as its allowance and the communication permit.
 
         Parameters
         ----------
@@ -180,6 +185,7 @@ class MeasurementExchange:
         exchange : MeasurementExchange
             The exchange after these messages have been sent.
         messages : sequence of sequence of Message
+            The messages of each robot; empty if no robot sends any.
         """
         if not self.allowances.any():
             return self, ()
@@ -199,10 +205,12 @@ class MeasurementExchange:
         return replace(self, sent_times=sent_times, allowances=allowances), messages
 
     def _count_measurements_to_send(self, seen: Observations, robot: int) -> int:
-        """Return the number of measurements that a robot sends in this step: at least one."""
+        """Return how many measurements a robot with an allowance sends in this step: at least one."""
         allowance = int(self.allowances[robot])
         if seen.send_limits is None:
             return allowance
+        # A robot without credits has a send limit of 1 byte. It still sends one measurement, which waits in
+        # its queue.
         fitting = int((seen.send_limits[robot] - HEADER_BYTES) // MEASUREMENT_BYTES)
         return min(allowance, max(1, fitting))
 

@@ -35,7 +35,7 @@ class GeodesicPlan(NamedTuple):
     """Goals of n robots, and the shortest paths to them."""
 
     goals: FloatArray
-    """(n, 2) m"""
+    """(n, 2) m, goals of the robots."""
     waypoints: FloatArray
     """(n, 2) m, the first waypoint of each path."""
     remaining_lengths: FloatArray

@@ -33,11 +33,11 @@ class OwnView:
     Attributes
     ----------
     number : int
-        Its own number, from 0.
+        Number of the robot, from 0.
     position : (2,) array, m
-        Its own position, as it knows it.
+        Position of the robot as it knows it, with any localization noise.
     velocity : (2,) array, m/s
-        Its own velocity.
+        Velocity of the robot.
     neighbors : (k, 2) array, m
         Positions of the robots within communication range, by their last messages.
     obstacle_point : (2,) array or None, m
@@ -95,7 +95,7 @@ class OwnView:
         payload : object
             The content. It must not be changed afterwards.
         size : int, bytes
-            Its size as it would be encoded.
+            Size of the payload when encoded.
         """
         self.sent_messages.append(Message(payload, size))
 
@@ -171,16 +171,17 @@ class IndividualControllerAdapter:
     Parameters
     ----------
     controller : IndividualController
-        It is called for each robot in turn.
+        The controller of a single robot.
 
     Attributes
     ----------
     controller : IndividualController
+        The controller of a single robot.
     name, label, summary : str
         Name, label and summary of the individual controller. By default, they are its class name and the
         first line of its docstring.
     information : Information
-        Information that it uses; "own" by default.
+        Information that the individual controller uses; "own" by default.
 
     See Also
     --------
@@ -234,7 +235,7 @@ class IndividualControllerAdapter:
         memory: IndividualMemories | None,
         robots: Iterable[int] | None = None,
     ) -> Decision:
-        """Call the individual controller for each robot.
+        """Compute the forces on all robots by calling the individual controller for each of them.
 
         Parameters
         ----------

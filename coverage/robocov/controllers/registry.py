@@ -139,7 +139,7 @@ def _explain_entry_fault(entry: EntryPoint, error: BaseException) -> Exception:
 
 
 def _add_names(kind: type[Any], name: str) -> type[Any]:
-    """Give a class the name, label and summary that it does not define itself."""
+    """Set the name, label and summary that a class does not define itself, and return the class."""
     summary = (kind.__doc__ or "").strip().split("\n")[0]
     defaults = {"name": name, "label": kind.__name__, "summary": summary}
     for attribute, default in defaults.items():

@@ -388,7 +388,7 @@ class Poduri(BaseController):
         return Decision(forces=repulsion + attraction + potential.obstacle, terms=terms, memory=memory)
 
     def _find_links(self, seen: Observations, team: Team) -> tuple[NeighborPairs, FloatArray]:
-        """Return the links of all robots, and the range R_c of each, (m,) m."""
+        """Return the links of all robots, and the range R_c of each link, (k,) in meters."""
         max_ranges = np.minimum(team.communication_range, self.link_range)
         pairs = _find_separated_neighbors(seen, float(max_ranges.max()))
         link_ranges = np.minimum(max_ranges[pairs.robots], max_ranges[pairs.neighbors])

@@ -45,11 +45,15 @@ _MIN_LENGTH = 1e-300
 _ROUNDING_M = 1e-9
 """Tolerance of free distances for rounding errors."""
 _MAX_RETURN_FACTOR = 3.0
-"""Path length after which a robot gives up its return, relative to the maximum length of its boundary."""
+"""Path length, there and back, after which a robot gives up its return to the best point, relative to the
+maximum length of its boundary."""
 
 COUNTERCLOCKWISE = 1
 CLOCKWISE = -1
-"""Directions of turns, and of the motion around obstacles."""
+"""Direction in which a robot turns away from an obstacle.
+
+After a counterclockwise turn, the obstacle is on the robot's right.
+"""
 
 Squares: TypeAlias = frozenset[tuple[int, int]]
 """Columns and rows of squares of the plane, of side `_SQUARE_SIDE_M`, counted from the origin."""
@@ -67,10 +71,10 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedGoal:
-    """The goal of a robot that passes an obstacle: it stays where the centroid was. Immutable."""
+    """A goal that does not move with the robot's centroid while the robot passes an obstacle. Immutable."""
 
     position: FloatArray
-    """(2,) m"""
+    """(2,) m, position of the centroid when the goal was fixed."""
     best_point: FloatArray | None = None
     """(2,) m, the point nearest to the goal of all boundaries that the robot followed or left."""
     resting_centroid: FloatArray | None = None
@@ -82,7 +86,7 @@ class FollowedBoundary:
     """The path of a robot along the boundary that it follows. Immutable."""
 
     entry_point: FloatArray
-    """(2,) m, point at which it started."""
+    """(2,) m, position at which the robot began to follow the boundary."""
     last_position: FloatArray
     """(2,) m, position of the robot at the last scan."""
     length: float
@@ -97,6 +101,7 @@ class FollowedBoundary:
 
     def is_complete(self) -> bool:
         """Return whether the robot has followed the whole boundary, back to its entry point."""
+        # A robot that has only moved a little is still near its entry point.
         if self.length <= 2.0 * math.pi * _RETURN_RADIUS_M:
             return False
         return math.dist(self.last_position, self.entry_point) < _RETURN_RADIUS_M
@@ -104,28 +109,32 @@ class FollowedBoundary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NavigationState:
-    """Navigation state of one robot. Immutable."""
+    """What one robot does between two scans: its mode, waypoint and goal. Immutable."""
 
     mode: Mode
     turn: int
-    """`COUNTERCLOCKWISE` or `CLOCKWISE`: it passes obstacles on its right, or on its left."""
+    """Direction in which the robot turns to pass an obstacle: `COUNTERCLOCKWISE` (obstacle on its right) or
+    `CLOCKWISE` (on its left)."""
     waypoint: FloatArray
-    """(2,) m, point that it heads for."""
+    """(2,) m, point that the robot heads for."""
     passes_waypoint: bool = False
-    """Whether it moves on past the waypoint, and does not slow down there."""
+    """Whether the robot moves on past the waypoint, and does not slow down there."""
     attempts: int = 0
-    """Number of goals that it has fixed so far."""
+    """Number of attempts: goals that the robot has fixed so far."""
     fixed_goal: FixedGoal | None = None
-    """None while its goal is its centroid."""
+    """None while the robot's goal is its centroid."""
     boundary: FollowedBoundary | None = None
-    """None unless it follows a boundary, or returns along it."""
+    """None unless the robot follows a boundary, or returns along it."""
 
     def get_goal(self, centroid: FloatArray) -> FloatArray:
         """Return the fixed goal, or else the centroid, (2,) m."""
         return centroid if self.fixed_goal is None else self.fixed_goal.position
 
     def release_goal(self, position: FloatArray, centroid: FloatArray, min_move: float) -> NavigationState:
-        """Return the state without its fixed goal if the robot has reached it, or should try a new one.
+        """Release the fixed goal if the robot has reached it or should try a new one; return the new state.
+
+        When the robot arrives at its best point, its centroid is recorded as `resting_centroid`. Otherwise
+        the state is returned unchanged.
 
         Parameters
         ----------
@@ -133,7 +142,12 @@ class NavigationState:
         centroid : (2,) array, m
             The moving goal, the centroid of the robot's cell.
         min_move : float, m
-            A robot at rest tries again if its centroid has moved by this, times the number of attempts.
+            A robot at rest at its best point tries again once its centroid has moved by more than
+            ``min_move * attempts``.
+
+        Returns
+        -------
+        NavigationState
         """
         goal = self.fixed_goal
         if goal is None:
@@ -181,9 +195,10 @@ class TangentBug(BaseController):
     choices are our own. A robot's centroid moves with the robot, and would draw it back from each detour;
     therefore the goal is fixed from the time when the robot starts to follow a boundary until it is reached
     or given up. Because a boundary may be as long as the building, the robot follows it for at most `detour`
-    times the distance to its goal, and then returns. It tries again after its centroid has moved by `moved`.
-    Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along each
-    other, and assume that others may be as large as the largest of the team.
+    times the distance to its goal, a limit that shrinks by a tenth with each attempt, and then returns. It
+    tries again after its centroid has moved by `moved` times the number of attempts. Obstacles in a scan are
+    enlarged by the radius of the robot and `clearance`. Robots slide along each other, and assume that others
+    may be as large as the largest of the team.
     """
 
     name = "tangentbug"
@@ -225,6 +240,8 @@ class TangentBug(BaseController):
             )
             states = self._navigate(seen, team, states, cells.centroids, obstacle_points, obstacle_squares)
         velocities = self._compute_velocities(seen, team, states, cells.centroids)
+        # Paths keep the whole clearance. With half of it as the margin, the avoidance of collisions does not
+        # stop a robot on such a path.
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
@@ -308,9 +325,9 @@ class ContourEnd(NamedTuple):
     """End of the contour that blocks the path."""
 
     ray: int
-    """The first ray past it."""
+    """Index of the first ray past the end."""
     point: FloatArray
-    """(2,) m, a point just past it."""
+    """(2,) m, a free point just past the end, relative to the robot."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -324,11 +341,11 @@ class ObstacleView:
     free_distances: FloatArray
     """(k,) Distance that the robot can move straight along each ray."""
     clearance: float
-    """Distance that its center keeps from obstacles."""
+    """Distance that the robot's center keeps from obstacles."""
     sensing_range: float
-    """Range of its sensor."""
+    """Range of the robot's sensor."""
 
-    def contains(self, point: FloatArray) -> bool:
+    def can_reach(self, point: FloatArray) -> bool:
         """Return whether the robot can move straight to a point."""
         distance = math.hypot(*point)
         return distance < _ARRIVAL_RADIUS_M or self.compute_free_distance(point) >= distance - _ROUNDING_M
@@ -363,18 +380,19 @@ class ObstacleView:
             the contour is closed.
         """
         first_ray = int((self.directions * direction).sum(axis=1).argmax())
-        blocked_distance = self.compute_free_distance(direction)
+        free_distance = self.compute_free_distance(direction)
         ends = {}
         for turn in (COUNTERCLOCKWISE, CLOCKWISE):
             # All rays, in the order in which a turn from the first one passes them.
             rays = (first_ray + turn * np.arange(len(self.directions))) % len(self.directions)
             distances = self.free_distances[rays]
-            previous = np.append(blocked_distance, distances[:-1])
-            is_past_end = (distances > previous + jump) | (distances >= self.sensing_range)
+            previous_distances = np.append(free_distance, distances[:-1])
+            has_jump = distances > previous_distances + jump
+            is_past_end = has_jump | (distances >= self.sensing_range)
             if is_past_end.any():
                 k = int(is_past_end.argmax())
                 # The robot moves to a free point close to the contour, not to the far end of the free ray.
-                end_distance = min(distances[k], previous[k] + jump)
+                end_distance = min(distances[k], previous_distances[k] + jump)
                 point = self.directions[rays[k]] * end_distance
                 ends[turn] = ContourEnd(ray=int(rays[k]), point=point)
         return ends
@@ -389,16 +407,16 @@ class Navigator:
     position: FloatArray
     """(2,) m, position of the robot in the region."""
     goal_offset: FloatArray
-    """(2,) m, its goal relative to its position."""
+    """(2,) m, goal of the robot relative to its position."""
     obstacle_squares: Squares
-    """Squares in which it has detected obstacle points."""
+    """Squares in which the robot has detected obstacle points."""
 
     def update(self, state: NavigationState) -> NavigationState:
         """Return the navigation state after the scan.
 
-        In any mode, a robot moves straight to its goal once it is in view. Otherwise, the mode decides.
+        In any mode, a robot that can move straight to its goal does so. Otherwise, the mode decides.
         """
-        if self.view.contains(self.goal_offset):
+        if self.view.can_reach(self.goal_offset):
             return self._head_for(state, Mode.GOAL, self.position + self.goal_offset)
         if state.mode is Mode.BEST_POINT:
             return state
@@ -407,24 +425,26 @@ class Navigator:
         if state.mode is Mode.LEAVING:
             if self._must_approach_waypoint(state):
                 return state
+            # If the path toward the goal is free now, `_move_to_goal` heads along a ray close to it, and the
+            # robot heads for the goal itself after the next scan.
             state = self._finish_leaving(state)
         elif self._is_free_ahead():
             return self._head_for(state, Mode.GOAL, self.position + self.goal_offset)
         return self._move_to_goal(state)
 
     def _is_free_ahead(self) -> bool:
-        """Return whether the sensor sees no obstacle on the straight path to the goal."""
+        """Return whether the straight path toward the goal is free up to the sensing range."""
         return self.view.compute_free_distance(self.goal_offset) >= self.view.sensing_range - _ROUNDING_M
 
     def _must_approach_waypoint(self, state: NavigationState) -> bool:
-        """Return whether the waypoint is in view, and the robot has not yet reached it."""
+        """Return whether the robot has not yet reached the waypoint, and can move straight to it."""
         offset = state.waypoint - self.position
-        return math.hypot(*offset) > _RETURN_RADIUS_M and self.view.contains(offset)
+        return math.hypot(*offset) > _RETURN_RADIUS_M and self.view.can_reach(offset)
 
     def _finish_leaving(self, state: NavigationState) -> NavigationState:
-        """Return the state of a robot that has left a boundary, and moves to its goal again."""
+        """Return the state of a robot that no longer heads for the point at which it leaves a boundary."""
         assert state.fixed_goal is not None
-        # The next point at which it leaves a boundary has to be nearer to the goal.
+        # The next point at which the robot leaves a boundary has to be nearer to the goal than this one.
         goal = replace(state.fixed_goal, best_point=state.waypoint)
         return replace(state, mode=Mode.GOAL, fixed_goal=goal)
 
@@ -441,15 +461,21 @@ class Navigator:
         )
 
     def _move_to_goal(self, state: NavigationState) -> NavigationState:
-        """Return the state of a robot that moves to the goal, past the obstacle that blocks the path."""
+        """Return the state of a robot that moves to the goal, past the obstacle that blocks the path.
+
+        If no end of the blocking contour is nearer to the goal than the robot is, it follows the boundary.
+        """
         ends = self.view.find_contour_ends(self.goal_offset, self.controller.jump)
-        remaining = {turn: math.dist(self.goal_offset, end.point) for turn, end in ends.items()}
-        path_lengths = {turn: math.hypot(*end.point) + remaining[turn] for turn, end in ends.items()}
+        remaining_distances = {turn: math.dist(self.goal_offset, end.point) for turn, end in ends.items()}
+        path_lengths = {
+            turn: math.hypot(*end.point) + remaining_distances[turn] for turn, end in ends.items()
+        }
         if state.turn in ends:
             # The robot does not alternate between two ends with about the same path length.
             path_lengths[state.turn] -= _MIN_IMPROVEMENT_M
         goal_distance = math.hypot(*self.goal_offset)
-        approaching_turns = [turn for turn in ends if remaining[turn] < goal_distance]
+        approaching_turns = [turn for turn in ends if remaining_distances[turn] < goal_distance]
+        # Without an approaching turn, this is the direction in which the robot follows the boundary.
         turn = min(approaching_turns or ends, key=path_lengths.__getitem__, default=state.turn)
         state = replace(state, turn=turn)
         if approaching_turns:
@@ -494,6 +520,7 @@ class Navigator:
             return False
         centers = (np.array(list(self.obstacle_squares)) + 0.5) * _SQUARE_SIDE_M
         distance = np.hypot(*(self.goal_offset - (centers - self.position)).T).min()
+        # The side of a square is added because an obstacle point may lie anywhere in its square.
         return bool(distance < self.view.clearance + _SQUARE_SIDE_M)
 
     def _follow_boundary(self, state: NavigationState) -> NavigationState:
@@ -534,9 +561,10 @@ class Navigator:
         directions = self.view.directions
         # On each ray, the point nearest to the goal.
         depths = np.clip((directions * self.goal_offset).sum(axis=1), 0.0, self.view.free_distances)
-        remaining = np.hypot(*(self.goal_offset - depths[:, None] * directions).T)
-        ray = int(remaining.argmin())
-        if remaining[ray] >= math.dist(self.position + self.goal_offset, best_point) - _MIN_IMPROVEMENT_M:
+        remaining_distances = np.hypot(*(self.goal_offset - depths[:, None] * directions).T)
+        ray = int(remaining_distances.argmin())
+        best_distance = math.dist(self.position + self.goal_offset, best_point)
+        if remaining_distances[ray] >= best_distance - _MIN_IMPROVEMENT_M:
             return None
         return np.asarray(self.position + depths[ray] * directions[ray])
 

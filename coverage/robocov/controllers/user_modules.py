@@ -58,21 +58,24 @@ class _Call(NamedTuple):
 def explain_fault(context: str, error: BaseException, ending: str = "") -> RobocovError:
     """Return an error with a one-line explanation of an exception in code outside robocov.
 
+    The message names the file and line in which the exception was raised, if they are known.
+
     Parameters
     ----------
     context : str
         Beginning of the message, which names the controller.
     error : BaseException
-        The exception that the code raised. Notes such as "robot 3" are added to the message.
+        The exception that the code raised. Its notes that begin with "robot ", such as "robot 3", are added
+        to the message.
     ending : str
         End of the message, such as " at 0.117 s".
 
     Returns
     -------
     ControllerEndedError
-        For exceptions that would terminate Python, as `SystemExit` does. The message names file and line.
+        For exceptions that would terminate Python, such as `SystemExit`.
     ParameterError
-        For all other exceptions. The message names file and line.
+        For all other exceptions.
     """
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("robot ")]
     location = _format_fault_location(error)
@@ -80,7 +83,7 @@ def explain_fault(context: str, error: BaseException, ending: str = "") -> Roboc
     fault = _describe_exception(error)
     if isinstance(error, Exception):
         return ParameterError(f"{context}: {fault}{suffix}")
-    return ControllerEndedError(f"{context}: it terminated Python by raising {fault}{suffix}")
+    return ControllerEndedError(f"{context}: it tried to terminate Python by raising {fault}{suffix}")
 
 
 def _describe_exception(error: BaseException) -> str:

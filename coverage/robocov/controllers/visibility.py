@@ -136,10 +136,11 @@ class Visibility(BaseController):
         directions = compute_ray_directions(ray_count)
         depths = view.distances[..., None] * _SAMPLE_FRACTIONS
         wall_distances = np.where(view.is_hit, view.distances, np.inf)
+        # A point can only be within range of two robots if these are no farther apart than twice the range.
         pairs = seen.find_neighbors(2.0 * float(max_distances.max()))
         points = seen.positions[:, None, None] + depths[..., None] * directions[:, None]
         weight = evaluate_density(seen.density, points)
-        weight = weight * find_cells_in_view(depths, wall_distances, directions, pairs, max_distances)
+        weight = weight * find_points_in_own_cell(depths, wall_distances, directions, pairs, max_distances)
         # The weight at the sensing range, times the length of the arc there, for rays that hit no obstacle.
         arcs = ~view.is_hit * weight[..., -1] * max_distances[:, None] * (2.0 * np.pi / ray_count)
         edges = find_occlusion_edges(view, directions, max_distances, self.jump)
@@ -150,7 +151,7 @@ class Visibility(BaseController):
 
 
 @kernel
-def find_cells_in_view(
+def find_points_in_own_cell(
     depths: FloatArray,
     wall_distances: FloatArray,
     directions: FloatArray,
@@ -170,7 +171,7 @@ def find_cells_in_view(
     pairs : NeighborPairs
         The neighbors that may see points of the view.
     max_distances : (n,) array, m
-        Maximum distance of each robot's view.
+        Maximum distance of each robot's view: R in the power below.
 
     Returns
     -------
@@ -180,10 +181,12 @@ def find_cells_in_view(
     is_own = np.ones(depths.shape, dtype=np.bool_)
     for pair in range(len(pairs.robots)):
         robot = pairs.robots[pair]
-        # All coordinates are relative to the robot; `offset` leads from the neighbor to it.
+        # All coordinates are relative to the robot. `pairs.offsets` leads from the neighbor to the robot,
+        # hence the minus signs.
         neighbor_x = -pairs.offsets[pair, 0]
         neighbor_y = -pairs.offsets[pair, 1]
         neighbor_range = max_distances[pairs.neighbors[pair]]
+        # `is_path_clear` does not test the end of the path, which is the neighbor's position for every point.
         if is_behind_wall(neighbor_x, neighbor_y, wall_distances[robot]):
             continue
         for ray in range(len(directions)):

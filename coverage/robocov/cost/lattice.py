@@ -97,18 +97,18 @@ class Tiles(NamedTuple):
     """The box tree of the tiles."""
 
 
-def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
+def build_lattice(geodesics: Geodesics, lattice: int) -> tuple[Sites, Tiles]:
     """Build the sites of a lattice, and arrange them in tiles.
 
-    The region's bounding box, extended to a square from its lower left corner, is divided into ``side²``
-    cells.
+    The region's bounding box, extended to a square from its lower left corner, is divided into
+    ``lattice²`` cells.
 
     Parameters
     ----------
     geodesics : Geodesics
         The shortest paths of the environment.
-    side : int
-        Number of cells along a side.
+    lattice : int
+        Number of cells along a side of the lattice.
 
     Returns
     -------
@@ -120,12 +120,12 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     ParameterError
         If no site is in the free space.
     """
-    spacing = geodesics.size / side
+    spacing = geodesics.size / lattice
     all_cells = []
     all_components = []
-    for first in range(0, side * side, _CELLS_PER_BLOCK):
-        cells = np.arange(first, min(first + _CELLS_PER_BLOCK, side * side))
-        centers = _compute_centers(cells, side, spacing, geodesics.grid.origin)
+    for first in range(0, lattice * lattice, _CELLS_PER_BLOCK):
+        cells = np.arange(first, min(first + _CELLS_PER_BLOCK, lattice * lattice))
+        centers = _compute_centers(cells, lattice, spacing, geodesics.grid.origin)
         # Column c of `is_inside` says which cells are in component c of the free space.
         is_inside = geodesics.count_windings(geodesics.grid.snap(centers)) == 1
         is_free = is_inside.any(axis=1)
@@ -134,19 +134,19 @@ def build_lattice(geodesics: Geodesics, side: int) -> tuple[Sites, Tiles]:
     cells = np.concatenate(all_cells)
     if not len(cells):
         raise ParameterError(
-            f"lattice: expected at least one site in the free space, got none with {side} cells along a "
+            f"lattice: expected at least one site in the free space, got none with {lattice} cells along a "
             "side; choose a finer lattice"
         )
     cells.setflags(write=False)
-    points = copy_read_only(_compute_centers(cells, side, spacing, geodesics.grid.origin))
-    sites = Sites(side, spacing, points, cells)
+    points = copy_read_only(_compute_centers(cells, lattice, spacing, geodesics.grid.origin))
+    sites = Sites(lattice, spacing, points, cells)
     return sites, _build_tiles(sites, geodesics.grid.snap(points), np.concatenate(all_components))
 
 
-def _compute_centers(cells: IntArray, side: int, spacing: float, origin: FloatArray) -> FloatArray:
-    """Return the centers of cells with the indices (m,), in meters, (m, 2)."""
-    columns = cells % side
-    rows = cells // side
+def _compute_centers(cells: IntArray, lattice: int, spacing: float, origin: FloatArray) -> FloatArray:
+    """Return the centers, (m, 2) in meters, of the cells with the given indices, (m,)."""
+    columns = cells % lattice
+    rows = cells // lattice
     return (np.column_stack([columns, rows]) + 0.5) * spacing + origin
 
 

@@ -110,7 +110,7 @@ class CoverageResult(Drawable):
 
     @cached_property
     def times(self) -> FloatArray:
-        """Time until the first robot arrives at each site, (m,) s; inf if none does.
+        """Time until the first robot arrives at each site, (m,) in seconds; inf if none does.
 
         Without `speeds`, robots move at 1 m/s.
         """
@@ -122,7 +122,7 @@ class CoverageResult(Drawable):
 
     @cached_property
     def first_waypoints(self) -> FloatArray:
-        """First corner on the path from the owner to each site, or else the site itself, (m, 2) m."""
+        """First corner on the path from the owner to each site, or else the site itself, (m, 2) in meters."""
         waypoints = self.points.copy()
         is_bent = self.first_corners >= 0
         waypoints[is_bent] = self.corners[self.first_corners[is_bent]]

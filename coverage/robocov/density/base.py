@@ -25,7 +25,7 @@ density."""
 class Density(ABC):
     """The importance φ of each point, as in equation (4). It is dimensionless and never negative.
 
-    A density is immutable.
+    A density is immutable. Subclasses define `kind` and the four abstract members.
 
     See Also
     --------
@@ -42,7 +42,6 @@ class Density(ABC):
 
     Examples
     --------
-    >>> import numpy as np
     >>> import robocov as rc
     >>> hall = rc.Environment("hall", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)))
     >>> peak = rc.Gaussian((8.0, 3.0), weight=4.0, sigma=1.0)
@@ -81,7 +80,7 @@ class Density(ABC):
 
     @abstractmethod
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute mass, first moments and polar moment of each cell about its origin.
+        """Compute the mass, first moments and polar moment of each cell about its origin.
 
         Parameters
         ----------
@@ -100,7 +99,7 @@ class Density(ABC):
 
     @property
     def is_uniform(self) -> bool:
-        """Whether the density is certainly the same everywhere. True only if the bounds coincide."""
+        """Whether the density is known to be the same everywhere, because the bounds coincide."""
         return self.lower_bound == self.upper_bound
 
     def compute_masses_and_centroids(
@@ -127,8 +126,8 @@ class Density(ABC):
         Notes
         -----
         Where the mean density of a cell is below 1e-9 of the maximum, rounding errors would dominate the
-        centroid. The centroid is then computed as if uniform mass had been added up to this mean density.
-        The returned masses are not changed.
+        centroid. The centroid is then computed as if the cell also contained a uniform density that raises
+        its mean to this value. The returned masses are not changed.
         """
         moments = self.compute_moments(edges, origins)
         # Rounding can make the mass of a cell with hardly any density negative.
@@ -225,7 +224,7 @@ class Uniform(Density):
         return np.full(len(points), float(self.weight))
 
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute mass, first moments and polar moment of each cell: those for density 1 times the weight.
+        """Compute the moments of each cell: those for density 1 times the weight.
 
         Parameters
         ----------

@@ -143,7 +143,7 @@ class Gaussian:
         return np.asarray(self.weight * np.exp(-0.5 * (x * x + y * y)))
 
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute mass, first moments and polar moment of each cell.
+        """Compute the mass, first moments and polar moment of each cell.
 
         Parameters
         ----------
@@ -275,7 +275,7 @@ class Gaussians(Density):
         return total
 
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute mass, first moments and polar moment of each cell in closed form.
+        """Compute the mass, first moments and polar moment of each cell in closed form.
 
         Parameters
         ----------

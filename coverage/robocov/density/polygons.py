@@ -186,7 +186,7 @@ class WeightedPolygons(Density):
         return values
 
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute mass, first moments and polar moment of each cell exactly.
+        """Compute the mass, first moments and polar moment of each cell exactly.
 
         Parameters
         ----------

@@ -229,8 +229,9 @@ class ArrayCache:
             arrays = read_arrays(io.BytesIO(payload), path.name, self.max_bytes)
             for array in arrays.values():
                 array.setflags(write=False)
+            # The time of modification tells when a file was last used. The arrays are valid without it.
             with suppress(OSError):
-                os.utime(path)  # The time of modification tells when a file was last used.
+                os.utime(path)
             return arrays
         return None
 
@@ -249,6 +250,7 @@ class ArrayCache:
         payload = buffer.getvalue()
         if len(payload) > self.max_bytes:
             return
+        # Without a cache, the arrays are computed again the next time.
         with suppress(OSError, OutputError):
             self.folder.mkdir(parents=True, exist_ok=True)
             with replace_file(self.folder / f"{key}{_SUFFIX}", durable=False) as temporary:
@@ -272,7 +274,7 @@ class ArrayCache:
         for _, size, path in sorted(entries):
             if total_size <= self.max_bytes:
                 break
-            with suppress(OSError):
+            with suppress(OSError):  # Another process may have removed the file, or may have it open.
                 path.unlink()
             total_size -= size
 

@@ -55,7 +55,8 @@ def lock_folder(folder: Path, name: str = ".lock", *, remove: bool = False) -> I
         yield
     finally:
         if remove:
-            # The file is removed while it is locked, so that no other process holds a lock on it.
+            # The file is removed while it is locked, so that no other process holds a lock on it. On a system
+            # that cannot remove open files, it remains, which does no harm.
             with suppress(OSError):
                 path.unlink()
         lock.release()

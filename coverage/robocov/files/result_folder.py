@@ -338,7 +338,7 @@ def report_folder_errors(folder: Path) -> Iterator[None]:
         raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
 
 
-def _read_file_lists(path: Path) -> tuple[set[str], set[str]] | None:
+def _read_manifest(path: Path) -> tuple[set[str], set[str]] | None:
     """Read the names of files in a manifest or journal; return None if there is no such file.
 
     The first set contains the files of the result, the second one the files to remove.
@@ -374,7 +374,7 @@ def _require_result_file(name: str) -> None:
 
 def _apply_journal(folder: Path) -> None:
     """Complete the steps in the journal of a folder, if there is one, and make the journal the manifest."""
-    journal = _read_file_lists(folder / _JOURNAL_FILE)
+    journal = _read_manifest(folder / _JOURNAL_FILE)
     if journal is None:
         return
     files, removed_files = journal
@@ -411,6 +411,8 @@ def _open_folder(folder: Path) -> Iterator[None]:
         finally:
             # If a commit was interrupted, its journal and staged files must remain for the next process.
             if not os.path.lexists(folder / _JOURNAL_FILE):
+                # The next process that opens the folder would discard the files as well. An error here must
+                # not replace an error of the block.
                 with suppress(OSError):
                     _discard_staging(folder)
 
@@ -441,20 +443,22 @@ def _find_replaced_files(folder: Path, *, overwrite: bool) -> set[str] | None:
     return owned_files
 
 
-def _find_result_root(folder: Path, list_name: str = MANIFEST_FILE) -> tuple[Path, str]:
+def _find_result_root(folder: Path, manifest_name: str = MANIFEST_FILE) -> tuple[Path, str]:
     """Return the folder of the whole result to which a folder belongs, and the name of the run.
 
-    The folder of one run of a comparison belongs to the folder of the comparison, whose manifest or journal
-    lists the files of the run. `list_name` is the file name of this manifest or journal. Any other folder
-    belongs to itself, and the name of the run is empty.
+    `manifest_name` is `MANIFEST_FILE` or `_JOURNAL_FILE`. A folder with a manifest or journal of its own is
+    the root of its result. The folder of a run of a comparison has none; it belongs to the comparison, whose
+    manifest or journal lists the files of the run. For any other folder, the folder itself and an empty name
+    are returned.
     """
-    if os.path.lexists(folder / list_name):
+    if os.path.lexists(folder / manifest_name):
         return folder, ""
     real_folder = Path(os.path.realpath(folder))  # Unlike `resolve`, this accepts circular links.
+    # A damaged manifest in the folder above does not make this folder part of a comparison.
     with suppress(InputError):
-        lists = _read_file_lists(real_folder.parent / list_name)
-        if lists is not None:
-            files, _ = lists
+        manifest = _read_manifest(real_folder.parent / manifest_name)
+        if manifest is not None:
+            files, _ = manifest
             if any(name.startswith(f"{real_folder.name}/") for name in files):
                 return real_folder.parent, real_folder.name
     return folder, ""
@@ -468,9 +472,9 @@ def _list_owned_files(folder: Path) -> set[str] | None:
     """
     # A damaged manifest still shows that robocov wrote the folder.
     with suppress(InputError):
-        lists = _read_file_lists(folder / MANIFEST_FILE)
-        if lists is not None:
-            files, _ = lists
+        manifest = _read_manifest(folder / MANIFEST_FILE)
+        if manifest is not None:
+            files, _ = manifest
             return files
     kind = _identify_kind(folder)
     if kind is None and not os.path.lexists(folder / MANIFEST_FILE):

@@ -198,7 +198,7 @@ def _is_nested_deeper(value: object, limit: int) -> bool:
 
 
 def locate_issues(error: MapError, text: str | bytes, source_name: str) -> MapError:
-    """Add lines and columns to the issues in a document.
+    """Return an error about a document with the lines and columns of its issues.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def locate_issues(error: MapError, text: str | bytes, source_name: str) -> MapEr
 
 
 def _locate(issue: Issue, text: str, offset: int) -> Issue:
-    """Add the line and the column of an offset in the text to an issue."""
+    """Return an issue with the line and the column of an offset in the text."""
     line, column = find_line_and_column(text, offset)
     return issue._replace(line=line, column=column)
 

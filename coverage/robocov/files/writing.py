@@ -61,6 +61,7 @@ def replace_file(target: Path, *, durable: bool = True) -> Iterator[Path]:
         yield temporary
         if durable:
             _flush(temporary)
+        # If the target exists, its permissions are kept.
         with suppress(FileNotFoundError):
             temporary.chmod(stat.S_IMODE(real_target.stat().st_mode))
         temporary.replace(real_target)

@@ -304,7 +304,7 @@ def cut_cell(
 
 
 def remove_streets(cell: Cell, widening: float) -> Cell:
-    """Remove the streets along the edges of a cell.
+    """Return the block that remains of a cell without the streets along its edges.
 
     Parameters
     ----------

@@ -201,12 +201,12 @@ def generate_map(  # noqa: PLR0913 - a keyword for each property of the map
         raise ParameterError(describe_unknown_name("kind of map", str(kind), GENERATORS))
     map_kind = GENERATORS[kind]
     side = require_number("side", side, MIN_SIDE_M, MAX_SIDE_M)
+    obstacle_count = map_kind.default_obstacle_count if obstacles is None else obstacles
+    blocked_fraction = map_kind.default_blocked_fraction if area is None else area
+    width = side if width is None else width
+    height = side if height is None else height
     request = MapRequest(
-        obstacle_count=map_kind.default_obstacle_count if obstacles is None else obstacles,
-        blocked_fraction=map_kind.default_blocked_fraction if area is None else area,
-        gap=gap,
-        width=side if width is None else width,
-        height=side if height is None else height,
+        obstacle_count=obstacle_count, blocked_fraction=blocked_fraction, gap=gap, width=width, height=height
     )
     for attempt in range(_MAX_ATTEMPTS):
         rng = np.random.default_rng([int(seed), attempt])

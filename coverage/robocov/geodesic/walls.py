@@ -178,7 +178,7 @@ def _list_segments(free: MultiPolygon) -> _Segments:
 
 
 def _sort_spatially(segments: _Segments) -> _Segments:
-    """Sort walls so that nearby ones have nearby indices."""
+    """Return the walls, sorted so that nearby ones have nearby indices."""
     middles = (segments.vertices[segments.starts] + segments.vertices[segments.ends]) / 2.0
     order = _compute_spatial_order(middles)
     return _Segments(

@@ -222,7 +222,7 @@ class _Proof(NamedTuple):
     bound: float
     """Lower bound on the cost, as a weighted sum over the sites, m."""
     prices: FloatArray
-    """(m,) Prices of the sites that prove the bound, m."""
+    """(m,) Prices of the sites that prove the bound, in meters."""
     better_candidates: FloatArray
     """(p, 2) Positions with a higher profit than any position in the table, grid steps."""
 
@@ -411,7 +411,7 @@ class _Dual:
     def improve_prices(
         self, prices: FloatArray, smoothing: float, heartbeat: Callable[[], None]
     ) -> FloatArray:
-        """Search for prices, (m,) m, that maximize the dual over the positions in the table.
+        """Search for prices, (m,) in meters, that maximize the dual over the positions in the table.
 
         The dual is the sum of the weighted prices minus n times the maximum profit of a position. The maximum
         has no gradient where several positions are equally profitable. The search therefore replaces it by
@@ -585,7 +585,7 @@ def _triangulate(area: shapely.Geometry) -> FloatArray:
 def _compute_initial_prices(
     geodesics: Geodesics, robots: FloatArray, sites: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the maximum and the initial prices of the sites, (m,) m each.
+    """Return the maximum and the initial prices of the sites, (m,) in meters each.
 
     The positions of the n robots and the m sites are in grid steps. The maximum price of a site is its
     distance from the robot of rank `_MAX_PRICE_RANK`; it is infinite if there are fewer robots.

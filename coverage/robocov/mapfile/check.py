@@ -134,6 +134,9 @@ class MapReport:
             Values by key.
         """
         gap = self.narrowest_gap
+        gap_width = None if gap is None else gap.width
+        gap_points = None if gap is None else [list(point) for point in gap.between]
+        density_range = None if self.density_range is None else list(self.density_range)
         return {
             "name": self.name,
             "area_m2": self.area,
@@ -144,11 +147,11 @@ class MapReport:
             "components_m2": list(self.components),
             "radius_m": self.radius,
             "unreachable_area_m2": self.unreachable_area,
-            "narrowest_gap_m": None if gap is None else gap.width,
-            "narrowest_gap_between": None if gap is None else [list(point) for point in gap.between],
+            "narrowest_gap_m": gap_width,
+            "narrowest_gap_between": gap_points,
             "starts": {start.name: {"kind": start.kind, "capacity": start.capacity} for start in self.starts},
             "density": self.density,
-            "density_range": None if self.density_range is None else list(self.density_range),
+            "density_range": density_range,
             "mean_density": self.mean_density,
             "warnings": list(self.warnings),
         }
@@ -181,6 +184,11 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     """
     gap = find_narrowest_gap(environment.free)
     density = environment.density
+    density_kind = None
+    density_range = None
+    if density is not None:
+        density_kind = density.kind
+        density_range = (density.lower_bound, _find_maximum(density))
     return MapReport(
         name=environment.name,
         area=environment.area,
@@ -192,8 +200,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         narrowest_gap=gap,
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(_find_warnings(environment, gap, radius)),
-        density=None if density is None else density.kind,
-        density_range=None if density is None else (density.lower_bound, _find_maximum(density)),
+        density=density_kind,
+        density_range=density_range,
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
         environment=environment,
     )

@@ -13,14 +13,17 @@ _INITIAL_NEIGHBORS = 8
 
 
 class ClosePairs(NamedTuple):
-    """Directed pairs of points, sorted by first, then second."""
+    """Directed pairs of points, sorted by first, then second.
+
+    Each pair appears twice, once in each direction.
+    """
 
     first: IntArray
-    """(m,) Index of the first point of each pair."""
+    """(k,) Index of the first point of each pair."""
     second: IntArray
-    """(m,) Index of the second point."""
+    """(k,) Index of the second point."""
     distances: FloatArray
-    """(m,) m"""
+    """(k,) Distance between the two points, m."""
 
 
 def find_close_pairs(positions: FloatArray, max_distance: float) -> ClosePairs:
@@ -61,7 +64,6 @@ def find_pairs_in_range(points: FloatArray, ranges: FloatArray) -> tuple[IntArra
     indptr : (n + 1,) int array
         ``pairs.second[indptr[i]:indptr[i + 1]]`` are the points in range of point i.
     pairs : ClosePairs
-        Each pair appears twice, once in each direction.
     """
     n = len(points)
     indptr = np.zeros(n + 1, np.intp)

@@ -60,18 +60,19 @@ class DensitySensor:
         known_positions: FloatArray,
         sensing_ranges: FloatArray,
     ) -> DensitySensor:
-        """Build the sensor of a step.
+        """Build the sensor for one step.
 
         Parameters
         ----------
         density : Density or None
-            The density that the robots measure; None for 1 everywhere.
+            The density that the robots measure. None if it is 1 everywhere.
         positions : (n, 2) array, m
             Positions of the robots.
         known_positions : (n, 2) array, m
             Positions as the robots know them. A robot measures relative to itself: with a localization error,
             it measures at a point that is off by this error.
         sensing_ranges : (n,) array, m
+            Maximum distance at which each robot can measure.
 
         Returns
         -------
@@ -90,7 +91,8 @@ class DensitySensor:
                 )
             if density is None:
                 return np.ones(len(points))
-            # Without a localization error, this avoids the rounding of `points - known + true`.
+            # The same array if there is no localization error. This avoids the rounding of
+            # `points - known_positions + positions`.
             if known_positions is positions:
                 return density.evaluate(points)
             return density.evaluate(positions[robots] + offsets)

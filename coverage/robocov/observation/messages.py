@@ -25,7 +25,7 @@ class Message:
     Parameters
     ----------
     payload : object
-        The content. It must not be changed after the message was sent.
+        The content. It must not be changed after the message has been sent.
     size : int, bytes
         Size of the payload when encoded. It determines how long the transmission takes, and how likely
         the message is lost.
@@ -33,7 +33,7 @@ class Message:
     Raises
     ------
     ParameterError
-        If the size is not a whole number from 1.
+        If the size is not a whole number from 1 to `MAX_MESSAGE_BYTES`.
 
     See Also
     --------

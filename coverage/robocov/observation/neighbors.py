@@ -192,9 +192,9 @@ class NeighborPositions(NamedTuple):
     indptr: IntArray
     """(n + 1,) ``indices[indptr[i]:indptr[i + 1]]`` are the neighbors of robot i."""
     indices: IntArray
-    """(m,)"""
+    """(k,) Indices of the neighbors of all robots, one robot after another."""
     positions: FloatArray
-    """(m, 2) m, reported positions in the order of `indices`; empty without reports."""
+    """(k, 2) Reported positions in the order of `indices`, m; empty without reports."""
 
     @classmethod
     def from_graph(cls, neighbors: Neighbors, reported_positions: FloatArray | None) -> NeighborPositions:

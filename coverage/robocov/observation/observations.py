@@ -23,13 +23,13 @@ class NeighborPairs(NamedTuple):
     """Directed pairs of a robot and one of its neighbors, sorted by robot, then neighbor."""
 
     robots: IntArray
-    """(m,) Index of the robot of each pair."""
+    """(k,) Index of the robot of each pair."""
     neighbors: IntArray
-    """(m,) Index of the neighbor."""
+    """(k,) Index of the neighbor."""
     offsets: FloatArray
-    """(m, 2) m, from the known position of the neighbor to the robot."""
+    """(k, 2) Vector from the known position of the neighbor to the robot, m."""
     distances: FloatArray
-    """(m,) m"""
+    """(k,) Distance from the neighbor to the robot, m."""
 
 
 @dataclass(slots=True, eq=False)

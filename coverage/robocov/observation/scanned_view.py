@@ -244,6 +244,8 @@ def is_behind_wall(x: float, y: float, wall_distances: FloatArray) -> bool:
 def is_path_clear(x: float, y: float, dx: float, dy: float, wall_distances: FloatArray) -> bool:
     """Return whether a straight path stays in front of the walls that the robot sees.
 
+    The start and the end of the path are not tested.
+
     Parameters
     ----------
     x, y : float, m

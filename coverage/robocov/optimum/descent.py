@@ -57,7 +57,7 @@ def descend(
     robot_components: IntArray,
     heartbeat: Callable[[], None] = lambda: None,
 ) -> CoverageResult:
-    """Move robots to a local minimum of the coverage cost.
+    """Find a local minimum of the coverage cost by descent from given positions.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class Edges(NamedTuple):
     """The edges of a directed graph with m nodes, in compressed sparse rows."""
 
     lengths: FloatArray
-    """(e,) m"""
+    """(e,) Length of each edge, m."""
     ends: IntArray
     """(e,) The node that each edge leads to."""
     edge_starts: IntArray

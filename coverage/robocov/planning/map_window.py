@@ -107,7 +107,7 @@ class MapWindow:
 
     @cached_property
     def nodes(self) -> FloatArray:
-        """Positions of the nodes, (m, 2) m, row by row."""
+        """Positions of the nodes, (m, 2) in meters, row by row."""
         return self.window.compute_nodes(self.known_map.raster)
 
     @cached_property

@@ -196,7 +196,7 @@ def _solve_laplace(blocks: _BlockGrid, block_side: int) -> FloatArray:
 
 @kernel
 def _spread_to_cells(cells: NDArray[np.uint8], block_openness: FloatArray, block_side: int) -> FloatArray:
-    """Give each unknown cell the openness of its block, and all other cells 0."""
+    """Return the openness of all cells: that of the block for unknown cells, and 0 for all other cells."""
     rows, columns = cells.shape
     openness = np.zeros((rows, columns))
     for row in range(rows):

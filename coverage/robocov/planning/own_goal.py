@@ -29,11 +29,11 @@ class OwnGoal(NamedTuple):
     """A local minimum of the coverage cost as a function of the position of one robot."""
 
     goal: FloatArray
-    """(2,) m"""
+    """(2,) m, the position of minimum cost."""
     node: int
     """The node at which the search ended, close to the goal."""
     cell_distances: FloatArray
-    """(m,) m, distances from that node to the nodes of the robot's own cell, 0 for all other nodes."""
+    """(m,) Distances from that node to the nodes of the robot's own cell, in meters; 0 for other nodes."""
     cost: float
     """Coverage cost J of the whole team with the robot at that node, in cells times meters."""
 
@@ -147,7 +147,7 @@ class _NodeSearch:
         return neighbors
 
     def compute_cell_distances(self, node: int) -> FloatArray:
-        """Compute the distances from a node to those of the robot's own cell, 0 for all others, (m,) m."""
+        """Compute the distances, (m,) in meters, from a node to those of the robot's cell; 0 for others."""
         distances = self._distances[node]
         is_own = distances < self._other_distances
         cell_distances = np.zeros(self._node_count)

@@ -400,7 +400,7 @@ class ScanLog:
 
 
 def _thin_out(checkpoints: Sequence[Checkpoint]) -> tuple[Checkpoint, ...]:
-    """Remove checkpoints so that older ones are farther apart, but keep the first and the last one.
+    """Return fewer checkpoints: older ones are farther apart, and the first and the last one are kept.
 
     The number of checkpoints then grows only with the logarithm of the number of rounds. When a late scan
     arrives, the number of rounds that have to be added again is proportional to the age of that scan.

@@ -36,7 +36,7 @@ class TeamSituation(NamedTuple):
     """Positions and previous goals of k robots, as known to the first of them, which makes the plan."""
 
     positions: FloatArray
-    """(k, 2) m"""
+    """(k, 2) m, positions of the robots."""
     previous_goals: FloatArray
     """(k, 2) m, goals in the previous plan, or the positions of robots without one."""
     is_fixed: BoolArray

@@ -72,6 +72,7 @@ class VoronoiRoadmap(NamedTuple):
         # Each group of adjacent cells of the graph becomes a vertex, at its first cell. Two vertices are
         # connected if their groups touch. Finally, the other free cells are added to the nearest group.
         is_in_graph = find_voronoi_cells(has_clearance)
+        # On a line, a group contains at least `steps` cells.
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_in_graph) / max_vertices)))
         first_cells, vertex_of_cell = _group_cells(is_in_graph, steps, _NEIGHBOR_STEPS)
         vertices = np.column_stack(np.divmod(first_cells, has_clearance.shape[1]))
@@ -170,11 +171,14 @@ def _thin(is_in_graph: BoolArray, must_stay: BoolArray, order: IntArray, neighbo
 
 @kernel
 def _count_crossings(is_in_graph: BoolArray, row: int, column: int, neighbor_steps: IntArray) -> int:
-    """Return Hilditch's crossing number of a cell. It is 1 if its neighbors stay connected without it.
+    """Return Hilditch's crossing number of a cell; removing the cell is safe only if it is 1.
 
     This is the number of separate runs of cells of the graph among the eight neighbors. The neighbors above
     and to the right, for example, touch diagonally, and belong to the same run. Each run is counted at its
     start: a side neighbor that is not in the graph, followed by a neighbor that is.
+
+    A closed ring of neighbors has no start and counts 0. Interior cells are therefore not removed, which
+    would make a hole.
     """
     crossings = 0
     for k in range(0, 8, 2):

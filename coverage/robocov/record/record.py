@@ -196,17 +196,17 @@ class Record(Drawable):
         VoronoiPartition or WeightedCells
             `WeightedCells` if `has_travel_time_cells`. The cells are those under unlimited communication.
         """
-        rows = slice(None) if self.conditions is None else self.is_working[k]
-        positions = self.positions[k][rows]
+        is_working = self.is_working[k]
+        positions = self.positions[k][is_working]
         region = self.environment.region
         density = self.environment.density
         if self.has_travel_time_cells:
-            speeds = self.team.max_speed[rows]
+            speeds = self.team.max_speed[is_working]
             return partition_by_travel_time(positions, speeds, region, density=density)
         return partition(positions, region, density=density)
 
     def snapshot(self, k: int) -> Snapshot:
-        """Return the state and the decision at a time step, without the force terms, which are not recorded.
+        """Return the state and the decision at a time step.
 
         Parameters
         ----------
@@ -216,25 +216,33 @@ class Record(Drawable):
         Returns
         -------
         Snapshot
+
+        Notes
+        -----
+        The observations contain only what is recorded: true positions instead of noisy ones, the density even
+        if the robots had to measure it, and no scans or messages. The decision has no force terms.
         """
-        is_working = None if self.conditions is None else self.is_working[k]
         neighbors = Neighbors.from_ranges(self.positions[k], self.team.communication_range)
+        is_working = None
+        if self.conditions is not None:
+            is_working = self.is_working[k]
+            neighbors = neighbors.restrict_to_working(is_working)
+        steering = None if self.steering is None else self.steering[k]
         observations = Observations(
             positions=self.positions[k],
             velocities=self.velocities[k],
-            neighbors=neighbors if is_working is None else neighbors.restrict_to_working(is_working),
+            neighbors=neighbors,
             obstacle_points=self.obstacle_points[k],
             region=self.environment.region,
             time=float(self.time[k]),
             max_speeds=self.team.max_speed,
             density=self.environment.density,
-            steering=None if self.steering is None else self.steering[k],
+            steering=steering,
         )
-        decision = Decision(
-            forces=self.forces[k],
-            goals=None if np.isnan(self.goals[k]).all() else self.goals[k],
-            cells=self.cells(k) if self.has_travel_time_cells else None,
-        )
+        goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
+        # Figures compute cells by distance themselves if a decision has none.
+        cells = self.cells(k) if self.has_travel_time_cells else None
+        decision = Decision(forces=self.forces[k], goals=goals, cells=cells)
         return Snapshot(observations, decision, is_working=is_working)
 
     def at(self, time: float) -> Snapshot:

@@ -148,8 +148,12 @@ class Scenario:
         source: ControllerSource | None = None,
     ) -> None:
         state = None
+        given_starts = None
         if starts is not None:
             state = TeamState(positions=starts, velocities=velocities, steering=steering)  # type: ignore[arg-type]
+            given_starts = state.positions
+            velocities = state.velocities
+            steering = state.steering
         elif velocities is not None or steering is not None:
             raise ParameterError("velocities: expected starts as well, got none")
         check_dt(dt)
@@ -160,9 +164,9 @@ class Scenario:
             "team": _build_team(team, robots, state),
             "start": start,
             "seed": seed,
-            "given_starts": None if state is None else state.positions,
-            "velocities": None if state is None else state.velocities,
-            "steering": None if state is None else state.steering,
+            "given_starts": given_starts,
+            "velocities": velocities,
+            "steering": steering,
             "duration": require_number("duration", duration, 0.0, MAX_DURATION_S, "s"),
             "dt": dt,
             "conditions": conditions,
@@ -238,10 +242,16 @@ class Scenario:
         ParameterError
             If a value cannot be used.
         """
+        controller: str | Controller = self.controller
+        gains: Mapping[str, Value] | None = self.gains
+        if self._controller_object is not None:
+            # The object contains the gains.
+            controller = self._controller_object
+            gains = None
         arguments: dict[str, Any] = {
             "environment": self.environment,
-            "controller": self.controller if self._controller_object is None else self._controller_object,
-            "gains": self.gains if self._controller_object is None else None,
+            "controller": controller,
+            "gains": gains,
             "team": self.team,
             "start": self.start,
             "seed": self.seed,
@@ -395,7 +405,8 @@ class Scenario:
             A scenario that starts from the recorded positions, and has the duration of the record. Changes
             that the user made in the window during the run are not part of the scenario.
         """
-        has_velocities = bool(record.velocities[0].any())
+        velocities = record.velocities[0] if record.velocities[0].any() else None
+        steering = None if record.steering is None else record.steering[0]
         return cls(
             record.environment,
             record.controller,
@@ -404,8 +415,8 @@ class Scenario:
             start=record.start,
             seed=record.seed,
             starts=record.positions[0],
-            velocities=record.velocities[0] if has_velocities else None,
-            steering=None if record.steering is None else record.steering[0],
+            velocities=velocities,
+            steering=steering,
             duration=float(record.time[-1] - record.time[0]),
             dt=record.dt,
             conditions=record.conditions,

@@ -39,7 +39,7 @@ class _BatchDecision(NamedTuple):
     """The decision for the robots of all runs in a step."""
 
     forces: FloatArray
-    """(runs * n, 2) N"""
+    """(runs * n, 2) N, forces on the robots, run by run."""
     goals: FloatArray | None
     """(runs * n, 2) m; None if the controller has no goals."""
     memories: list[Any]
@@ -214,11 +214,12 @@ class SimulationBatch:
             messages = decision.messages
         else:
             joint_forces = self._check_forces(forces)
-        next_inboxes = self._send_messages(messages)
+        next_inboxes, sent_bytes = self._send_messages(messages)
         # Change the state only after everything that can fail.
         self._world.step(joint_forces, self.dt)
         self._memories = next_memories
         self._inboxes = next_inboxes
+        self._sent_bytes += sent_bytes
         self._steps += 1
         self._clear_step_cache()
 
@@ -317,17 +318,22 @@ class SimulationBatch:
         _, observations = self._radio.receive_messages(self._inboxes[run], self._steps, self.observe_run(run))
         return observations
 
-    def _send_messages(self, messages: list[Sequence[Sequence[Message]]]) -> list[Inbox | None]:
-        """Send the messages of each run, which arrive in the next step, and return the new inboxes."""
+    def _send_messages(
+        self, messages: list[Sequence[Sequence[Message]]]
+    ) -> tuple[list[Inbox | None], FloatArray]:
+        """Return the inboxes of all runs after messages were sent, and the bytes that were sent in each run.
+
+        The messages arrive in the next step.
+        """
         inboxes: list[Inbox | None] = [None] * len(self)
+        sent_bytes = np.zeros(len(self))
         is_working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
             positions = self._world.positions[self._rows[run]]
-            inboxes[run], sent_bytes = self._radio.send_messages(
+            inboxes[run], sent_bytes[run] = self._radio.send_messages(
                 None, self._steps, run_messages, positions, is_working
             )
-            self._sent_bytes[run] += sent_bytes
-        return inboxes
+        return inboxes, sent_bytes
 
     def restart(self, run: int, starts: FloatArray) -> None:
         """Restart one run from other positions. The simulation time of the batch continues.

@@ -527,28 +527,24 @@ class Simulation:
         ParameterError
             If team and positions differ in size.
         """
+        has_same_conditions = conditions is None
+        has_same_controller = controller is None
         new_team = self.team if team is None else team
-        if steering is None and len(new_team) == len(self.team):
+        has_same_size = len(new_team) == len(self.team)
+        if steering is None and has_same_size:
             steering = self.steering
-        state = TeamState(
-            positions=self.positions if positions is None else positions,
-            velocities=self.velocities if velocities is None else velocities,
-            steering=steering,
-            steps=self._steps,
-        )
-        changed = Simulation(
-            self.environment if environment is None else environment,
-            self.controller if controller is None else controller,
-            state,
-            new_team,
-            self.dt,
-            conditions=self.conditions if conditions is None else conditions,
-        )
+        positions = self.positions if positions is None else positions
+        velocities = self.velocities if velocities is None else velocities
+        environment = self.environment if environment is None else environment
+        controller = self.controller if controller is None else controller
+        conditions = self.conditions if conditions is None else conditions
+        state = TeamState(positions=positions, velocities=velocities, steering=steering, steps=self._steps)
+        changed = Simulation(environment, controller, state, new_team, self.dt, conditions=conditions)
         changed.joined = self.joined
         changed.sent_bytes = self.sent_bytes
-        if len(new_team) == len(self.team):
+        if has_same_size:
             _copy_knowledge(
-                self, changed, copy_messages=conditions is None, has_same_controller=controller is None
+                self, changed, copy_messages=has_same_conditions, has_same_controller=has_same_controller
             )
         return changed
 

@@ -142,7 +142,7 @@ def _compute_segment_moments(half_angle: float, series: FloatArray) -> tuple[flo
 
 
 def split_into_chords(pieces: FloatArray, max_deviation: float) -> list[FloatArray]:
-    """Replace each piece by chords.
+    """Compute the chords that replace each piece.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def check_neighbors(neighbors: Neighbors, reported_positions: FloatArray | None,
 
 
 def apply_density(cells: _AnyCells, density: Density | None) -> _AnyCells:
-    """Set the density of new cells, and compute their masses and centroids for this density.
+    """Set the density of new cells and their masses and centroids for this density; return the cells.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: FloatArray) -> CellEdge
 
 
 def _cut_by_discs(edges: CellEdges, edge_radii: FloatArray) -> _CutEdges:
-    """Cut edges by discs around their generators, with a radius for each edge, (e,) m.
+    """Return edges that are cut by discs around their generators, with a radius for each edge, (e,) m.
 
     The boundary of the intersection of a cell with its disc follows each edge inside the disc. Outside the
     disc, the edge is replaced by an arc of the disc that spans the same directions.

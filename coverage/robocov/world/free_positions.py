@@ -21,7 +21,7 @@ _QUADRANT_SEGMENTS = 16
 
 
 def relocate_robots(environment: Environment, positions: FloatArray, team: Team) -> FloatArray:
-    """Move robots that overlap walls or each other, so that all of them fit.
+    """Compute new positions of robots that overlap walls or each other, so that all of them fit.
 
     In each round, robots in walls are moved to the nearest positions outside, and the two robots of each
     overlapping pair are moved apart.

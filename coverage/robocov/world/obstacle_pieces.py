@@ -167,7 +167,7 @@ def _triangulate(polygon: BaseGeometry) -> list[Ring]:
 
 
 def _merge_rings(rings: list[Ring]) -> list[Ring]:
-    """Merge triangles across their common edges as long as the results are convex.
+    """Return triangles, merged across their common edges as long as the results are convex.
 
     An edge is a pair of points. All rings are counter-clockwise. If one piece has the edge from a to b, the
     piece on the other side of this edge therefore has the edge from b to a.

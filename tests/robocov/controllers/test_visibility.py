@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from property_examples import count_examples
 
 from robocov.controllers import Boosting, Visibility
-from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_undetected
-from robocov.controllers.visibility import find_cells_in_view
+from robocov.controllers.boosting import Ascent, BoostLimits, Mode, compute_miss_probabilities
+from robocov.controllers.visibility import find_points_in_own_cell
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation import NeighborPairs, Observations, compute_ray_directions
@@ -126,7 +126,7 @@ def test_a_point_belongs_to_the_robot_with_the_lowest_power(seed: int, n: int) -
     directions = compute_ray_directions(16)
     depths = reach[:, None, None] * np.broadcast_to(rng.uniform(0.0, 1.0, 5), (n, 16, 5))
     pairs = observe(positions).find_neighbors()
-    is_own = find_cells_in_view(depths, np.full((n, 16), np.inf), directions, pairs, reach)
+    is_own = find_points_in_own_cell(depths, np.full((n, 16), np.inf), directions, pairs, reach)
     for i in range(n):
         points = positions[i] + depths[i][..., None] * directions[:, None]
         power = ((points[..., None, :] - positions) ** 2).sum(axis=-1) - reach**2
@@ -137,7 +137,7 @@ def test_neighbors_behind_walls_do_not_share_the_view() -> None:
     positions = np.random.default_rng(0).uniform((1, 1), (9, 7), size=(4, 2))
     pairs = observe(positions).find_neighbors()
     walls = np.full((4, 16), 1e-9)
-    is_own = find_cells_in_view(
+    is_own = find_points_in_own_cell(
         np.ones((4, 16, 5)), walls, compute_ray_directions(16), pairs, np.full(4, 3.0)
     )
     assert is_own.all()
@@ -219,14 +219,14 @@ def test_a_neighbor_behind_a_wall_detects_nothing_here() -> None:
     walls = np.full((1, 72), np.inf)
     pairs = NeighborPairs(np.array([0]), np.array([1]), np.array([[-2.0, 0.0]]), np.array([2.0]))
     reach = np.full(2, 3.0)
-    undetected = compute_undetected(depths, walls, directions, pairs, reach, 0.5)
+    undetected = compute_miss_probabilities(depths, walls, directions, pairs, reach, 0.5)
     distance = np.hypot(*(directions - [2.0, 0.0]).T)
     expected = np.where(distance <= 3.0, 1.0 - np.exp(-0.5 * distance), 1.0)
     np.testing.assert_allclose(undetected[0, :, 0], expected)
     # A wall between the two robots.
     walls[0, :5] = 1.5
     walls[0, -4:] = 1.5
-    assert (compute_undetected(depths, walls, directions, pairs, reach, 0.5) == 1.0).all()
+    assert (compute_miss_probabilities(depths, walls, directions, pairs, reach, 0.5) == 1.0).all()
 
 
 def test_boosts_lead_to_where_no_robot_detects() -> None:

@@ -180,7 +180,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ),
         (
             "def __post_init__(self): exit(0)",
-            "'Mine' cannot be created: it terminated Python by raising SystemExit: 0 (mine.py, line 7)",
+            "cannot be created: it tried to terminate Python by raising SystemExit: 0 (mine.py, line 7)",
         ),
         (
             "def __post_init__(self): raise TypeError('no')",
@@ -207,7 +207,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ("scanning = 5", "controller 'Mine': scanning: expected a Scanning, got 5"),
         (
             "def begin(self, region, team): exit(1)",
-            "controller 'Mine': it terminated Python by raising SystemExit: 1 (mine.py, line 7) at 0.000 s",
+            "'Mine': it tried to terminate Python by raising SystemExit: 1 (mine.py, line 7) at 0.000 s",
         ),
         (
             "def decide(self, seen, memory): return 3",
@@ -224,7 +224,7 @@ def test_an_invalid_controller_class_is_reported_with_its_line(
     head = "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Mine(Base):\n"
     mine.write_text(f"{base}{head}    {body}\n")
     arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *arguments, status=1 if "terminated Python" in part else 2)
+    assert part in read_error(capsys, *arguments, status=1 if "terminate Python" in part else 2)
     assert not out.exists()
 
 
@@ -278,7 +278,7 @@ def test_an_invalid_value_of_a_gain_is_rejected_in_a_short_line(
         ),
         (
             "raise SystemExit(0)",
-            "controller 'Mine': it terminated Python by raising SystemExit: 0 (mine.py, line 5)",
+            "controller 'Mine': it tried to terminate Python by raising SystemExit: 0 (mine.py, line 5)",
         ),
         (
             "return [float('nan'), 0]",
@@ -301,7 +301,7 @@ def test_a_failing_controller_is_reported_with_its_line(
     )
     out = tmp_path / "run"
     arguments = ("run", "square", *SHORT, "--json", "--controller", f"{mine}:Mine", "--out", str(out))
-    assert part in read_error(capsys, *arguments, status=1 if "terminated Python" in part else 2)
+    assert part in read_error(capsys, *arguments, status=1 if "terminate Python" in part else 2)
     assert not out.exists(), "no empty folder is left behind"
 
 

@@ -95,7 +95,7 @@ def test_the_source_of_a_custom_controller_is_saved(tmp_path: Path) -> None:
         ),
         (
             "        raise SystemExit(3)\n",
-            "controller 'Mine': it terminated Python by raising SystemExit: 3 (mine.py, line 11) for robot 1",
+            "controller 'Mine': it tried to terminate Python by raising SystemExit: 3 (mine.py, line 11)",
         ),
         (
             "        raise ValueError('a\\nb\\udcff')\n",

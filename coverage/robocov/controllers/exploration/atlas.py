@@ -67,7 +67,7 @@ _LISTENING_S = 2.0
 _SHARED_PATIENCE_FACTOR = 2.5
 """Factor of the gain `patience` if all robots learn what one of them sees."""
 _MIN_PROGRESS_M = 0.05
-"""A robot that moves less between two plans, away from its goal, is stuck."""
+"""A robot that has not arrived at its goal and moves less than this between two plans is stuck."""
 _SWAP_SAVING = 0.1
 """Fraction of the sum of squared path lengths that an exchange of goals must save."""
 _JOINT_PLANNING_CROSSINGS = 3.0
@@ -374,11 +374,15 @@ class Atlas(BaseController):
         return self._plan_own_motion(previous, state, seen, cooperation, robot)
 
     def _compute_period(self, previous: PlannerState, robot: int, time_to_next_node: float) -> float:
-        """Return the time until a robot's next plan, s: at least the time to move to the next node."""
+        """Return the time until a robot's next plan, s: at least the time to move to the next node.
+
+        After a robot's first plan, it is longer by a fraction that differs from robot to robot.
+        """
         period = max(self.period, time_to_next_node)
         if previous.basis is None and self.is_staggered:
             # The times from the first plan to the second differ, so that robots keep planning at different
-            # times.
+            # times. The delay of the first plan depends on `robot`; the next number gives a different
+            # fraction, above 0 also for robot 0.
             period = period * (1.0 + compute_stagger_fraction(robot + 1))
         return period
 

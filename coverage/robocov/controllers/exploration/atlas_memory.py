@@ -23,11 +23,11 @@ class TeamKnowledge:
     """Knowledge of one robot about the others."""
 
     teammates: Teammates
-    """The robots that it takes into account."""
+    """The robots that the robot takes into account."""
     encountered: frozenset[int] = frozenset()
-    """Indices of its neighbors so far, and of robots that others have reported to it; without failed ones."""
+    """Indices of the robots that the robot has met or learned of from reports; without failed ones."""
     loss_times: Mapping[int, float] = field(default_factory=dict)
-    """Time at which each lost robot was found to have failed or to be missing, s, by its index."""
+    """Time at which each lost robot was found to have failed or to be missing, s, by index."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class PlanBasis:
     planner: GridPlanner
     """Planner of the robot's own goal and its routes."""
     robots: IntArray
-    """(k,) Indices of the robots that it knew of, its own first."""
+    """(k,) Indices of the robot itself, which comes first, and of the others that it knew of."""
     positions: FloatArray
     """(k, 2) m, positions of these robots."""
     is_quiet: bool
@@ -66,7 +66,7 @@ class TeamGoals:
     planner: GridPlanner
     """Planner on which the goals were found."""
     robots: IntArray
-    """(p,) Indices of the robots with goals in the plan, its own first."""
+    """(p,) Indices of the robot itself, which comes first, and of the others with goals in the plan."""
     goals: FloatArray
     """(p, 2) m, goals of these robots."""
 
@@ -76,9 +76,9 @@ class OwnMotion:
     """Motion of a robot according to its last plan."""
 
     goal: FloatArray
-    """(2,) m, its own goal."""
+    """(2,) m, goal of the robot."""
     viewpoint: FloatArray | None = None
-    """(2,) m, the point to which it moves first, to look around. None: it moves straight to its goal."""
+    """(2,) m, point to which the robot moves first, to look around. None: it moves straight to its goal."""
     is_idle: bool = False
     """Whether the next plan may be skipped as long as nothing changes."""
 
@@ -88,28 +88,28 @@ class JamState:
     """Number of plans for which a robot has been stuck among others, and end of its move away from them."""
 
     stuck_plans: int = 0
-    """Number of consecutive plans during which it has been stuck."""
+    """Number of consecutive plans during which the robot has been stuck."""
     evasion_end: float = 0.0
-    """Time until which it moves out of the jam, s."""
+    """Time until which the robot moves out of the jam, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlannerState:
-    """Memory of one robot."""
+    """Memory of one robot. Immutable."""
 
     known_map: DiscoveredMap
-    """The map that it has discovered; with shared maps, the map when it last planned."""
+    """The map that the robot has discovered; with shared maps, the map when it last planned."""
     next_plan_time: float
     """Time of the next plan, s."""
     knowledge: TeamKnowledge
-    """Its knowledge of the other robots."""
+    """Knowledge of the other robots."""
     path: TraveledPath = TraveledPath()
     basis: PlanBasis | None = None
-    """The knowledge on which its last plan is based; None before the first plan."""
+    """Map and positions on which the last plan is based; None before the first plan."""
     team_goals: TeamGoals | None = None
-    """Result of the first stage of its last plan; None before the first plan."""
+    """Result of the first stage of the last plan; None before the first plan."""
     motion: OwnMotion | None = None
-    """Result of the later stages of its last plan; None before the first plan."""
+    """Result of the later stages of the last plan; None before the first plan."""
     jam: JamState = JamState()
 
     def __deepcopy__(self, memo: object) -> PlannerState:

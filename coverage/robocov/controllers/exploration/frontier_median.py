@@ -81,7 +81,7 @@ class FrontierMedian(SharedMapController):
         return Placement(goals=self._compute_median(situation), is_final=True, inspected_targets=inspected)
 
     def _list_inspected_targets(self, situation: Situation) -> FloatArray:
-        """Return the targets that need no further visit, (m, 2) m."""
+        """Return the targets that need no further visit, (t, 2) in meters."""
         previous_plan = situation.previous_plan
         if previous_plan is None:
             return np.empty((0, 2))

@@ -58,13 +58,13 @@ class _Messages(NamedTuple):
     """The newest message that each robot has received from each of its neighbors."""
 
     receivers: IntArray
-    """(m,) Index of the robot that has each message."""
+    """(k,) Index of the robot that has each message."""
     senders: IntArray
-    """(m,) Index of the robot that sent it."""
+    """(k,) Index of the robot that sent it."""
     positions: FloatArray
-    """(m, 2) m, reported position of the sender."""
+    """(k, 2) Reported position of the sender, m."""
     sent_times: FloatArray
-    """(m,) s, time at which each message was sent."""
+    """(k,) Time at which each message was sent, s."""
 
 
 class Estimates(NamedTuple):

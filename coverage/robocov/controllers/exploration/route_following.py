@@ -68,7 +68,7 @@ class RouteCommand(NamedTuple):
     """Forces that lead robots along their routes in one step."""
 
     forces: FloatArray
-    """(n, 2) N"""
+    """(n, 2) N, forces on the robots."""
     goals: FloatArray
     """(n, 2) m, ends of the routes."""
     waypoint_indices: IntArray

@@ -86,15 +86,17 @@ class RobotExchange:
 
     log: ScanLog
     own_scan: NumberedScan | None = None
-    """Its newest scan. It enters the log in the next step, when scans of others arrive at the earliest."""
+    """Newest scan of the robot. It enters the log in the next step, when scans of others arrive at the
+    earliest."""
     own_inventory: Inventory | None = None
-    """The inventory in its newest digest."""
+    """The inventory in the robot's newest digest."""
     digests: Mapping[int, ReceivedDigest] = field(default_factory=dict)
     """The newest digest that has arrived from each robot, by its index. Never changed in place."""
     repair_times: Mapping[tuple[int, int], float] = field(default_factory=dict)
-    """Times at which it last sent scans again, s, by robot and round. Never changed in place."""
+    """Times at which the robot last sent scans again, s, by owner and round of the scan. Never changed in
+    place."""
     outgoing: tuple[Message, ...] = ()
-    """Messages that it has not been able to send yet."""
+    """Messages that the robot has not been able to send yet."""
 
     def __deepcopy__(self, memo: object) -> RobotExchange:
         return self
@@ -272,7 +274,7 @@ class ScanExchange:
         )
 
     def send(self, seen: Observations) -> tuple[ScanExchange, tuple[tuple[Message, ...], ...]]:
-        """Take from each robot's outgoing messages those that it can send in this step.
+        """Return the outgoing messages that the robots can send in this step, and the exchange without them.
 
         Parameters
         ----------

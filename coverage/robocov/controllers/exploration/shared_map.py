@@ -60,7 +60,7 @@ class Placement(NamedTuple):
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
     inspected_targets: FloatArray = np.empty((0, 2))
-    """(m, 2) m, targets that need no further visit, for a controller that looks at unknown space."""
+    """(t, 2) Targets that need no further visit, m, for a controller that looks at unknown space."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +119,7 @@ class Candidates(NamedTuple):
     """Candidate positions for the goals of a plan, with a table of distances for `robocov.k_median`."""
 
     positions: FloatArray
-    """(c, 2) m"""
+    """(c, 2) m, the candidate positions."""
     table: FloatArray
     """(m, c) Weighted distances from the m nodes that count in the cost to the candidates."""
 

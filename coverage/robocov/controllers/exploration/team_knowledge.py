@@ -139,7 +139,7 @@ def _find_lost_robots(teammates: Teammates, seen: Observations, team: Team, robo
     communication_range = float(team.communication_range[robot])
     is_neighbor = np.isin(teammates.robots, seen.neighbors.list_neighbors(robot))
     silence = np.where(is_neighbor, 0.0, seen.time - teammates.message_times)
-    # Since their last messages, both robots may have moved apart at full speed.
+    # Since their last messages, both robots may have moved apart at full speed, which is assumed to be equal.
     max_distance = teammates.message_distances + 2.0 * float(team.max_speed[robot]) * silence
     distance = np.sqrt(((teammates.positions - seen.positions[robot]) ** 2).sum(axis=1))
     return _LostRobots(

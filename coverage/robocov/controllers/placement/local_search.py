@@ -57,7 +57,9 @@ class LocalSearch(PlacementController):
 
 
 def move_in_turn(placement_map: PlacementMap, sources: IntArray, threshold: float) -> IntArray:
-    """Let robots move one after another, each to where the cost is lowest, until no move saves enough.
+    """Find the candidates to which robots move one after another, each to where the cost is lowest.
+
+    The search ends when no move saves enough.
 
     Parameters
     ----------
