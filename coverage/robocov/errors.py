@@ -5,7 +5,7 @@
     │   ├── MapError          a map file, with line, column and JSON path of the first issue
     │   ├── StartError        a start without space for the team
     │   └── ParameterError    a gain, a limit, the name of a controller
-    ├── ControllerEndedError  a user's controller terminated Python (exit status 1)
+    ├── ControllerEndedError  a user's controller tried to end Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
 Every message is one line that names the source (a file or an argument), the place in it, the expected value

@@ -49,7 +49,7 @@ class GeodesicMemory:
     team: Team
     plan: GeodesicPlan | None = None
     plan_time: float = -np.inf
-    """s"""
+    """Time of the last plan, s."""
 
 
 @dataclass(frozen=True)

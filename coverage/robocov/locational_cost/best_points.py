@@ -35,11 +35,11 @@ HEIGHT_HELP = "height h of the sensor in (14), for target=sensing"
 _MAX_ITERATIONS = 80
 """Maximum number of iterations. Most cells need 4; a very thin cell below a low sensor needs a few dozen."""
 _MAX_WEIGHTED_ITERATIONS = 30
-"""The same for densities that are not uniform."""
+"""Maximum number of iterations for densities that are not uniform."""
 _STEP_TOLERANCE = 1e-7
 """The search ends with a step of at most this length, as a fraction of half the perimeter of the cell."""
 _WEIGHTED_STEP_TOLERANCE = 1e-6
-"""The same for densities that are not uniform, for which a quadrature limits the accuracy."""
+"""Step at which the search ends for densities that are not uniform, whose quadrature limits the accuracy."""
 _MIN_STEP = 1e-15
 """Steps up to this fraction of half the perimeter of the cell may be too short to change the point."""
 _MIN_CURVATURE = 1e-14

@@ -41,10 +41,11 @@ _ROUGH_SMOOTHINGS = (0.02, 0.007)
 """Smoothing of the maximum profit in the first searches for prices, as fractions of the cost per robot."""
 
 _FIRST_SMOOTHING = 0.0025
-"""The same in the search before the first proof. It is halved before each later proof."""
+"""Smoothing in the search before the first proof, as a fraction of the cost per robot. It is halved before
+each later proof."""
 
 _FINAL_SMOOTHING = 0.125
-"""The same in the last search for prices, as a fraction of the requested precision."""
+"""Smoothing in the last search for prices, as a fraction of the requested precision."""
 
 _RELATIVE_TOLERANCE = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""

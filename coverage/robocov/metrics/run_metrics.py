@@ -152,7 +152,8 @@ def compute_run_metrics(
     record : Record
         The run.
     rate : float, Hz
-        Number of samples per simulated second. The last time step is always sampled. Energy and path lengths
+        Number of samples per simulated second; 0 samples only the first and the last time step. The last time
+        step is always sampled. Energy and path lengths
         are integrated over all time steps of the record, regardless of the rate.
     on_sample : callable or None
         Called after each sample, to report progress.

@@ -27,7 +27,7 @@ _MAX_QUASI_NEWTON_TRIALS = 4
 """Maximum number of trial steps along the quasi-Newton direction, each half as long as the previous one."""
 
 _MAX_GRADIENT_TRIALS = 14
-"""The same along the scaled gradient."""
+"""Maximum number of trial steps along the scaled gradient, each half as long as the previous one."""
 
 _STALL_STEPS = 5
 """Number of the last steps whose decreases are added up to detect a stall."""

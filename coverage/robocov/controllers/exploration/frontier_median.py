@@ -24,7 +24,7 @@ _INSPECTED_RADIUS_M = 0.5
 _ARRIVAL_RADIUS_M = 0.3
 """Distance from a target at which a robot has inspected it."""
 _MIN_PROGRESS_M = 0.05
-"""A robot that moves less between two plans is stuck."""
+"""A robot with a goal that moves less than this between two plans is stuck."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 """A cell and its eight neighbors."""
 

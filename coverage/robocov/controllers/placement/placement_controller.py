@@ -178,7 +178,7 @@ class PlacementMemory:
     waypoint_indices: IntArray
     """(n,) Index, in its route, of the waypoint that each robot heads for."""
     plan_time: float = -math.inf
-    """s"""
+    """Time of the last plan, s."""
     returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
 
