@@ -92,7 +92,7 @@ def test_robots_pass_doors_wider_than_they_are(width, radius, passes):
         assert math.pi * (width / 2) ** 2 * 0.99 <= mark.area <= width * (0.2 + 2 * radius)
         assert result.cut_off.area == pytest.approx(5.9 * 8.0, abs=0.5)
         assert words[0] == (
-            f"the gap at (5.9, 4) is {width:.3g} m wide: too narrow for robots of radius {radius:g} m"
+            f"the passage at (5.9, 4) is {width:.3g} m wide: too narrow for robots of radius {radius:g} m"
         )
         assert words[1].startswith(
             f"robots of radius {radius:g} m cannot pass between 2 parts of the free space"

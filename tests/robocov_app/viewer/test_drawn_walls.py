@@ -109,7 +109,7 @@ def test_the_area_without_robots_is_cut_off() -> None:
 @pytest.mark.parametrize(
     ("end", "description", "is_cut_off"),
     [
-        (5.93, "a gap of 7 cm, too narrow for a robot", True),
+        (5.93, "a passage of 7 cm, too narrow for a robot", True),
         (5.7, "", False),
         (6.0, "about 24 m² cut off", True),
     ],

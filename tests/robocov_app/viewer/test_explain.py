@@ -79,7 +79,7 @@ def test_each_force_is_described_with_its_cause():
         "repelled with 0.30 N by the obstacle, 42 cm south",
         "slowed with 0.40 N by viscosity",
         "resultant of these forces 0.30 N north",
-        "32 cm clear of the obstacle south of it",
+        "32 cm from the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
     ]
     assert get_line(report, "attraction").vector == (0.31, 0.0)
@@ -159,6 +159,12 @@ def test_three_balancing_forces_are_named():
     assert balance in list_texts(report)
 
 
+@pytest.mark.parametrize(("force", "is_reported"), [(1.99, False), (2.03, False), (2.2, True)])
+def test_a_limit_is_reported_if_the_shown_numbers_differ(force: float, is_reported: bool):
+    report = build_report([[2.0, 5]], goals=[[5, 5]], attraction=[[force, 0.0]])
+    assert any(text.startswith("acceleration limited") for text in list_texts(report)) is is_reported
+
+
 def test_a_robot_pressed_against_an_obstacle_is_held_by_it():
     east = {"goals": [[5, 5]], "attraction": [[10.0, 0.0]], "environment": ROOMS}
     report = build_report([[3.9, 5]], points=[[4, 5]], **east)
@@ -189,7 +195,7 @@ def test_touching_robots():
     [
         (0.0, "arrived: at rest on its goal"),
         (0.03, "arrived: at rest on its goal"),
-        (0.2, "arrived: at rest 20 cm from its goal"),
+        (0.2, "at rest 20 cm from its goal"),
         (0.5, "at rest 50 cm short of its goal: no force acts on it"),
     ],
 )
@@ -207,7 +213,7 @@ def test_a_pushed_robot_has_not_arrived():
 
 def test_arrival_near_a_goal_inside_an_obstacle():
     report = build_report([[3.85, 5]], goals=[[4.1, 5]], environment=ROOMS)
-    assert report.verdict == "arrived: at rest 25 cm from its goal, which is inside an obstacle"
+    assert report.verdict == "at rest 25 cm from its goal, which is inside an obstacle"
 
 
 @pytest.mark.parametrize(

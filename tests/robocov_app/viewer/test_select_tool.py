@@ -102,6 +102,11 @@ def test_shift_drag_keeps_the_direction(driver: Driver) -> None:
     assert pillar.center[1] == pytest.approx(1.2, abs=1e-6)
 
 
+def list_titles(driver: Driver) -> list[str]:
+    """Return the titles in the open menu."""
+    return [row.title for row in driver.window.dialogs.current.rows if row is not None]
+
+
 def test_the_menu_of_a_wall_changes_duplicates_and_deletes_it(driver: Driver) -> None:
     count = len(list_obstacles(driver))
     assert {"wider", "narrower", "duplicate", "delete"} <= set(open_menu(driver, WALL))
@@ -128,8 +133,13 @@ def test_the_menu_of_a_robot_lets_it_fail(driver: Driver) -> None:
     point = tuple(get_position(driver, 2).tolist())
     assert {"robot:fail", "robot:remove", "robot:follow"} <= set(open_menu(driver, point))
     assert driver.viewer.selected_robot == 2
+    assert list_titles(driver)[0] == "Fail"
     choose(driver, "robot:fail")
     assert 2 not in driver.session.displayed.numbers
+    open_menu(driver, point)
+    assert list_titles(driver)[0] == "Revive"
+    choose(driver, "robot:fail")
+    assert 2 in driver.session.displayed.numbers
 
 
 def test_the_menu_of_the_floor_adds_a_robot(driver: Driver) -> None:

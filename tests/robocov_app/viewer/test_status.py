@@ -13,6 +13,7 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.scenario import SessionScenario
+from robocov_app.viewer.window.session_runner import SessionRunner
 from robocov_app.viewer.window.status import describe_cursor, list_facts
 
 
@@ -52,6 +53,21 @@ def test_the_status_line_contains_pauses_videos_and_delays(viewer: Presenter) ->
     viewer.session.playback.is_playing = True
     viewer.session.playback.clock.is_behind = True
     assert "1× (running at 0.5×)" in list_facts(viewer, 60.0, 30.0, None)
+    viewer.session.playback.is_suspended = True
+    assert "1×" in list_facts(viewer, 60.0, 0.0, None), "an open list is no delay"
+
+
+def test_an_open_list_does_not_change_the_measured_rate(viewer: Presenter) -> None:
+    runner = SessionRunner(viewer)
+    viewer.session.playback.is_playing = True
+    for _ in range(50):
+        runner.advance(1 / 60, 1)
+    rate = runner.step_rate
+    assert rate > 30.0
+    viewer.session.playback.is_suspended = True
+    for _ in range(50):
+        runner.advance(1 / 60, 1)
+    assert runner.step_rate == rate
 
 
 def test_the_cursor_is_described_by_robot_and_distance(viewer: Presenter) -> None:

@@ -308,7 +308,7 @@ def test_a_wall_may_end_at_its_first_point():
     session = start_session()
     click(tool, session, (3.2, 3.0), (4.0, 3.0), (4.0, 3.8), (3.2, 3.8), (3.2, 3.0))
     assert tool.finish(session) == (
-        "wall drawn; about 0.5 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
+        "wall drawn; about 0.5 m² cut off; a passage of 15 cm, too narrow for a robot"  # to the wall above
     )
     assert len(session.displayed.environment.obstacles[-1].points) == 5
 

@@ -158,6 +158,14 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         assert driver.session.displayed.numbers == (1, 3)
 
 
+def test_a_draft_of_a_file_names_the_file(tmp_path: Path) -> None:
+    workspace = SessionWorkspace(start_session(), tmp_path, tmp_path / "story.robocov")
+    advance_session(workspace.session, 5).fail_robot(2)
+    crash_after_draft(workspace)
+    (draft,) = find_recoverable_drafts(tmp_path)
+    assert re.match(r"Unsaved changes to story\.robocov, \d\d:\d\d, 1 edit", describe_draft(draft))
+
+
 def test_a_session_that_another_one_replaces_can_be_recovered(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path, draft_folder=tmp_path / "drafts")
     other = tmp_path / "other.robocov"

@@ -471,7 +471,7 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     diameter = format_length(2 * radius)
     if width == diameter:
         width = f"{gap.width:.3f} m"
-    label = f"gap {width} {sign} {diameter}"
+    label = f"passage {width} {sign} {diameter}"
     side = 1.0
     if abs(across[0]) >= MIN_LENGTH_PX:
         # The label is to the right of the gap.

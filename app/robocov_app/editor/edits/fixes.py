@@ -162,7 +162,7 @@ def _widen_gap(request: FixRequest) -> Change:
             description = f"{format_numbered_name(sketch, key)} shortened by {missing:.2g} m"
             return Change(sketch.with_objects({key: shortened}), Selection.of(key), description)
     movable = _drop_obstacles_at_both_ends(sides)
-    require(movable and gap.length > 0.0, "no obstacle next to the gap can be moved")
+    require(movable and gap.length > 0.0, "no obstacle next to the passage can be moved")
     item, end, opposite_end = min(movable, key=lambda side: side.item.geometry.area)
     dx = missing * (end[0] - opposite_end[0]) / gap.length
     dy = missing * (end[1] - opposite_end[1]) / gap.length

@@ -188,7 +188,7 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
     problem_by_mark: dict[int, Problem] = {}
     for gap in gaps:
         middle = _compute_middle(gap)
-        message = f"the gap at {format_position(*middle)} is {gap.width:.3g} m wide: {reason}"
+        message = f"the passage at {format_position(*middle)} is {gap.width:.3g} m wide: {reason}"
         mark = int(tree.nearest(shapely.Point(middle)))
         problem = Problem(message, LineString(gap.between), is_error=False, kind="narrow")
         # Gaps are sorted by width, so the first one of a mark is the narrowest.
@@ -198,7 +198,10 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
     if not others:
         return problems
     geometry = shapely.union_all([problem.geometry for problem in others])
-    return [*problems[:_MAX_GAPS], Problem(f"{len(others)} more gaps are {reason}", geometry, is_error=False)]
+    return [
+        *problems[:_MAX_GAPS],
+        Problem(f"{len(others)} more passages are {reason}", geometry, is_error=False),
+    ]
 
 
 def _build_reach_warnings(

@@ -43,7 +43,7 @@ def list_map_facts(editor: Editor) -> list[Fact]:
             _describe_parts(measurement),
             "Connected parts of the free space, and those that a robot can sweep",
         ),
-        Fact("Gap", _describe_gap(measurement), "The narrowest passage, and a robot's diameter"),
+        Fact("Passage", _describe_gap(measurement), "The narrowest passage, and a robot's diameter"),
         Fact("Content", _describe_content(sketch, measurement), "Obstacles and their vertices"),
         Fact(
             "Density",

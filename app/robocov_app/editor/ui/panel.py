@@ -143,13 +143,13 @@ OBJECT_BUTTONS: dict[str, tuple[tuple[PanelButton, ...], ...]] = {
             PanelButton("Left", "align:left"),
             PanelButton("Center", "align:center"),
             PanelButton("Right", "align:right"),
-            PanelButton("Gaps ↔", "distribute:x"),
+            PanelButton("Space ↔", "distribute:x"),
         ),
         (
             PanelButton("Top", "align:top"),
             PanelButton("Middle", "align:middle"),
             PanelButton("Bottom", "align:bottom"),
-            PanelButton("Gaps ↕", "distribute:y"),
+            PanelButton("Space ↕", "distribute:y"),
         ),
         (
             PanelButton("Join", "join"),

@@ -45,7 +45,7 @@ from robocov_app.toolkit.window.map_pictures import MapPictures
 from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
 from robocov_app.toolkit.window_part import WindowPart
 
-STATUS_HINT = "F5: test it · F1: keys"
+STATUS_HINT = "F5: try it · F1: keys"
 KEYS_HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 

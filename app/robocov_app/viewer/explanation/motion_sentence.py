@@ -88,8 +88,9 @@ def _describe_pushed(situation: RobotSituation) -> str:
 
 def _describe_arrival(goal: NearbyObject) -> str:
     distance = abs(goal.offset)
-    relation = "on" if distance <= SETTLED_DISTANCE_M else f"{format_length(distance)} from"
-    text = f"arrived: at rest {relation} {goal.name}"
+    text = f"arrived: at rest on {goal.name}"
+    if distance > SETTLED_DISTANCE_M:
+        text = f"at rest {format_length(distance)} from {goal.name}"
     if goal.obstruction:
         return f"{text}, which is {goal.obstruction}"
     return text

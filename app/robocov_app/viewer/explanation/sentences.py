@@ -181,7 +181,8 @@ def _list_limits(situation: RobotSituation) -> list[str]:
     if acceleration > _FAST_ACCELERATION * limit:
         allowed = format_number(limit)
         wanted = format_number(acceleration)
-        texts.append(f"acceleration limited to {allowed} m/s² (the forces ask for {wanted} m/s²)")
+        if wanted != allowed:
+            texts.append(f"acceleration limited to {allowed} m/s² (the forces ask for {wanted} m/s²)")
     max_speed = situation.max_speed
     low, high = _FULL_SPEED
     if situation.speed >= low * max_speed:
@@ -256,7 +257,7 @@ def _list_sensed(situation: RobotSituation) -> list[str]:
     if situation.senses_obstacle:
         if obstacle is None or obstacle in situation.touched:
             return []
-        return [f"{format_length(obstacle.gap)} clear of {obstacle.side_text}"]
+        return [f"{format_length(obstacle.gap)} from {obstacle.side_text}"]
     if 0.0 < situation.sensing_range < _MAX_LISTED_RANGE_M:
         return [f"senses nothing within {format_length(situation.sensing_range)}"]
     return ["senses nothing"]

@@ -73,12 +73,16 @@ class WindowMenus:
         self._dialogs.ask(Menu(rows, pixel, self._run_command, is_for_fingers=is_on_phone))
 
     def _get_command(self, name: str) -> Command:
-        """Return a command; that of the video says what it does now."""
+        """Return a command; those that switch something say what they do now."""
         command = self._commands[name]
-        if name != "video":
-            return command
-        title = "Stop recording" if self._viewer.view.is_recording else "Record a video"
-        return replace(command, title=title)
+        if name == "video":
+            is_recording = self._viewer.view.is_recording
+            return replace(command, title="Stop recording" if is_recording else "Record a video")
+        if name == "robot:fail":
+            setup = self._viewer.session.displayed.get_setup(self._viewer.pane)
+            has_failed = self._viewer.selected_robot in setup.failed
+            return replace(command, title="Revive" if has_failed else "Fail")
+        return command
 
 
 def list_context_commands(viewer: Presenter) -> tuple[str, ...]:

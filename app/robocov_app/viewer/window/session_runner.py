@@ -44,7 +44,7 @@ class SessionRunner:
         if session.playback.is_playing != was_playing:
             viewer.revision += 1
             self._report_end()
-        if seconds > 0:
+        if seconds > 0 and not session.playback.is_suspended:
             self.step_rate += STEP_RATE_WEIGHT * (steps / seconds - self.step_rate)
         viewer.update_cost_map()
 

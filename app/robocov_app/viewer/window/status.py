@@ -80,7 +80,9 @@ def _list_cost_facts(known_cost: KnownCost, time: float) -> list[str]:
 def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
     session = viewer.session
     speed = format_speed(session.playback.clock.speed)
-    if session.playback.is_playing and session.playback.clock.is_behind:
+    playback = session.playback
+    # An open dialog suspends playback; the last measured rate would be out of date.
+    if playback.is_playing and playback.clock.is_behind and not playback.is_suspended:
         actual = step_rate * session.timeline.scenario.dt
         return f"{speed} (running at {actual:.1f}×)"
     return speed

@@ -94,5 +94,5 @@ def _describe_narrow_gap(before: Environment, after: Environment, radius: float)
     old_gaps = {gap.between for gap in find_narrow_gaps(before.free, width)}
     for gap in find_narrow_gaps(after.free, width):
         if gap.between not in old_gaps:
-            return [f"a gap of {100 * gap.width:.0f} cm, too narrow for a robot"]
+            return [f"a passage of {100 * gap.width:.0f} cm, too narrow for a robot"]
     return []

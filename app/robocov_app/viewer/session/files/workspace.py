@@ -150,7 +150,7 @@ def _check_draft(draft: autosave.Draft) -> autosave.Draft | None:
 
 def describe_draft(draft: autosave.Draft) -> str:
     """Describe a draft for the question whether to recover it."""
-    name = "session" if draft.path is None else f"changes of {draft.path.name}"
+    name = "session" if draft.path is None else f"changes to {draft.path.name}"
     session = draft.content["session"]
     nodes = session["touches"] if "touches" in session else session["edits"]  # the former in old drafts
     count = len(nodes) - 1
