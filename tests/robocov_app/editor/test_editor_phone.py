@@ -11,6 +11,7 @@ import pytest
 from driven_editor import EditorDriver, build_sheet, open_editor
 
 from robocov.environment import WallObstacle
+from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.window.input import COMMAND_EVENT
 from robocov_app.toolkit.window.page_view import PageAppearance, WindowControls
 
@@ -68,6 +69,32 @@ def test_a_wall_is_drawn_moved_and_deleted_by_buttons_and_fingers(phone: EditorD
     run_page_command(phone, "delete")
     assert not phone.shapes
     assert not read_controls(phone).can_delete
+
+
+def test_the_context_menu_has_rows_for_fingers_and_scrolls(phone: EditorDriver) -> None:
+    run_page_command(phone, "tool:wall")
+    phone.click_all((3, 5), (7, 5))
+    run_page_command(phone, "finish")
+    run_page_command(phone, "tool:select")
+    phone.click_at((4, 5), button=3)
+    menu = phone.window.dialogs.current
+    assert isinstance(menu, Menu)
+    phone.run_frames(2)
+    box = phone.window.dialogs.box
+    assert phone.window.screen.get_rect().contains(box)
+    ui = phone.window.dialogs.ui
+    rows = [widget.rect for widget in ui.widgets.values() if widget.kind == "option"]
+    commands = [command for command in menu.rows if command is not None]
+    assert len(rows) == len(commands) > 15
+    assert rows[0].height == 48 * 2
+    assert rows[-1].height < 48 * 2, "the last row is partly out of sight"
+    for _ in range(10):
+        phone.turn_wheel(*box.center, -1)
+    phone.run_frames(2)
+    last_row = ui.widgets[f"option:{commands[-1].name}"].rect
+    assert last_row.height == 48 * 2
+    phone.click(*last_row.center)
+    assert not phone.window.dialogs.is_open
 
 
 def test_a_trial_on_a_phone_has_its_buttons_and_a_way_back(phone: EditorDriver) -> None:

@@ -350,7 +350,7 @@ class EditorWindow(CommandWindow):
         if self.canvas.contains(pixel):
             select_for_menu(self.editor, self.canvas.to_world(pixel))
         commands = [self.commands[name] if name else None for name in list_menu_commands(self.editor)]
-        self.dialogs.ask(Menu(commands, pixel, self.do))
+        self.dialogs.ask(Menu(commands, pixel, self.do, is_for_fingers=self.editor.is_compact))
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; the key for screenshots works even while a dialog is open."""

@@ -61,22 +61,31 @@ class Menu(Dialog):
         self._run = run
 
     def show_content(self, ui: Ui) -> None:
-        """Show the commands."""
-        for number, command in enumerate(self.rows):
-            if command is None:
-                ui.row(height=_SEPARATOR_PX, below=0)
-                ui.cell()
-                continue
-            ui.row(height=_FINGER_ROW_PX if self._is_for_fingers else _ROW_PX, below=0)
-            is_clicked = ui.option(
-                command.title,
-                self._get_key_text(command),
-                key=command.name,
-                highlighted=number == self.highlighted,
-                disabled_reason=command.get_disabled_reason(),
-            )
-            if is_clicked:
-                self._choose(command)
+        """Show the commands; if they are higher than the window, they scroll."""
+        with ui.scroll("menu"):
+            for number, command in enumerate(self.rows):
+                if command is None:
+                    ui.row(height=_SEPARATOR_PX, below=0)
+                    ui.cell()
+                else:
+                    ui.row(height=self._row_height, below=0)
+                    self._show_command(ui, number, command)
+
+    @property
+    def _row_height(self) -> int:
+        """Height of a row with a command at scale 1, px."""
+        return _FINGER_ROW_PX if self._is_for_fingers else _ROW_PX
+
+    def _show_command(self, ui: Ui, number: int, command: Command) -> None:
+        is_clicked = ui.option(
+            command.title,
+            self._get_key_text(command),
+            key=command.name,
+            highlighted=number == self.highlighted,
+            disabled_reason=command.get_disabled_reason(),
+        )
+        if is_clicked:
+            self._choose(command)
 
     def _get_key_text(self, command: Command) -> str:
         """Return the key of a command at the right end of its row; empty on a phone."""
@@ -115,7 +124,7 @@ class Menu(Dialog):
         self.highlighted = numbers[index % len(numbers)]
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
-        """Move the box to its position, and make it as wide as the longest row."""
+        """Move the box to its position, and make it as wide as the longest row and as high as all rows."""
         title_size = round(TEXT_PX * scale)
         key_size = round(SMALL_TEXT_PX * scale)
         widths = [
@@ -123,7 +132,12 @@ class Menu(Dialog):
             for command in self.rows
             if command is not None
         ]
-        box.update(self._position, (round(_TEXT_MARGINS_PX * scale) + max(widths), box.height))
+        command_count = len(widths)
+        separator_count = len(self.rows) - command_count
+        _, margin = self.margin
+        height = command_count * self._row_height + separator_count * _SEPARATOR_PX + 2 * margin
+        size = (round(_TEXT_MARGINS_PX * scale) + max(widths), min(round(height * scale), screen.height))
+        box.update(self._position, size)
         box.clamp_ip(screen)
 
 
