@@ -35,6 +35,24 @@ def test_pixels_of_the_map_have_pixels_of_the_window(driver: Driver, notches: in
     )
 
 
+def test_a_finger_next_to_a_robot_in_a_picture_reaches_it(driver: Driver) -> None:
+    driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True)
+    canvas = driver.window.map_pictures._pictures[PHONE, True]._canvas
+    position = get_position(driver, 2).tolist()
+    x, y = canvas.to_pixel(position)
+    driver.window.do("tool:failure")
+    driver.click(*driver.window.map_pictures.find_window_pixel(PHONE, (x - 23 * SCALE, y)))
+    assert driver.viewer.message == "Robot 2 failed"
+    x, y = driver.find_robot_pixel(3)
+    appearance = PageAppearance(
+        scale=1.0, theme="light", shows_panel=True, is_compact=False, is_motion_reduced=True
+    )
+    driver.window.set_appearance(appearance)
+    driver.settle()
+    driver.click(x - 20, y)
+    assert driver.viewer.message.startswith("No robot here"), "the mouse of a large page is exact"
+
+
 def test_points_that_the_window_does_not_show_stay_off_its_controls(driver: Driver) -> None:
     driver.turn_wheel(*driver.find_robot_pixel(2), 8)
     driver.window.map_pictures.draw(PHONE, SCALE, is_controlling=True)

@@ -123,7 +123,7 @@ def test_a_finger_next_to_the_groove_moves_a_slider(phone: Driver) -> None:
 def test_a_finger_next_to_a_robot_reaches_it(upright_phone: Driver) -> None:
     run_page_command(upright_phone, "tool:failure")
     x, y = upright_phone.find_robot_pixel(2)
-    upright_phone.click(x + 20 * RATIO, y)
+    upright_phone.click(x + 23 * RATIO, y)
     assert upright_phone.viewer.message.lower() == "robot 2 failed"
 
 

@@ -161,3 +161,16 @@ def test_robots_have_the_same_size_in_all_panes(tmp_path: Path) -> None:
         positions = [scene.now.positions for scene in canvas.scenes]
         assert measure_spacing(positions[0]) != pytest.approx(measure_spacing(positions[1]))
         assert len(radii) == 1
+
+
+def test_a_click_next_to_a_small_robot_reaches_it(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, robots=3, size=(1280, 720)) as driver:
+        for _ in range(8):
+            driver.window.do("zoom:out")
+        driver.window.do("tool:failure")
+        canvas = driver.window.canvas
+        pane_canvas = canvas._build_canvas(driver.window.screen, 0, canvas.scenes[0])
+        assert max(compute_drawn_radii(pane_canvas, canvas.scenes[0])) < 7.0
+        x, y = min(driver.find_robot_pixel(number) for number in (1, 2, 3))
+        driver.click(x - 11.5, y)
+        assert driver.viewer.message.startswith("Robot ")

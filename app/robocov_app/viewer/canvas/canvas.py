@@ -35,6 +35,9 @@ from robocov_app.viewer.session.document import Node
 # Lengths in pixels at scale 1.
 _HIT_MARGIN_PX = 3.0  # around a robot; a click within it selects the robot
 _FINGER_MARGIN_PX = 12.0  # the same on a phone
+_MIN_HIT_RADIUS_PX = 12.0  # around a small robot; a click within it selects the robot
+FINGER_RADIUS_PX = 24.0
+"""The same on a phone: the distance from the center of a robot within which a finger reaches it."""
 _ACTIVE_BAR_PX = 3  # height of the bar at the top of the active pane
 _FRAME_STRENGTH = 0.18  # fraction of the color of text in the frames of the panes
 _BAR_GAP_PX = 6.0  # between the layer bar and the map
@@ -75,6 +78,9 @@ class ViewerCanvas:
         Camera of all panes.
     layout : Layout
         Layout of the window, from `arrange`.
+    finger_reach : float, m
+        Distance from the center of a robot within which a press selects it, at least; for a phone that shows
+        the map of a large window in its own size.
     """
 
     layout: Layout
@@ -86,6 +92,7 @@ class ViewerCanvas:
         self.theme = theme
         self.camera = SharedCamera(viewer)
         self.hovered: HoveredRobot | None = None
+        self.finger_reach = 0.0
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._environment: Environment | None = None
@@ -150,6 +157,10 @@ class ViewerCanvas:
         """Return the reach of the pointer (see `REACH_PX`) on the map of a pane, m."""
         return REACH_PX * self.layout.scale / self._painters[pane].camera.zoom
 
+    def get_zoom(self) -> float:
+        """Return the number of pixels per meter, which is the same in all panes."""
+        return self._painters[0].camera.zoom
+
     def find_robot(self, pixel: tuple[float, float], pane: int) -> int | None:
         """Return the number of the working or failed robot at a pixel of a pane; None if there is none."""
         if pane >= len(self._scenes):
@@ -160,13 +171,16 @@ class ViewerCanvas:
         canvas = self._build_canvas(pygame.Surface((1, 1)), pane, scene)
         distances = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
         margin_px = _FINGER_MARGIN_PX if self.layout.is_compact else _HIT_MARGIN_PX
+        min_radius_px = FINGER_RADIUS_PX if self.layout.is_compact else _MIN_HIT_RADIUS_PX
+        min_radius = max(min_radius_px * self.layout.scale, self.finger_reach * canvas.camera.zoom)
         radii = np.array(compute_drawn_radii(canvas, scene)) + margin_px * self.layout.scale
+        radii = np.maximum(radii, min_radius)
         rows = np.flatnonzero(distances <= radii).tolist()
         hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
         for number, position in scene.failed.items():
             distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
             failed_radius_px = FAILED_RADIUS_PX + margin_px - _HIT_MARGIN_PX
-            if distance <= failed_radius_px * self.layout.scale:
+            if distance <= max(failed_radius_px * self.layout.scale, min_radius):
                 hits.append((distance, number))
         if hits:
             return min(hits, key=lambda hit: hit[0])[1]

@@ -7,7 +7,7 @@ import pygame
 
 from robocov_app.look.theme import get_theme
 from robocov_app.toolkit.window.layout import build_layout, compute_aspect, is_inside
-from robocov_app.viewer.canvas.canvas import ViewerCanvas
+from robocov_app.viewer.canvas.canvas import FINGER_RADIUS_PX, ViewerCanvas
 from robocov_app.viewer.chart.chart import Chart
 from robocov_app.viewer.lessons.guide import LessonGuide
 from robocov_app.viewer.lessons.page import ClickArea
@@ -81,6 +81,8 @@ class ViewerMapPicture:
         self._canvas.camera.follow(window_canvas.camera)
         self._canvas.hovered = window_canvas.hovered
         self._canvas.draw(surface)
+        if is_controlling:
+            window_canvas.finger_reach = FINGER_RADIUS_PX * scale / self._canvas.get_zoom()
         self._chart.draw(surface)
         self._lesson_areas = []
         lesson = self._sources.lesson.shown

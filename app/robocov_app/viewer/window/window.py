@@ -261,6 +261,8 @@ class ViewerWindow(CommandWindow):
         view.is_compact = appearance.is_compact
         view.is_motion_reduced = appearance.is_motion_reduced
         self.dialogs.set_appearance(appearance)
+        # If a phone controls the window, its picture sets the reach again.
+        self.canvas.finger_reach = 0.0
         self.layer_bar.max_menu_width = appearance.max_dialog_width
         self.viewer.revision += 1
 
