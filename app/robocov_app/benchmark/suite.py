@@ -239,7 +239,11 @@ def build_map(name: str) -> Environment:
 
 
 def compute_map_hash(environment: Environment) -> str:
-    """Return the SHA-256 of the content of a map, apart from its description and the schema of its file."""
+    """Return the SHA-256 of the content of a map, apart from its description and the schema of its file.
+
+    Starts are hashed under the names that they had when the suite was frozen.
+    """
+    # Set to None rather than removed: removing the keys would change the frozen hashes.
     document = {**to_json(environment), "$schema": None, "description": None}
     starts = document.get("starts", {})
     document["starts"] = {_FROZEN_START_NAMES.get(name, name): start for name, start in starts.items()}

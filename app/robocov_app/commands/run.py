@@ -43,7 +43,10 @@ class Arguments(RunOptions):
     For a session, the controllers in files that it may load, as in a.py:A,b.py:B.
     """
     branch: str | None = None
-    """Branch of a session, by name or number; by default the one that was displayed when it was saved."""
+    """Branch of a session, by name or number.
+
+    By default, it is the displayed branch, up to the step at which the session was saved.
+    """
     all_branches: bool = False
     """Simulate all branches of a session, each into its own folder."""
 
@@ -161,7 +164,10 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
 
 
 def _select_branches(session: SavedSession, options: Arguments) -> list[tuple[Node, int, str]]:
-    """Return the last node and the last step of each selected branch, and the suffix for its folder name."""
+    """Return node, step and suffix of the folder name for each branch to simulate.
+
+    By default, this is the branch of the session, up to the step at which it was saved.
+    """
     document = session.document
     if options.branch is not None:
         branch = document.find_branch(options.branch)

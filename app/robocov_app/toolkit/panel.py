@@ -41,7 +41,7 @@ class CommandPanel(CommandPart):
 
     tabs: tuple[str, ...] = ()
     tab_widths: tuple[float, ...] = ()
-    # Tips next to the panel do not cover other rows.
+    # Tooltips next to the panel do not cover other rows.
     tip_side = "left"
 
     def __init__(self, commands: CommandTable, run_command: Callable[[str], object]) -> None:

@@ -44,7 +44,7 @@ class ToolRail(CommandPart):
         Runs the command with a given name.
     """
 
-    # Tips next to the rail do not cover other tools.
+    # Tooltips next to the rail do not cover other tools.
     tip_side = "right"
 
     def __init__(
@@ -59,7 +59,7 @@ class ToolRail(CommandPart):
         return layout.rail
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Adopt a layout and a theme; tips appear at once on a narrow rail, which has no space for names."""
+        """Adopt a layout and a theme; on a narrow rail without names, tooltips appear at once."""
         super().arrange(layout, theme)
         self._has_labels = layout.rail.width > round(RAIL_WIDTH_PX * layout.scale)
         self.ui.tool_tip.is_immediate = not self._has_labels

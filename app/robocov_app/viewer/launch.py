@@ -133,7 +133,7 @@ class ViewerLauncher:
                 window.viewer.show_message(message)
                 self._offer_help(window, file)
                 try:
-                    with save_changed_settings(settings, file, partial(self._read_settings, window)):
+                    with save_changed_settings(settings, file, partial(self._collect_settings, window)):
                         yield window
                 finally:
                     window.viewer.files.workspace.close()
@@ -226,12 +226,17 @@ class ViewerLauncher:
             return (width, height)
         return fit_to_screen((width, height))
 
-    def _read_settings(self, window: ViewerWindow, before: ViewerSettings) -> ViewerSettings:
-        """Return the settings of a window, without layers that were shown or hidden by options."""
+    def _collect_settings(self, window: ViewerWindow, previous: ViewerSettings) -> ViewerSettings:
+        """Return the current settings of a window.
+
+        Layers that options showed or hid stay as in the previous settings.
+        """
         viewer = window.viewer
         view = viewer.view
-        usual = _list_usual_layers(before)
-        layers = view.layers - (self.shown_layers - usual) | (self.hidden_layers & usual)
+        usual = _list_usual_layers(previous)
+        layers = set(view.layers)
+        layers -= self.shown_layers - usual
+        layers |= self.hidden_layers & usual
         width, height = limit_window_size(window.display.windowed_size or window.screen.get_size())
         changes = {
             "theme": view.theme,
@@ -244,7 +249,7 @@ class ViewerLauncher:
             "width": width,
             "height": height,
         }
-        return before.model_copy(update=changes)
+        return previous.model_copy(update=changes)
 
 
 def _list_usual_layers(settings: ViewerSettings) -> set[str]:

@@ -196,7 +196,7 @@ def test_omissions_and_repairs_are_reported() -> None:
 
 def test_hairlines_become_walls() -> None:
     foreign = build_map(collect_shapes(HALL, lines=[[[5, 0], [5, 5]]], thickness=1e-5))
-    assert foreign.repaired == ("1 line thinner than 1 mm, made as wide",)
+    assert foreign.repaired == ("1 line thinner than 1 mm, widened to 1 mm",)
     assert foreign.free.area == pytest.approx(200 - 0.005)
 
 

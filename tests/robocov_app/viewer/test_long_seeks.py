@@ -10,6 +10,7 @@ import pytest
 from driven_window import open_viewer
 from sample_sessions import RAPF, advance_session, start_session
 
+from robocov.environment import Environment
 from robocov_app.viewer.session import playback, present, seek
 from robocov_app.viewer.session.files.session_file import build_session_content, load_session, save_session
 from robocov_app.viewer.session.files.workspace import SessionWorkspace
@@ -65,29 +66,51 @@ def test_each_of_two_undos_in_a_row_undoes_one_edit(slow_computer: None) -> None
     assert session.displayed.time == pytest.approx(3.0)
 
 
-def test_sensed_points_are_recomputed_one_state_at_a_time(
-    slow_computer: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Other branches have hundreds of states, which would block a frame if they were taken together."""
+@pytest.fixture
+def sensor_calls(monkeypatch: pytest.MonkeyPatch) -> list[Environment]:
+    """Record the map of each call of the sensor while sensed points are recomputed."""
+    calls: list[Environment] = []
+    get_sensor = present.get_sensor
+
+    def record_call(environment):
+        calls.append(environment)
+        return get_sensor(environment)
+
+    monkeypatch.setattr(present, "get_sensor", record_call)
+    return calls
+
+
+def build_session_on_another_branch() -> Session:
     session = build_long_session()
     session.undo()
     play_until_there(session)
     session.add_robot((3.0, 3.0))
-    calls = 0
-    get_sensor = present.get_sensor
+    return session
 
-    def count_call(environment):
-        nonlocal calls
-        calls += 1
-        return get_sensor(environment)
 
-    monkeypatch.setattr(present, "get_sensor", count_call)
+def test_sensed_points_are_recomputed_from_a_limited_number_of_states(
+    sensor_calls: list[Environment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = build_session_on_another_branch()
+    # The other branch has 121 states: less than twice the maximum.
+    monkeypatch.setattr(present, "MAX_SENSED_STATES", 100)
+    session.seek(session.timeline.document.nodes[2])
+    play_until_there(session)
+    assert len(session.timeline.history) == 121
+    assert len(sensor_calls) == 61
+
+
+def test_sensed_points_are_recomputed_one_state_at_a_time(
+    slow_computer: None, sensor_calls: list[Environment]
+) -> None:
+    """Other branches have hundreds of states, which would block a frame if they were taken together."""
+    session = build_session_on_another_branch()
     session.seek(session.timeline.document.nodes[2])
     while session.timeline.is_seeking:
-        before = calls
+        before = len(sensor_calls)
         session.playback.advance(1 / 60)
-        assert calls - before <= 2
-    assert calls > 10
+        assert len(sensor_calls) - before <= 2
+    assert len(sensor_calls) > 10
 
 
 def test_a_saved_session_opens_at_once_and_is_recomputed_afterwards(

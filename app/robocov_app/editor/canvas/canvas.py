@@ -272,10 +272,10 @@ class EditorCanvas:
         self._draw_status_strip(scene)
 
     def _build_scene(self, arena: Surface) -> EditorScene:
-        """Build the scene of one frame, with the state of the active tool and of a drag."""
+        """Build the scene of one frame, with the overlay of the active tool and the state of a drag."""
         editor = self.editor
         view = self.build_view()
-        state = editor.tool.build_overlay(editor)
+        tool_overlay = editor.tool.build_overlay(editor)
         sketch, selection = editor.displayed
         cursor = self.cursor_pixel
         if cursor is not None:
@@ -285,26 +285,26 @@ class EditorCanvas:
             canvas=view.build_canvas(arena),
             view=view,
             editor=editor,
-            state=state,
-            saved=editor.sketch,
+            tool_overlay=tool_overlay,
+            committed_sketch=editor.sketch,
             sketch=sketch,
             selection=selection,
-            hidden_keys=_find_hidden_keys(editor.sketch, sketch, state),
+            hidden_keys=_find_hidden_keys(editor.sketch, sketch, tool_overlay),
             team=self.team,
             hovered=self.hovered,
             cursor=cursor,
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
-        """Draw the sheet of the saved map, with a boundary, picture or density that a tool is changing."""
-        sketch = scene.saved
-        is_boundary_changed = scene.sketch.boundary is not scene.saved.boundary
+        """Draw the sheet of the committed map, with a boundary, image or density that a tool is changing."""
+        sketch = scene.committed_sketch
+        is_boundary_changed = scene.sketch.boundary is not scene.committed_sketch.boundary
         if is_boundary_changed:
             sketch = scene.sketch
-        if scene.state.background is not None:
-            sketch = replace(sketch, background=scene.state.background)
-        if scene.state.pending is not None:
-            sketch = replace(sketch, density=scene.state.pending.density)
+        if scene.tool_overlay.background is not None:
+            sketch = replace(sketch, background=scene.tool_overlay.background)
+        if scene.tool_overlay.pending is not None:
+            sketch = replace(sketch, density=scene.tool_overlay.pending.density)
         clip = scene.view.clip
         scene.surface.blit(self.sheet.draw(scene.view, sketch, scene.hidden_keys), clip, clip)
         image = self.sheet.reference_image
@@ -342,13 +342,15 @@ class EditorCanvas:
         canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
 
 
-def _find_hidden_keys(saved: Sketch, displayed: Sketch, state: EditorToolOverlay) -> frozenset[int]:
+def _find_hidden_keys(
+    committed: Sketch, displayed: Sketch, tool_overlay: EditorToolOverlay
+) -> frozenset[int]:
     """Return the keys of obstacles to leave out of the sheet: those that are dragged, changed or removed."""
-    dragged_image = state.dragged_image
+    dragged_image = tool_overlay.dragged_image
     if dragged_image is not None and not dragged_image.shows_copies:
         return dragged_image.selection.items
     # The originals of copies stay on the sheet.
-    if dragged_image is not None or displayed is saved:
+    if dragged_image is not None or displayed is committed:
         return frozenset()
     items = {item.key: item for item in displayed.obstacles}
-    return frozenset(item.key for item in saved.obstacles if items.get(item.key) is not item)
+    return frozenset(item.key for item in committed.obstacles if items.get(item.key) is not item)

@@ -57,7 +57,7 @@ class OverlayLayer(Protocol):
 
 
 class DraggedObstacles:
-    """Obstacles that the active tool drags, changes or copies."""
+    """Obstacles that the active tool drags, changes or copies, and the outlines of dragged starts."""
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
@@ -65,35 +65,35 @@ class DraggedObstacles:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the obstacles."""
-        if scene.state.dragged_image is not None:
-            self._draw_dragged_image(scene, scene.state.dragged_image)
-        elif scene.sketch is not scene.saved:
+        if scene.tool_overlay.dragged_image is not None:
+            self._draw_dragged_image(scene, scene.tool_overlay.dragged_image)
+        elif scene.sketch is not scene.committed_sketch:
             theme = scene.canvas.theme
-            # The sheet shows all obstacles of the saved map except for the hidden ones.
-            keys = scene.saved.index_by_key.keys() - scene.hidden_keys
-            items = [item for item in scene.sketch.obstacles if item.key not in keys]
+            # The sheet shows all obstacles of the committed map except for the hidden ones.
+            keys_on_sheet = scene.committed_sketch.index_by_key.keys() - scene.hidden_keys
+            items = [item for item in scene.sketch.obstacles if item.key not in keys_on_sheet]
             self._sheet.draw_items(scene.canvas, items, mix(theme.obstacle, theme.accent, DRAGGED_TINT))
 
     def _draw_dragged_image(self, scene: EditorScene, dragged: DraggedImage) -> None:
         camera = scene.view.camera
         image = self._image.get(
-            scene.saved,
+            scene.committed_sketch,
             (dragged.selection, camera, scene.view.theme.name),
-            lambda: self._draw_image(scene, dragged.selection),
+            lambda: self._render_image(scene, dragged.selection),
         )
         dx = round(camera.zoom * dragged.offset[0])
         dy = round(-(camera.zoom * dragged.offset[1]))
         scene.surface.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
 
-    def _draw_image(self, scene: EditorScene, selection: Selection) -> Surface:
+    def _render_image(self, scene: EditorScene, selection: Selection) -> Surface:
         theme = scene.view.theme
         canvas = scene.view.build_transparent_canvas()
-        items = [item for item in scene.saved.obstacles if item.key in selection.items]
+        items = [item for item in scene.committed_sketch.obstacles if item.key in selection.items]
         fill = mix(theme.obstacle, theme.accent, DRAGGED_TINT)
         self._sheet.draw_items(canvas, items, fill, theme.accent)
         for owner in selection.owners - selection.items:
             draw_object_outline(
-                canvas, self._sheet, scene.saved, owner, color=theme.accent, width=OUTLINE_WIDTH_PX
+                canvas, self._sheet, scene.committed_sketch, owner, color=theme.accent, width=OUTLINE_WIDTH_PX
             )
         return canvas.surface
 
@@ -124,7 +124,7 @@ class Paths:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the paths and, while motion is shown, each obstacle at its current position."""
-        sketch = scene.state.pending or scene.sketch
+        sketch = scene.tool_overlay.pending or scene.sketch
         theme = scene.canvas.theme
         for key in paths.list_moving_obstacles(sketch):
             item = sketch.get_item(key)
@@ -152,7 +152,7 @@ class StartMarkers:
             is_selected = name in scene.editor.selection.starts
             overlay.draw_start(scene.canvas, start, is_selected=is_selected)
             # Labels stay in place while obstacles are dragged.
-            draw_start_label(scene.canvas, scene.saved, start, label)
+            draw_start_label(scene.canvas, scene.committed_sketch, start, label)
 
 
 class TeamAtStart:
@@ -207,17 +207,17 @@ class SelectedObjects:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw outlines, frame and handles. Objects that are dragged have outlines already."""
-        if scene.state.dragged_image is not None:
+        if scene.tool_overlay.dragged_image is not None:
             return
         selection = scene.selection.restrict_to(scene.sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.owner for vertex in selection.vertices}
         self._draw_hovered_object(scene, owners)
         self._draw_outlines(scene, selection, owners)
-        if "handles" in scene.view.shown and scene.state.shows_handles and selection:
+        if "handles" in scene.view.shown and scene.tool_overlay.shows_handles and selection:
             self._draw_handles(scene, selection)
 
     def _draw_hovered_object(self, scene: EditorScene, selected: set[Owner]) -> None:
-        hovered = scene.state.hovered
+        hovered = scene.tool_overlay.hovered
         if hovered is None or hovered in selected or not scene.cursor:
             return
         if Selection.of(hovered).restrict_to(scene.sketch):
@@ -233,13 +233,13 @@ class SelectedObjects:
             self._draw_all(scene.canvas, scene.sketch, owners)
             return
 
-        def draw_image() -> Surface:
+        def render_image() -> Surface:
             canvas = scene.view.build_transparent_canvas()
             self._draw_all(canvas, scene.sketch, owners)
             return canvas.surface
 
         look = (selection, scene.view.camera, scene.view.theme.name, scene.view.scale)
-        image = self._outlines.get(scene.sketch, look, draw_image)
+        image = self._outlines.get(scene.sketch, look, render_image)
         scene.canvas.surface.blit(image, (0, 0), special_flags=_PREMULTIPLIED)
 
     def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:
@@ -260,7 +260,7 @@ class SelectedObjects:
         handles = editor.handles
         if scene.sketch is not editor.sketch or scene.pixel != editor.pixel:
             handles = list_handles(scene.sketch, selection, scene.pixel)
-        overlay.draw_handles(canvas, handles, selection.vertices, scene.state.hovered_handle)
+        overlay.draw_handles(canvas, handles, selection.vertices, scene.tool_overlay.hovered_handle)
 
 
 class GapLabel:
@@ -271,7 +271,7 @@ class GapLabel:
         measurement = scene.measurement
         if measurement is not None and measurement.gap is not None:
             cursor = None
-            if scene.state.labels_cursor:
+            if scene.tool_overlay.labels_cursor:
                 cursor = scene.cursor
             overlay.draw_gap_label(scene.canvas, measurement.gap, measurement.radius, cursor)
 
@@ -299,7 +299,7 @@ class ToolPreview:
 
     def draw(self, scene: EditorScene) -> None:
         """Draw the preview."""
-        overlay.draw_preview(scene.canvas, scene.state, scene.cursor)
+        overlay.draw_preview(scene.canvas, scene.tool_overlay, scene.cursor)
 
 
 class TypedText:

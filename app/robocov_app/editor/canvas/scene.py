@@ -30,9 +30,9 @@ class EditorScene:
         The view of the sheet.
     editor : Editor
         The editor.
-    state : EditorToolOverlay
-        Draw state of the tool.
-    saved : Sketch
+    tool_overlay : EditorToolOverlay
+        Overlay of the active tool.
+    committed_sketch : Sketch
         The map without the changes of the current drag.
     sketch : Sketch
         The map as it is displayed.
@@ -52,8 +52,8 @@ class EditorScene:
     canvas: Canvas
     view: View
     editor: Editor
-    state: EditorToolOverlay
-    saved: Sketch
+    tool_overlay: EditorToolOverlay
+    committed_sketch: Sketch
     sketch: Sketch
     selection: Selection
     hidden_keys: frozenset[int]

@@ -24,6 +24,11 @@ For small angles it is the angle between the directions of the paths, rad.
 """
 _BLOCK_PX = 4
 """Side of the blocks of pixels that are evaluated at their middle first."""
+_NEAR_BLOCK_SIDES = 1.5
+"""Distance from a border, in block sides, within which pixels are evaluated: about a diagonal.
+
+Half of it reaches the corners of a block; the rest allows for curved borders.
+"""
 _MAX_CANDIDATES = 5
 """Maximum number of paths that are compared at a point."""
 _TOLERANCE_STEPS = 1e-9
@@ -50,8 +55,13 @@ class BorderPixels:
 
     def select_within(self, max_distance: float) -> BorderPixels:
         """Return the pixels within a distance of the border, m."""
-        rows = (self.distances <= max_distance).nonzero()[0]
-        return BorderPixels(self.rows[rows], self.columns[rows], self.owners[rows], self.distances[rows])
+        indices = (self.distances <= max_distance).nonzero()[0]
+        return BorderPixels(
+            rows=self.rows[indices],
+            columns=self.columns[indices],
+            owners=self.owners[indices],
+            distances=self.distances[indices],
+        )
 
 
 class _Candidates(NamedTuple):
@@ -234,12 +244,13 @@ class DistanceField:
     def _evaluate_borders(
         self, x: FloatArray, y: FloatArray, max_distance: float
     ) -> tuple[BorderPixels, BorderPixels]:
-        """Evaluate the pixels of squares with candidates: coarsely in blocks, then finely near borders.
+        """Find owners and border distances: once per block of pixels, then per pixel near borders.
 
         Returns
         -------
         coarse : BorderPixels
-            All pixels of these squares, with the values at the middle of their block.
+            Pixels of the blocks whose middle is in a square with candidates, each with the values at that
+            middle.
         fine : BorderPixels
             Pixels that may be within the maximum distance, m, of a border, with their own values.
         """
@@ -248,16 +259,15 @@ class DistanceField:
         middle_y = compute_block_middles(y, _BLOCK_PX)
         columns, rows = self.lattice.find_squares(middle_x, middle_y)
         has_candidates = self._border_candidates.indices[rows[block_rows], columns[block_columns]] >= 0
-        blocks = self._evaluate_pixels(
+        blocks = self._evaluate_points(
             block_rows[has_candidates], block_columns[has_candidates], middle_x, middle_y
         )
-        step = abs(x[1] - x[0]) if len(x) > 1 else self.lattice.spacing
-        # Half the diagonal of a block, and as much again, since borders may be curved.
-        is_near = blocks.distances <= max_distance + 1.5 * _BLOCK_PX * step
+        pixel_spacing = abs(x[1] - x[0]) if len(x) > 1 else self.lattice.spacing
+        is_near = blocks.distances <= max_distance + _NEAR_BLOCK_SIDES * _BLOCK_PX * pixel_spacing
         fine_block_rows = np.append(blocks.rows[is_near], block_rows[~has_candidates])
         fine_block_columns = np.append(blocks.columns[is_near], block_columns[~has_candidates])
         fine_rows, fine_columns, _ = _list_block_pixels(fine_block_rows, fine_block_columns, len(y), len(x))
-        fine = self._evaluate_pixels(fine_rows, fine_columns, x, y)
+        fine = self._evaluate_points(fine_rows, fine_columns, x, y)
         return _spread_over_pixels(blocks, len(y), len(x)), fine
 
     def _find_blocks(self, x: FloatArray, y: FloatArray) -> tuple[IntArray, IntArray]:
@@ -272,15 +282,16 @@ class DistanceField:
         block_rows, block_columns = np.logical_or.reduce(has_corner).nonzero()
         return block_rows, block_columns
 
-    def _evaluate_pixels(
+    def _evaluate_points(
         self, rows: IntArray, columns: IntArray, x: FloatArray, y: FloatArray
     ) -> BorderPixels:
-        """Return the nearest robot of pixels, and their distance to the border with the second nearest.
+        """Return the nearest robot of points, and their distance to the border with the second nearest.
 
         Parameters
         ----------
         rows, columns : (k,) int array
-            Pixels of the grid. Those in squares without candidates are left out.
+            Rows and columns of points of the grid `x`, `y` (pixels or middles of blocks). Points in squares
+            without candidates are left out.
         x : (w,) array, m
         y : (h,) array, m
 

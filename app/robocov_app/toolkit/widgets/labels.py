@@ -5,7 +5,7 @@ from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import wrap_text
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, TEXT_PX, draw_text, get_text_size
 from robocov_app.toolkit.widgets.page import Page, Widget
-from robocov_app.toolkit.widgets.tool_tip import TipSketch
+from robocov_app.toolkit.widgets.tool_tip import TipDrawing
 
 _NOTE_GAP_PX = 6.0  # at scale 1
 
@@ -26,7 +26,7 @@ def show_label(
     tip: str = "",
     align: str = "left",
     note: str = "",
-    sketch: TipSketch | None = None,
+    drawing: TipDrawing | None = None,
 ) -> None:
     """Show a line of text in the next cell.
 
@@ -44,11 +44,11 @@ def show_label(
         "left", "center" or "right".
     note : str
         Small gray text after a text at the left, shown if there is space for it.
-    sketch : TipSketch, optional
+    drawing : TipDrawing, optional
         Drawing in the tooltip.
     """
     rect = page.cell()
-    page.add_widget(Widget("label", key or text, rect, text, tip=tip, sketch=sketch))
+    page.add_widget(Widget("label", key or text, rect, text, tip=tip, drawing=drawing))
     is_small = style in ("header", "unit")
     color = page.theme.ink
     if is_small:

@@ -18,7 +18,7 @@ from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.widgets.open_list import OpenList
 from robocov_app.toolkit.widgets.row_layout import RowLayout
 from robocov_app.toolkit.widgets.text_edit import TextEdit
-from robocov_app.toolkit.widgets.tool_tip import TipSide, TipSketch, ToolTip, draw_tool_tip
+from robocov_app.toolkit.widgets.tool_tip import TipDrawing, TipSide, ToolTip, draw_tool_tip
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.input import DOUBLE_CLICK_S, ENTER_KEYS, get_key_name
 
@@ -45,7 +45,7 @@ class Widget:
     tip : str
         Tooltip; if it has several lines, the first one is its title.
     enabled : bool
-    sketch : TipSketch or None
+    drawing : TipDrawing or None
         Drawing in the tooltip.
     """
 
@@ -56,7 +56,7 @@ class Widget:
     value: object = None
     tip: str = ""
     enabled: bool = True
-    sketch: TipSketch | None = None
+    drawing: TipDrawing | None = None
 
 
 class Page(RowLayout):
@@ -103,9 +103,9 @@ class Page(RowLayout):
     scroll_offsets, content_heights : dict of str to float
         Scroll offset and total height of the content at scale 1, px, by the key of the scroll area.
     tool_tip : ToolTip
-        Decides when the tip of the widget under the pointer appears.
+        Decides when the tooltip of the widget under the pointer appears.
     tip_side : TipSide
-        Where tips appear: below their widgets, or to the left or right of the page.
+        Where tooltips appear: below their widgets, or to the left or right of the page.
     """
 
     def __init__(self, theme: Theme, scale: float = 1.0) -> None:
@@ -242,7 +242,7 @@ class Page(RowLayout):
                 widget=widget.rect,
                 page=self.box,
                 side=self.tip_side,
-                sketch=widget.sketch,
+                drawing=widget.drawing,
             )
 
     # For widgets

@@ -20,23 +20,23 @@ TIP_TEXT_COLOR: Color = (245, 247, 250)
 _TEXT_PX = 11.0
 _LINE_PX = 16.0
 _MAX_WIDTH_PX = 240.0
-_DISTANCE_PX = 5.0
-"""Distance of the tip from the widget, and of the text from the top of the tip."""
+_GAP_TO_WIDGET_PX = 5.0
+_TOP_MARGIN_PX = 5.0
+"""Distance of the text from the top of the box, and of a drawing from the text."""
 _CORNER_RADIUS_PX = 4.0
 _MARGIN_PX = 7.0
 _HEIGHT_PX = 9.0
 """Height of the box in addition to that of its content."""
 _FILL_STRENGTH = 0.2
-"""Fraction of the color of text in the background of tips, with the dark theme."""
+"""Fraction of the color of text in the background of tooltips, with the dark theme."""
 _LIGHT_FILL_STRENGTH = 0.92
 _EDGE_STRENGTH = 0.24
 
-TipSketch: TypeAlias = Callable[[float], Surface]
+TipDrawing: TypeAlias = Callable[[float], Surface]
 """Function that renders a drawing for a tooltip, with premultiplied alpha, at a scale."""
 
-
 TipSide: TypeAlias = Literal["below", "left", "right"]
-"""Side on which a tip appears: below its widget, or to the left or right of the page with the widget."""
+"""Side on which a tooltip appears: below its widget, or to the left or right of the page with the widget."""
 
 
 class _Line(NamedTuple):
@@ -52,7 +52,7 @@ class ToolTip:
     Attributes
     ----------
     is_immediate : bool
-        Whether tips appear at once, because the widgets show no names.
+        Whether tooltips appear at once, because the widgets show no names.
     """
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class ToolTip:
         self._rested_since_s = perf_counter()
 
     def dismiss(self) -> None:
-        """Show no tip until the mouse is over another widget, because this one was pressed."""
+        """Show no tooltip until the mouse is over another widget, because this one was pressed."""
         self._is_dismissed = True
 
     def set_hovered(self, widget: str) -> bool:
@@ -101,75 +101,77 @@ def draw_tool_tip(
     widget: Rect,
     page: Rect,
     side: TipSide = "below",
-    sketch: TipSketch | None = None,
+    drawing: TipDrawing | None = None,
 ) -> None:
-    """Draw a tooltip next to a widget, where it covers neither the widget nor its neighbors.
+    """Draw a tooltip next to a widget, or next to the page that contains it.
 
     Parameters
     ----------
     screen : pygame.Surface
+        Surface to draw on; its size is that of the window.
     text : str
         If it has several lines, the first one is a title.
     theme : Theme
     scale : float
-        Size of texts and margins.
+        Factor by which text sizes and margins are multiplied.
     widget : pygame.Rect
         Position of the widget in the window, px.
     page : pygame.Rect
         Position of the panel, bar or menu with the widget, px.
     side : TipSide
-        Where the tip appears. If there is no space beside the page, it is below the page; if there is no
-        space below, it is above.
-    sketch : TipSketch, optional
+        Where the tooltip appears. If there is no space next to the page, it is below the page; if there is
+        no space below, it is above.
+    drawing : TipDrawing, optional
         Drawing below the text.
     """
-    size = round(_TEXT_PX * scale)
+    text_size = round(_TEXT_PX * scale)
     line_height = round(_LINE_PX * scale)
-    distance = round(_DISTANCE_PX * scale)
-    lines = _list_lines(text, size, round(_MAX_WIDTH_PX * scale))
-    width = max(measure_text(line.text, size, line.is_title) for line in lines)
+    gap = round(_GAP_TO_WIDGET_PX * scale)
+    top_margin = round(_TOP_MARGIN_PX * scale)
+    lines = _list_lines(text, text_size, round(_MAX_WIDTH_PX * scale))
+    width = max(measure_text(line.text, text_size, line.is_title) for line in lines)
     height = line_height * len(lines)
     image: Surface | None = None
-    if sketch is not None:
-        image = sketch(scale)
+    if drawing is not None:
+        image = drawing(scale)
         width = max(width, image.get_width())
-        height += distance + image.get_height()
+        height += top_margin + image.get_height()
     box_size = (width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
-    box = _place_box(box_size, widget, page, side, distance=distance, window=screen.get_rect())
+    box = _place_box(box_size, widget, page, side, gap=gap, window=screen.get_rect())
     _draw_box(screen, box, theme, scale)
     left = box.left + round(_MARGIN_PX * scale)
-    top = box.top + distance
+    top = box.top + top_margin
     for line in lines:
-        screen.blit(render_text(line.text, size, TIP_TEXT_COLOR, line.is_title), (left, top))
+        screen.blit(render_text(line.text, text_size, TIP_TEXT_COLOR, line.is_title), (left, top))
         top += line_height
     if image is not None:
-        screen.blit(image, (left, top + distance), special_flags=BLEND_PREMULTIPLIED)
+        screen.blit(image, (left, top + top_margin), special_flags=BLEND_PREMULTIPLIED)
 
 
 def _place_box(
-    size: tuple[int, int], widget: Rect, page: Rect, side: TipSide, *, distance: int, window: Rect
+    size: tuple[int, int], widget: Rect, page: Rect, side: TipSide, *, gap: int, window: Rect
 ) -> Rect:
-    """Return the box of a tip at a distance from its page, px, inside the window; see `draw_tool_tip`."""
+    """Return the box of a tooltip in the window; `gap` is its distance from the widget or the page, px."""
     box = Rect((0, 0), size)
-    # Above its page, the top bar would cover a tip.
+    # Above its page, the top bar would cover a tooltip.
     below_top_of_page = Rect(window.left, page.top, window.width, window.bottom - page.top)
     if side == "right":
-        box.midleft = page.right + distance, widget.centery
+        box.midleft = page.right + gap, widget.centery
         if box.right <= window.right:
             return box.clamp(below_top_of_page)
     elif side == "left":
-        box.midright = page.left - distance, widget.centery
+        box.midright = page.left - gap, widget.centery
         if box.left >= window.left:
             return box.clamp(below_top_of_page)
     anchor = widget if side == "below" else page
-    box.midtop = widget.centerx, anchor.bottom + distance
+    box.midtop = widget.centerx, anchor.bottom + gap
     if box.bottom > window.bottom:
-        box.bottom = anchor.top - distance
+        box.bottom = anchor.top - gap
     return box.clamp(window)
 
 
 def _draw_box(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
-    """Draw the empty box of a tip; its text is light in both themes."""
+    """Draw the empty box of a tooltip; its text is light in both themes."""
     strength = _FILL_STRENGTH
     if theme is LIGHT:
         strength = _LIGHT_FILL_STRENGTH
@@ -178,11 +180,11 @@ def _draw_box(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
     draw_rounded_box(screen, box, fill, edge=edge, radius=round(_CORNER_RADIUS_PX * scale))
 
 
-def _list_lines(text: str, size: int, width: float) -> list[_Line]:
+def _list_lines(text: str, text_size: int, width: float) -> list[_Line]:
     """Wrap a text into lines of limited width, px; the first of several paragraphs is the title."""
     paragraphs = text.split("\n")
     lines = []
     for number, paragraph in enumerate(paragraphs):
         is_title = number == 0 and len(paragraphs) > 1
-        lines += [_Line(line, is_title) for line in wrap_text(paragraph, size, width, is_title)]
+        lines += [_Line(line, is_title) for line in wrap_text(paragraph, text_size, width, is_title)]
     return lines

@@ -30,7 +30,7 @@ def fit_chips(
     Symbols that need no explanation are left out first, then a button replaces the presets. Then the chips of
     standard layers lose their texts and are left out, from the last one, so that symbols that are new to the
     user keep their texts. Texts that fit into the space that is left return. Everything that is left out is
-    also in the menu of layers, and chips without text have a tip.
+    also in the menu of layers, and chips without text have a tooltip.
 
     Parameters
     ----------

@@ -358,7 +358,7 @@ class LayerBar(BasicFocusGroup):
             side: TipSide = "below"
             page = box
             if (chip, box) in self.rows:
-                # Below its row, the tip would cover the next one.
+                # Below its row, the tooltip would cover the next one.
                 side = "right"
                 page = self.menu_box
             draw_tool_tip(screen, tip, self._theme, self._scale, widget=box, page=page, side=side)

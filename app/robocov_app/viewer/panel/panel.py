@@ -25,8 +25,8 @@ from robocov_app.toolkit.window.layout import PANEL_WIDTH_PX, Layout
 from robocov_app.viewer.explanation.explain import RobotReport
 from robocov_app.viewer.explanation.quantities import MIN_FORCE_N
 from robocov_app.viewer.explanation.sentences import ReportLine
+from robocov_app.viewer.panel.parameter_drawings import get_parameter_drawing
 from robocov_app.viewer.panel.parameters import NumberParameter, OptionParameter, Parameter
-from robocov_app.viewer.panel.sketches import get_sketch
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.setup.scenario import MAX_PANES
 
@@ -297,7 +297,7 @@ class ViewerPanel(CommandPanel):
             parameter.label,
             tip=_build_tip(parameter, unit),
             note=choose_note(parameter),
-            sketch=get_sketch(name),
+            drawing=get_parameter_drawing(name),
         )
         text = ui.text_field(name, parameter.format())
         if text is not None:

@@ -240,10 +240,11 @@ class PaneGroup:
             self.drag = None
 
     def _change_panes(self, build_continuation: Callable[[Pane], Continuation]) -> None:
-        """Change all panes; if one of them cannot be changed, raise and change none."""
+        """Apply an edit to the panes; if one of them cannot be changed, raise and change none."""
         continuations = [(pane, build_continuation(pane)) for pane in self.panes]
         changes = []
         for pane, continuation in continuations:
+            # Skip panes that the edit does not affect: their simulation continues.
             if continuation.positions is not None or continuation.setup is not pane.setup:
                 simulation = pane.build_changed_simulation(continuation)
                 changes.append((pane, continuation.setup, simulation))

@@ -280,9 +280,12 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Ite
 
 
 def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Iterator[None]:
-    """Recompute the sensed points of a pane from some of the recorded states; yield after each state."""
+    """Recompute the sensed points of a pane from at most `MAX_SENSED_STATES` of the recorded states.
+
+    Yield after each state, so that the window stays responsive.
+    """
     sensed = SensedPoints()
-    stride = max(1, len(history) // MAX_SENSED_STATES)
+    stride = max(1, math.ceil(len(history) / MAX_SENSED_STATES))
     for index in range(0, len(history), stride):
         time = history.get_time(index)
         state = history[index].states[pane.number]

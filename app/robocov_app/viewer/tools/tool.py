@@ -67,7 +67,7 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
     uses_right_button : bool
         Whether the right button works like the left one, instead of panning.
     uses_wheel : bool
-        Whether the wheel changes its size, instead of zooming.
+        Whether the wheel changes the size of the tool, instead of zooming.
     is_resizable : bool
         Whether the tool has a size that `resize` changes.
     is_painting : bool
@@ -81,7 +81,7 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
     is_painting = False
 
     def build_overlay(self, session: Session) -> ViewerToolOverlay:
-        """Return the overlay of the tool in a pane."""
+        """Return the overlay that the tool shows on the map."""
         return ViewerToolOverlay()
 
     def resize(self, session: Session, factor: float) -> str:

@@ -194,15 +194,27 @@ class Shapes:
         self.outlines[-1] = replace(last, edges=edges)
 
     def add_line(self, line: WallLine, *, location: str = "") -> None:
-        """Add a wall; raise MapError if a coordinate or the width is out of range."""
+        """Add a wall.
+
+        A wall that is too thin is widened and counted as a repair, and one without a length is left out.
+
+        Raises
+        ------
+        MapError
+            If a coordinate or the width is out of range.
+        """
         (points,) = self._check_rings([line.points], location)
+        # A negative width is no reason to reject a file: the wall is only too thin.
         width = max(line.width, 0.0)
-        width_location = ": ".join(filter(None, (self.source_name, location, "width")))
-        files.require_length(width, width_location, 0.0)
+        source = self.source_name
+        if location:
+            source = f"{self.source_name}: {location}"
+        files.require_length(width, f"{source}: width", 0.0)
         if width < MIN_SIZE_M:
-            self.repairs.counts["line", f"thinner than {1000 * MIN_SIZE_M:g} mm, made as wide"] += 1
+            minimum = f"{1000 * MIN_SIZE_M:g} mm"
+            self.repairs.counts["line", f"thinner than {minimum}, widened to {minimum}"] += 1
             width = MIN_SIZE_M
-        if not (points[1:] != points[:-1]).any():
+        if (points[1:] == points[:-1]).all():
             self.count_omission("line", "without a length")
             return
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))

@@ -1,4 +1,4 @@
-"""Tooltips of the tool rail and of parameters, with and without a sketch."""
+"""Tooltips of the tool rail and of parameters, with and without a drawing."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from robocov_app.look.theme import LIGHT
 from robocov_app.toolkit.widgets import icon_buttons, tool_tip
 from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, draw_tool_tip
 from robocov_app.toolkit.widgets.ui import Ui
-from robocov_app.viewer.panel.sketches import get_sketch
+from robocov_app.viewer.panel.parameter_drawings import get_parameter_drawing
 
 WIDGET = pygame.Rect(270, 80, 36, 36)
 PAGE = pygame.Rect(260, 40, 60, 300)
 """Panel that contains the widget."""
 
 
-def find_tip_box(text: str, **options) -> pygame.Rect:
-    """Draw a tip for `WIDGET` on a blank surface, and return the box of the changed pixels."""
+def find_tooltip_box(text: str, **options) -> pygame.Rect:
+    """Draw a tooltip for `WIDGET` on a blank surface, and return the box of the changed pixels."""
     blank = pygame.Color(1, 2, 3)
     screen = pygame.Surface((600, 400))
     screen.fill(blank)
@@ -32,41 +32,41 @@ def find_tip_box(text: str, **options) -> pygame.Rect:
 
 
 @pytest.fixture
-def quick_tips(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Show tips at once."""
+def immediate_tooltips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Show tooltips at once."""
     monkeypatch.setattr(tool_tip, "TIP_DELAY_S", 0.0)
 
 
 @pytest.mark.usefixtures("driver")
-def test_tips_are_below_their_widget_or_beside_its_page() -> None:
-    assert find_tip_box("Wall").top > WIDGET.bottom
-    right = find_tip_box("Wall (W)\nDrag.", side="right")
+def test_tooltips_are_below_their_widget_or_next_to_its_page() -> None:
+    assert find_tooltip_box("Wall").top > WIDGET.bottom
+    right = find_tooltip_box("Wall (W)\nDrag.", side="right")
     assert right.left > PAGE.right
     assert right.top < WIDGET.centery < right.bottom
-    assert find_tip_box("Wall (W)\nDrag.", side="left").right < PAGE.left
+    assert find_tooltip_box("Wall (W)\nDrag.", side="left").right < PAGE.left
 
 
 @pytest.mark.usefixtures("driver")
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_tips_beside_the_page_are_not_above_it(side: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise, the top bar would cover the title of the first tool's tip."""
+def test_tooltips_next_to_the_page_are_not_above_it(side: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise, the top bar would cover the title of the first tool's tooltip."""
     page = pygame.Rect(260, 75, 60, 300)
     monkeypatch.setitem(globals(), "PAGE", page)
-    tip = find_tip_box("Hand (V)\nClick or drag a robot\nor an obstacle\nor the floor", side=side)
+    tip = find_tooltip_box("Hand (V)\nClick or drag a robot\nor an obstacle\nor the floor", side=side)
     assert tip.top == page.top
 
 
 @pytest.mark.usefixtures("driver")
 @pytest.mark.parametrize("page", [pygame.Rect(0, 40, 600, 300), pygame.Rect(0, 60, 600, 340)])
-def test_without_space_beside_the_page_tips_are_below_or_above_it(
+def test_without_space_next_to_the_page_tooltips_are_below_or_above_it(
     page: pygame.Rect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(globals(), "PAGE", page)
-    assert not find_tip_box("Radius of the robots", side="left").colliderect(page)
+    assert not find_tooltip_box("Radius of the robots", side="left").colliderect(page)
 
 
-@pytest.mark.usefixtures("quick_tips")
-def test_tips_of_the_panel_cover_no_row_of_the_panel(driver: Driver) -> None:
+@pytest.mark.usefixtures("immediate_tooltips")
+def test_tooltips_of_the_panel_cover_no_row_of_the_panel(driver: Driver) -> None:
     panel = driver.window.panel.ui
     label = driver.get_widget("label", "Repulsion strength")
     driver.move(*driver.find_pixel((0.1, 0.1)))
@@ -79,8 +79,8 @@ def test_tips_of_the_panel_cover_no_row_of_the_panel(driver: Driver) -> None:
     assert differs[:, panel.box.left - 60 : panel.box.left].any()
 
 
-@pytest.mark.usefixtures("quick_tips")
-def test_a_pressed_widget_shows_no_tip_until_the_mouse_has_left_it(driver: Driver) -> None:
+@pytest.mark.usefixtures("immediate_tooltips")
+def test_a_pressed_widget_shows_no_tooltip_until_the_mouse_has_left_it(driver: Driver) -> None:
     tip = driver.window.panel.ui.tool_tip
     plus = driver.get_widget("button", "more").rect.center
     driver.move(*plus)
@@ -93,23 +93,23 @@ def test_a_pressed_widget_shows_no_tip_until_the_mouse_has_left_it(driver: Drive
 
 @pytest.mark.usefixtures("driver")
 @pytest.mark.parametrize("parameter", ["k_rep", "k_att", "team.sensing_range"])
-def test_sketches_are_below_the_text(parameter: str) -> None:
-    sketch = get_sketch(parameter)
-    assert sketch is not None
-    assert sketch(1.0).get_bounding_rect().width > 100
-    plain = find_tip_box("Strength\nWhat it is")
-    assert find_tip_box("Strength\nWhat it is", sketch=sketch).height > plain.height + 80
+def test_drawings_are_below_the_text(parameter: str) -> None:
+    drawing = get_parameter_drawing(parameter)
+    assert drawing is not None
+    assert drawing(1.0).get_bounding_rect().width > 100
+    plain = find_tooltip_box("Strength\nWhat it is")
+    assert find_tooltip_box("Strength\nWhat it is", drawing=drawing).height > plain.height + 80
 
 
-def test_three_parameters_have_sketches(driver: Driver) -> None:
+def test_three_parameters_have_drawings(driver: Driver) -> None:
     for label in ("Repulsion strength", "Attraction strength", "Sensing range"):
-        assert driver.get_widget("label", label).sketch is not None
-    assert driver.get_widget("label", "Radius").sketch is None
-    assert get_sketch("radius") is None
+        assert driver.get_widget("label", label).drawing is not None
+    assert driver.get_widget("label", "Radius").drawing is None
+    assert get_parameter_drawing("radius") is None
 
 
-@pytest.mark.usefixtures("quick_tips")
-def test_every_button_of_the_rail_shows_a_tip_with_its_key_beside_it(driver: Driver) -> None:
+@pytest.mark.usefixtures("immediate_tooltips")
+def test_every_button_of_the_rail_shows_a_tooltip_with_its_key_next_to_it(driver: Driver) -> None:
     rail = driver.window.tool_rail.ui
     for widget in rail.widgets.values():
         command = driver.window.commands[widget.key]
@@ -150,9 +150,9 @@ def test_wide_windows_show_the_names_of_tools(tmp_path: Path, monkeypatch: pytes
             assert tool.title in texts
 
 
-@pytest.mark.usefixtures("quick_tips")
-def test_a_message_does_not_cover_a_tip(driver: Driver) -> None:
-    """In a low window, the tips of the lowest tools reach the place of the message."""
+@pytest.mark.usefixtures("immediate_tooltips")
+def test_a_message_does_not_cover_a_tooltip(driver: Driver) -> None:
+    """In a low window, the tooltips of the lowest tools reach the position of the message."""
     rail = driver.window.tool_rail.ui
     ruler = driver.get_widget("button", "tool:ruler")
     driver.move(*ruler.rect.center)

@@ -1,4 +1,4 @@
-"""Sketches in tooltips of parameters: the same scene with a small and with a large value."""
+"""Drawings in tooltips of parameters: the same scene with a small and with a large value."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,7 +12,7 @@ from pygame import Surface
 from robocov_app.look.colors import Color
 from robocov_app.render.fonts import render_text
 from robocov_app.render.surface_cache import cache_surfaces
-from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, TipSketch
+from robocov_app.toolkit.widgets.tool_tip import TIP_TEXT_COLOR, TipDrawing
 
 # Tooltips are light on dark in both themes.
 _FAINT: Color = (158, 169, 186)
@@ -30,7 +30,7 @@ _ROBOT_RADIUS_PX = 6.0
 _LINE_PX = 1.6
 _ARROW_HEAD_PX = 5.0
 _SUPERSAMPLING = 4
-"""Sketches are drawn larger by this factor and then scaled down, which smooths their edges."""
+"""Drawings are rendered larger by this factor and then scaled down, which smooths their edges."""
 _DASH_COUNT = 28
 """Number of dashes of a dashed circle."""
 _CACHE_BYTES = 1_000_000
@@ -132,26 +132,26 @@ _SCENES: Mapping[str, Callable[..., None]] = MappingProxyType(
 """Function that draws the scene of a parameter, by the name of the parameter."""
 
 
-def get_sketch(parameter: str) -> TipSketch | None:
-    """Return the sketch of a parameter; None if it has none."""
+def get_parameter_drawing(parameter: str) -> TipDrawing | None:
+    """Return the drawing of a parameter; None if it has none."""
     if parameter not in _SCENES:
         return None
-    return partial(_render_sketch, parameter)
+    return partial(_render_drawing, parameter)
 
 
 @cache_surfaces(_CACHE_BYTES)
-def _render_sketch(parameter: str, scale: float) -> Surface:
+def _render_drawing(parameter: str, scale: float) -> Surface:
     """Render the scene of a parameter with a small value at the left and with a large one at the right."""
     side = round(_SCENE_PX * scale)
     gap = round(_GAP_PX * scale)
-    sketch = Surface((2 * side + gap, side + round(_CAPTION_PX * scale)), pygame.SRCALPHA, 32)
+    drawing = Surface((2 * side + gap, side + round(_CAPTION_PX * scale)), pygame.SRCALPHA, 32)
     text_size = round(_CAPTION_TEXT_PX * scale)
     for is_large, caption in ((False, "small"), (True, "large")):
         large = Surface((side * _SUPERSAMPLING, side * _SUPERSAMPLING), pygame.SRCALPHA, 32)
         _SCENES[parameter](_Pen(large, side * _SUPERSAMPLING / _SCENE_PX), is_large=is_large)
         scene = pygame.transform.smoothscale(large.premul_alpha(), (side, side))
         left = side + gap if is_large else 0
-        sketch.blit(scene, (left, 0))
+        drawing.blit(scene, (left, 0))
         text = render_text(caption, text_size, _FAINT).premul_alpha()
-        sketch.blit(text, text.get_rect(midtop=(left + side // 2, side)))
-    return sketch
+        drawing.blit(text, text.get_rect(midtop=(left + side // 2, side)))
+    return drawing
