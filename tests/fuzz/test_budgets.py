@@ -9,11 +9,13 @@ MAX_BUDGET_SHARE = 3.0
 """More than 1, because test machines are slower and run other processes."""
 
 
+SIMILAR_CASES = ("7,900", "a comb of 40,000", "a wall of 490,000", "noise", "rooms")
+"""Beginnings of the names of cases that are left out, because other cases are similar and faster."""
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
-@pytest.mark.parametrize(
-    "name", [name for name in CASES if not name.startswith(("7,900", "a comb of 12,000", "noise", "rooms"))]
-)
+@pytest.mark.parametrize("name", [name for name in CASES if not name.startswith(SIMILAR_CASES)])
 def test_reading_a_file_stays_within_its_budget(name: str) -> None:
     ((_, cost),) = measure_cases([name], seconds=60.0)
     assert cost.share < MAX_BUDGET_SHARE, cost

@@ -71,7 +71,7 @@ def assert_obstacles_are_apart(environment, gap):
     assert all(boundary.contains(shape) for shape in shapes)
 
 
-@settings(max_examples=count_examples(160))
+@settings(max_examples=count_examples(80))
 @given(draw_requests())
 @example({"seed": 3, "kind": "polygons", "obstacles": 6, "area": 0.2, "gap": 0.6, "side": 10.0})
 @example({"seed": 3, "kind": "blocks", "obstacles": 12, "area": 0.45, "gap": 0.5, "side": 10})

@@ -440,11 +440,11 @@ def test_robots_cross_doors_that_are_wide_enough() -> None:
 
 
 def compute_final_cost(n: int, communication_range: float = math.inf, seed: int = 0) -> float:
-    """Return the coverage cost of n robots in the map "rooms" after 40 s."""
+    """Return the coverage cost of n robots in the map "rooms" after 25 s."""
     rooms = load_map("rooms")
     team = Team.homogeneous(n, communication_range=communication_range)
     simulation = Simulation(rooms, Atlas(), rooms.start(None).sample(n, seed=seed, radius=0.1), team)
-    run_until(simulation, 40.0)
+    run_until(simulation, 25.0)
     return CoverageCost(rooms, lattice=64)(simulation.positions).mean_distance
 
 
