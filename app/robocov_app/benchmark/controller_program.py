@@ -55,7 +55,7 @@ class ControllerProgram:
     setup : Setup
         The controller, and what it knows before the first step.
     sensor : DensitySensor or None
-        Sensor for a density that robots do not know.
+        Sensor for a density that robots do not know. None if robots never measure the density.
 
     Raises
     ------
@@ -103,7 +103,10 @@ class _SingleRobotAdapter(IndividualControllerAdapter):
 
 
 def _build_controller(setup: Setup) -> Controller:
-    """Build the controller of a process; an individual one is called for a single robot if there is one."""
+    """Build the controller.
+
+    An individual controller is called only for the robot of this process, if the process has one.
+    """
     code = setup.code
     controller = make_controller(code.name, code.gains, source=code.source)
     if setup.robot is not None and isinstance(controller, IndividualControllerAdapter):

@@ -93,17 +93,22 @@ def sample_new_maps(families: Sequence[str], count: int, rng: np.random.Generato
     families : sequence of str
         Names of families; those without a generator are ignored.
     count : int
-        Number of maps; fewer are drawn if there are fewer families.
+        Number of maps; fewer are sampled if fewer families have a generator.
     rng : Generator
         Random numbers for the choice of families and seeds.
 
     Returns
     -------
     list of NewMap
+
+    Raises
+    ------
+    ParameterError
+        If no seed gives a map of a family.
     """
-    drawable = [family for family in families if family in GENERATORS or family in FLOOR_PLANS]
-    chosen = rng.permutation(len(drawable))[:count].tolist()
-    return [_sample_map(drawable[k], rng) for k in sorted(chosen)]
+    generated_families = [family for family in families if family in GENERATORS or family in FLOOR_PLANS]
+    chosen = rng.permutation(len(generated_families))[:count].tolist()
+    return [_sample_map(generated_families[k], rng) for k in sorted(chosen)]
 
 
 def _sample_map(family: str, rng: np.random.Generator) -> NewMap:

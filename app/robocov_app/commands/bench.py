@@ -42,16 +42,14 @@ class Part(NamedTuple):
 
 
 PARTS = {
-    "step": Part("A step of RAPF on campus", "step"),
-    "maps": Part("The exact coverage cost on maps", "cost", "list_map_cases"),
-    "cost": Part("The exact coverage cost in a unit square with random obstacles", "cost"),
-    "learning": Part(
-        "Learning environments on rooms, with the exact cost in the reward of each step", "learning"
-    ),
-    "sweep": Part("A sweep of short runs on three maps, processor time", "processes"),
-    "render": Part("Frames of 1280 x 720", "render"),
-    "window": Part("The window of 1280 x 720 on rooms, in use", "window"),
-    "start": Part("The start of commands", "processes", "list_start_cases"),
+    "step": Part("One RAPF step on campus", "step"),
+    "maps": Part("Exact coverage cost on maps", "cost", "list_map_cases"),
+    "cost": Part("Exact coverage cost in a unit square with random obstacles", "cost"),
+    "learning": Part("Learning environments on rooms (exact cost in the reward of each step)", "learning"),
+    "sweep": Part("Sweep of short runs on three maps (CPU time)", "processes"),
+    "render": Part("Rendering of frames (1280 x 720)", "render"),
+    "window": Part("Interactive window on rooms (1280 x 720)", "window"),
+    "start": Part("Start-up time of commands", "processes", "list_start_cases"),
 }
 """The parts by name, in the order in which they are measured."""
 PartName = Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
@@ -80,13 +78,12 @@ class Arguments(FigureOptions):
 
 def command(options: Arguments) -> None:
     """Run `robocov bench`."""
-    # Set these variables before numpy is loaded, which reads them. `report_compilation` loads it.
+    # numpy reads these variables when it is loaded, which `report_compilation` does.
     for name in _THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
-    rows: list[Row] = []
     with report_compilation():
         cases = _collect_cases(options.part, is_quick=options.quick)
-        interruption = _measure(cases, rows, quiet=options.json)
+        rows, interruption = _measure(cases, quiet=options.json)
     if options.plot is not None and rows:
         from robocov_app.look.theme import get_theme
         from robocov_app.speed_benchmarks.plot import save_ratios
@@ -98,6 +95,7 @@ def command(options: Arguments) -> None:
     else:
         _print_tables(rows)
         _print_machine(machine)
+    # Raised only now, so that the results so far are printed.
     if interruption is not None:
         raise interruption
 
@@ -131,20 +129,26 @@ def _collect_cases(part_name: PartName, *, is_quick: bool) -> list[Callable[[], 
 
 
 def _measure(
-    cases: Sequence[Callable[[], Sequence[Row]]], rows: list[Row], *, quiet: bool
-) -> KeyboardInterrupt | None:
-    """Append the results of the cases to `rows`, and return the exception if the user interrupts them.
+    cases: Sequence[Callable[[], Sequence[Row]]], *, quiet: bool
+) -> tuple[list[Row], KeyboardInterrupt | None]:
+    """Measure the cases.
 
-    The caller raises the exception again after it has printed the results so far.
+    Returns
+    -------
+    rows : list of Row
+        Results of the cases so far.
+    interruption : KeyboardInterrupt or None
+        The exception if the user interrupts the measurements.
     """
+    rows: list[Row] = []
     try:
         with show_progress("measuring", len(cases), quiet=quiet) as update:
             for number, case in enumerate(cases, start=1):
                 rows.extend(case())
                 update(number)
     except KeyboardInterrupt as error:
-        return error
-    return None
+        return rows, error
+    return rows, None
 
 
 def _describe_machine() -> dict[str, Any]:

@@ -21,7 +21,7 @@ from robocov_app.figures.map_grid import (
     compute_column_width,
     write_heading,
 )
-from robocov_app.figures.page import TITLE, FigurePage, PagePanel
+from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, PagePanel
 from robocov_app.figures.run_titles import (
     build_run_title,
     format_end_time,
@@ -257,7 +257,7 @@ def _build_captions(page: FigurePage, contents: _Contents) -> _Captions:
         shared=join_facts(shared),
         names=names,
         facts=different_facts,
-        name_widths=[page.measure_text(name, points=TITLE, bold=True) for name in names],
+        name_widths=[page.measure_text(name, points=TITLE_SIZE_PT, bold=True) for name in names],
         facts_widths=[page.measure_text(text) for text in different_facts],
         gap=_CAPTION_GAP * page.scale,
     )
@@ -278,7 +278,7 @@ def _write_one_line(
     left, top, panel_width, _ = panel.box
     row = top - _FACTS_ROW * page.scale
     right = left + max(panel_width, min(panel.caption_width, width))
-    page.write(captions.names[number], left, row, points=TITLE, bold=True)
+    page.write(captions.names[number], left, row, points=TITLE_SIZE_PT, bold=True)
     page.write(captions.facts[number], right, row, color=page.theme.faint, align="right")
 
 
@@ -288,5 +288,5 @@ def _write_two_lines(page: FigurePage, captions: _Captions, number: int, panel: 
     name_row = top - _NAME_ROW * page.scale
     facts_row = top - _FACTS_ROW * page.scale
     max_width = panel.caption_width
-    page.write(captions.names[number], left, name_row, points=TITLE, bold=True, max_width=max_width)
+    page.write(captions.names[number], left, name_row, points=TITLE_SIZE_PT, bold=True, max_width=max_width)
     page.write(captions.facts[number], left, facts_row, color=page.theme.faint, max_width=max_width)

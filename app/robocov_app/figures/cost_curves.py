@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from robocov.errors import ParameterError, quote
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TITLE, FigurePage, check_not_empty, get_figure
+from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, check_not_empty, get_figure
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 
 _MARGINS = CurveMargins(left=52, top=86, bottom=56, right=52)
@@ -73,5 +73,5 @@ def _create_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int
     page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
     left = _MARGINS.left * page.scale
     title_row = 30 * page.scale
-    page.write(title, left, title_row, points=TITLE, bold=True, max_width=width - left - page.margin)
+    page.write(title, left, title_row, points=TITLE_SIZE_PT, bold=True, max_width=width - left - page.margin)
     return add_curve_axes(page, curves, _MARGINS)

@@ -20,7 +20,7 @@ from robocov_app.figures.cost_curves import plot_cost
 from robocov_app.figures.coverage_layout import (
     BAR_INDENT,
     BAR_WIDTH,
-    CAPTION_TITLE,
+    CAPTION_TITLE_SIZE_PT,
     CURVE_MARGINS,
     CoverageArrangement,
     CoverageContents,
@@ -37,7 +37,7 @@ from robocov_app.figures.curves import (
 from robocov_app.figures.extent import Extent, enclose_maps
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
-    SMALL,
+    SMALL_SIZE_PT,
     FigurePage,
     PageBox,
     PagePanel,
@@ -58,8 +58,8 @@ from robocov_app.render.distance_map.colors import (
 )
 from robocov_app.render.distance_map.pixel_distances import DistanceField
 
-DOTS_PER_PIXEL = 2
-"""Dots of a map image per pixel of the page."""
+IMAGE_PIXELS_PER_PAGE_PIXEL = 2
+"""Resolution of the images of maps, relative to that of the page."""
 MIN_SIZE_PX = (720, 400)
 """Minimum size of a page with curves and maps; a smaller page shows only the curves."""
 _MIN_ASPECT_SIDE_BY_SIDE = 2.4
@@ -325,7 +325,9 @@ def _draw_maps(
         _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
         title_row = box.top - _CAPTION_TITLE_ROW * scale
         facts_row = box.top - _CAPTION_FACTS_ROW * scale
-        page.write(snapshot.title, box.left, title_row, points=CAPTION_TITLE, bold=True, max_width=max_width)
+        page.write(
+            snapshot.title, box.left, title_row, points=CAPTION_TITLE_SIZE_PT, bold=True, max_width=max_width
+        )
         page.write(snapshot.facts, box.left, facts_row, color=page.theme.faint, max_width=max_width)
 
 
@@ -342,7 +344,7 @@ def _draw_snapshot(
         y,
         limit,
         theme,
-        dots_per_meter=DOTS_PER_PIXEL * box.width / (high_x - low_x),
+        image_pixels_per_meter=IMAGE_PIXELS_PER_PAGE_PIXEL * box.width / (high_x - low_x),
         border_width=_BORDER_WIDTH * scale,
     )
     image = axes.imshow(
@@ -360,7 +362,7 @@ def _draw_snapshot(
 
 
 def _compute_pixel_centers(axes: Axes, box: PageBox) -> tuple[FloatArray, FloatArray]:
-    """Return the centers of the dots of an image that fills axes in a box, px.
+    """Return the coordinates of the pixel centers of an image that fills the axes; `box` is their size, px.
 
     Returns
     -------
@@ -371,8 +373,9 @@ def _compute_pixel_centers(axes: Axes, box: PageBox) -> tuple[FloatArray, FloatA
     """
     low_x, high_x = axes.get_xlim()
     low_y, high_y = axes.get_ylim()
-    columns = max(round(DOTS_PER_PIXEL * box.width), 2)
-    rows = max(round(DOTS_PER_PIXEL * box.height), 2)
+    # At least two, because borders are measured in distances between adjacent pixels.
+    columns = max(round(IMAGE_PIXELS_PER_PAGE_PIXEL * box.width), 2)
+    rows = max(round(IMAGE_PIXELS_PER_PAGE_PIXEL * box.height), 2)
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     return x, y
@@ -385,7 +388,7 @@ def _paint_distances(
     limit: float,
     theme: Theme,
     *,
-    dots_per_meter: float,
+    image_pixels_per_meter: float,
     border_width: float,
 ) -> NDArray[np.uint8]:
     """Return the RGB image of distances and borders, (h, w, 3).
@@ -398,13 +401,14 @@ def _paint_distances(
     limit : float, m
         End of the color scale.
     theme : Theme
-    dots_per_meter : float
+    image_pixels_per_meter : float
     border_width : float, px
     """
-    pixels = build_palette(theme)[compute_color_levels(field, x, y, limit, DOTS_PER_PIXEL * _HATCH_PX)]
-    width = DOTS_PER_PIXEL * border_width
-    borders = field.compute_borders(x, y, width / dots_per_meter)
-    opacity = compute_line_opacities(borders, dots_per_meter, width)[:, None]
+    levels = compute_color_levels(field, x, y, limit, IMAGE_PIXELS_PER_PAGE_PIXEL * _HATCH_PX)
+    pixels = build_palette(theme)[levels]
+    width = IMAGE_PIXELS_PER_PAGE_PIXEL * border_width
+    borders = field.compute_borders(x, y, width / image_pixels_per_meter)
+    opacity = compute_line_opacities(borders, image_pixels_per_meter, width)[:, None]
     border_pixels = (borders.rows, borders.columns)
     border_color = np.array(theme.geodesic_border)
     pixels[border_pixels] = np.rint((1.0 - opacity) * pixels[border_pixels] + opacity * border_color)
@@ -439,7 +443,7 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: CoverageArrangement) 
     marks = list_color_ticks(limit)
     labels = [f"{mark:g}" for mark in marks]
     labels[-1] += " m"
-    axes.set_xticks(marks, labels, fontsize=SMALL)
+    axes.set_xticks(marks, labels, fontsize=SMALL_SIZE_PT)
     axes.set_yticks([])
     axes.tick_params(
         colors=to_plot_color(theme.faint), labelcolor=to_plot_color(theme.ink), length=2.5, pad=1.5

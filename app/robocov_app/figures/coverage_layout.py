@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.artist import Artist
 
 from robocov_app.figures.curves import CurveMargins, TimeCurve, compute_right_margin
-from robocov_app.figures.page import TEXT, TITLE, FigurePage, PageBox, PagePanel
+from robocov_app.figures.page import TEXT_SIZE_PT, TITLE_SIZE_PT, FigurePage, PageBox, PagePanel
 from robocov_app.look.theme import Theme
 
 DEFAULT_WIDTH_PX = 1500
@@ -16,8 +16,8 @@ MAX_HEIGHT_PX = 2600
 MAX_MAP_HEIGHT_PX = 760
 MAX_ASPECT_BESIDE = 1.9
 """Maximum width / height of a map to the right of the curves; a wider map is below them."""
-CAPTION_TITLE = TEXT + 1.5
-"""Text size of the title above a map, points."""
+CAPTION_TITLE_SIZE_PT = TEXT_SIZE_PT + 1.5
+"""Text size of the title above a map."""
 BAR_WIDTH = 190
 """Width of the color scale at scale 1, px."""
 BAR_INDENT = 14
@@ -168,7 +168,7 @@ def _measure_captions(page: FigurePage, contents: CoverageContents) -> float:
     """Return the width of the widest line above a map, px."""
     widths = [0.0]
     for title, facts in contents.captions:
-        widths.append(page.measure_text(title, points=CAPTION_TITLE, bold=True))
+        widths.append(page.measure_text(title, points=CAPTION_TITLE_SIZE_PT, bold=True))
         widths.append(page.measure_text(facts))
     return max(widths)
 
@@ -215,7 +215,7 @@ def _arrange_page(
     maps_top = head
     curves = PageBox(page.margin, head, curves_width - page.margin, height - head)
     bar_row = _BAR_ROW * scale
-    bar_min_left = page.margin + page.measure_text(contents.title, points=TITLE, bold=True)
+    bar_min_left = page.margin + page.measure_text(contents.title, points=TITLE_SIZE_PT, bold=True)
     bar_min_left += _TITLE_GAP * scale
     if contents.is_below:
         curves_height = _CURVES_HEIGHT * scale
@@ -285,18 +285,22 @@ def _arrange_panels(page: FigurePage, area: PageBox, contents: CoverageContents)
         rows = math.ceil(count / candidate)
         max_width = (width - (candidate - 1) * gap) / candidate
         max_height = (height - (rows - 1) * gap) / rows - caption_height
+        # Keep a positive size on a page that is too low.
         candidate_width = min(max_width, max(max_height, 1.0) * contents.aspect)
+        # Of equally large arrangements, take the one with more columns.
         if candidate_width >= panel_width:
             panel_width = candidate_width
             columns = candidate
     slot_width = (width - (columns - 1) * gap) / columns
     panel_height = panel_width / contents.aspect
     # A map is in the middle of its slot, or farther left if its caption needs the space.
-    indent = min((slot_width - panel_width) / 2, max(slot_width - _measure_captions(page, contents), 0.0))
+    caption_space = max(slot_width - _measure_captions(page, contents), 0.0)
+    indent = min((slot_width - panel_width) / 2, caption_space)
     panels = []
     for number in range(count):
         row, column = divmod(number, columns)
         x = left + column * (slot_width + gap) + indent
         y = top + row * (panel_height + caption_height + gap) + caption_height
-        panels.append(PagePanel(PageBox(x, y, panel_width, panel_height), slot_width - indent))
+        box = PageBox(x, y, panel_width, panel_height)
+        panels.append(PagePanel(box, caption_width=slot_width - indent))
     return panels

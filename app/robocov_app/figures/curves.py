@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from robocov.typing import FloatArray
 from robocov_app.figures.page import (
     POINTS_PER_INCH,
-    TEXT,
+    TEXT_SIZE_PT,
     FigurePage,
     PageBox,
     PlotColor,
@@ -50,6 +50,8 @@ _DASHED_ORDER = 2.1
 _MARK_PT = 6.5
 _LABEL_LINE_HEIGHT = 1.45
 """Height of a line of labels, in text sizes."""
+_CONNECTION_WIDTH_PT = 0.8
+"""Width of the line from a curve's last value to its label."""
 # Horizontal distances from the axes.
 _CONNECTION_START_PT = 2
 _CONNECTION_END_PT = 9
@@ -373,39 +375,40 @@ def _draw_line(axes: Axes, item: StyledCurve, color: PlotColor, weight: float) -
 
 
 def _draw_end_labels(axes: Axes, ends: Sequence[_CurveEnd], weight: float) -> None:
-    """Write the mark and the label of each curve to the right of the axes, with a line to its end."""
+    """Write mark and label of each curve right of the axes, with a line from the height of its last value."""
     dpi = get_figure(axes).dpi
     box = axes.get_window_extent()
     # One point as a fraction of the width of the axes.
-    point = dpi / POINTS_PER_INCH / box.width
-    line_height = _LABEL_LINE_HEIGHT * TEXT * dpi / POINTS_PER_INCH
-    rows: list[float] = axes.transData.transform([(end.time, end.value) for end in ends])[:, 1].tolist()
-    label_rows = spread_labels(rows, line_height, float(box.y0), float(box.y1))
-    for end, row, label_row in zip(ends, rows, label_rows, strict=True):
-        fraction = (label_row - box.y0) / box.height
-        axes.annotate(
+    point_fraction = dpi / POINTS_PER_INCH / box.width
+    line_height = _LABEL_LINE_HEIGHT * TEXT_SIZE_PT * dpi / POINTS_PER_INCH
+    # Heights on the page, px.
+    end_points: FloatArray = axes.transData.transform([(end.time, end.value) for end in ends])
+    end_heights: list[float] = end_points[:, 1].tolist()
+    label_heights = spread_labels(end_heights, line_height, float(box.y0), float(box.y1))
+    for end, end_height, label_height in zip(ends, end_heights, label_heights, strict=True):
+        label_fraction = (label_height - box.y0) / box.height
+        axes.text(
+            1.0 + _LABEL_START_PT * point_fraction,
+            label_fraction,
             end.text,
-            (end.time, end.value),
-            (1.0 + _LABEL_START_PT * point, fraction),
             color=end.color,
-            textcoords=axes.transAxes,
-            annotation_clip=False,
+            transform=axes.transAxes,
             va="center",
             ha="left",
-            fontsize=TEXT,
+            fontsize=TEXT_SIZE_PT,
             fontweight="bold",
         )
         axes.plot(
-            [1.0 + _CONNECTION_START_PT * point, 1.0 + _CONNECTION_END_PT * point],
-            [(row - box.y0) / box.height, fraction],
+            [1.0 + _CONNECTION_START_PT * point_fraction, 1.0 + _CONNECTION_END_PT * point_fraction],
+            [(end_height - box.y0) / box.height, label_fraction],
             transform=axes.transAxes,
             color=end.color,
-            linewidth=0.8,
+            linewidth=_CONNECTION_WIDTH_PT,
             clip_on=False,
         )
         axes.plot(
-            1.0 + _MARK_CENTER_PT * point,
-            fraction,
+            1.0 + _MARK_CENTER_PT * point_fraction,
+            label_fraction,
             end.mark,
             transform=axes.transAxes,
             color=end.color,

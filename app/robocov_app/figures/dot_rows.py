@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from robocov.typing import FloatArray
 from robocov_app.figures.page import (
     POINTS_PER_INCH,
-    TEXT,
+    TEXT_SIZE_PT,
     FigurePage,
     PageBox,
     get_figure,
@@ -142,7 +142,7 @@ def label_rows(
     """Write the names of rows to the left of the axes, and the label of the horizontal axis."""
     axes.set_yticks(rows, names)
     style_axes(axes, theme, label, grid="x")
-    axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT, pad=_NAME_GAP_PT)
+    axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT_SIZE_PT, pad=_NAME_GAP_PT)
 
 
 def draw_row_marks(axes: Axes, rows: Sequence[float], styles: Sequence[CurveStyle], theme: Theme) -> None:

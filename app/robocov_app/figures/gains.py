@@ -15,7 +15,7 @@ from robocov.controllers.gains import Value, format_value
 from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
-    SMALL,
+    SMALL_SIZE_PT,
     FigurePage,
     PageBox,
     ValueAxis,
@@ -127,7 +127,9 @@ def plot_gains(
     set_value_limits(axes.yaxis, values, ValueAxis(label))
     style_axes(axes, LIGHT, _shorten_name(gain), label, grid="y")
     if len(all_results) > 1:
-        axes.legend(frameon=False, fontsize=SMALL, labelcolor=to_plot_color(LIGHT.ink), borderaxespad=0.2)
+        axes.legend(
+            frameon=False, fontsize=SMALL_SIZE_PT, labelcolor=to_plot_color(LIGHT.ink), borderaxespad=0.2
+        )
     return get_figure(axes)
 
 
@@ -165,7 +167,7 @@ def draw_gain_grid(axes: Axes, grid: GainGrid, theme: Theme) -> None:
             f"{value:.{decimals}f}",
             ha="center",
             va="center",
-            fontsize=SMALL,
+            fontsize=SMALL_SIZE_PT,
             color=to_plot_color(theme.ink),
             fontweight="bold" if value == low else "normal",
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from matplotlib.artist import Artist
 
-from robocov_app.figures.page import HEADING, FigurePage, PageBox, PagePanel
+from robocov_app.figures.page import HEADING_SIZE_PT, FigurePage, PageBox, PagePanel
 
 SPACE_WITHOUT_HEADING = 8
 """Space above the captions of a page without a heading, at scale 1, px."""
@@ -79,4 +79,4 @@ def write_heading(page: FigurePage, text: str, first_box: PageBox, rise: float) 
     """Write a heading `rise` pixels above the first map; an empty heading is left out."""
     if text:
         row = first_box.top - rise
-        page.write(text, first_box.left, row, points=HEADING, bold=True, max_width=page.content_width)
+        page.write(text, first_box.left, row, points=HEADING_SIZE_PT, bold=True, max_width=page.content_width)

@@ -14,7 +14,7 @@ from robocov.record import Record
 from robocov_app.figures import map_drawing, run_drawing
 from robocov_app.figures.contact_points import find_contact_points
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TITLE, FigurePage, PageBox, get_figure
+from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, PageBox, get_figure
 from robocov_app.figures.run_titles import (
     build_run_title,
     format_end_time,
@@ -198,7 +198,7 @@ def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]
 
 def _write_above_map(page: FigurePage, title: str, facts: str, box: PageBox) -> None:
     """Write the title and the facts above a map; center them as a block if they are wider than the map."""
-    title_width = page.measure_text(title, points=TITLE, bold=True)
+    title_width = page.measure_text(title, points=TITLE_SIZE_PT, bold=True)
     text_width = min(max(title_width, page.measure_text(facts)), page.content_width)
     left = box.left
     if text_width > box.width:
@@ -206,5 +206,5 @@ def _write_above_map(page: FigurePage, title: str, facts: str, box: PageBox) -> 
     max_width = page.content_width
     title_row = box.top - _NAME_ROW * page.scale
     facts_row = box.top - _FACTS_ROW * page.scale
-    page.write(title, left, title_row, points=TITLE, bold=True, max_width=max_width)
+    page.write(title, left, title_row, points=TITLE_SIZE_PT, bold=True, max_width=max_width)
     page.write(facts, left, facts_row, color=page.theme.faint, max_width=max_width)

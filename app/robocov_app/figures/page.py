@@ -22,11 +22,11 @@ from robocov_app.look.colors import Color
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.look.theme import Theme
 
-# Text sizes, points.
-HEADING = 14.0
-TITLE = 12.5
-TEXT = 9.5
-SMALL = 8.5
+# Text sizes.
+HEADING_SIZE_PT = 14.0
+TITLE_SIZE_PT = 12.5
+TEXT_SIZE_PT = 9.5
+SMALL_SIZE_PT = 8.5
 POINTS_PER_INCH = 72
 
 
@@ -94,10 +94,10 @@ def style_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal
     ink = to_plot_color(theme.ink)
     faint = to_plot_color(theme.faint)
     axes.set_facecolor(to_plot_color(theme.background))
-    axes.tick_params(colors=faint, labelcolor=ink, labelsize=SMALL, left=False)
-    axes.set_xlabel(x, fontsize=TEXT, color=ink)
+    axes.tick_params(colors=faint, labelcolor=ink, labelsize=SMALL_SIZE_PT, left=False)
+    axes.set_xlabel(x, fontsize=TEXT_SIZE_PT, color=ink)
     if y:
-        axes.set_ylabel(y, fontsize=TEXT, color=ink)
+        axes.set_ylabel(y, fontsize=TEXT_SIZE_PT, color=ink)
         axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
         axes.yaxis.set_label_coords(0.0, 1.03)
     for side, spine in axes.spines.items():
@@ -301,7 +301,7 @@ class FigurePage:
         """
         if max_width is None:
             max_width = self.content_width
-        self.write(text, self.margin, y * self.scale, points=TITLE, bold=True, max_width=max_width)
+        self.write(text, self.margin, y * self.scale, points=TITLE_SIZE_PT, bold=True, max_width=max_width)
 
     def write(
         self,
@@ -309,7 +309,7 @@ class FigurePage:
         x: float,
         y: float,
         *,
-        points: float = TEXT,
+        points: float = TEXT_SIZE_PT,
         bold: bool = False,
         color: Color | None = None,
         max_width: float | None = None,
@@ -348,7 +348,7 @@ class FigurePage:
             text = text[:-1]
             artist.set_text(text.rstrip(" ·") + "…")
 
-    def measure_text(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
+    def measure_text(self, text: str, *, points: float = TEXT_SIZE_PT, bold: bool = False) -> float:
         """Return the width of a text of a size in points, px."""
         artist = self.figure.text(0, 0, text, fontsize=points, fontweight=_get_font_weight(bold))
         width = self._measure_width(artist)
@@ -495,8 +495,8 @@ class FigurePage:
             self._draw_line((x, y - half_tick), (x, y + half_tick))
         label = format_scale_length(length)
         label_left = right + _SCALE_BAR_LABEL_GAP * self.scale
-        self.write(label, label_left, y, points=SMALL, bold=True)
-        return label_left + self.measure_text(label, points=SMALL, bold=True)
+        self.write(label, label_left, y, points=SMALL_SIZE_PT, bold=True)
+        return label_left + self.measure_text(label, points=SMALL_SIZE_PT, bold=True)
 
     def _draw_line(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Draw a line between two positions, px."""
@@ -528,7 +528,7 @@ class FigurePage:
             loc=anchor,
             bbox_to_anchor=self.to_figure(*position),
             frameon=False,
-            fontsize=SMALL,
+            fontsize=SMALL_SIZE_PT,
             labelcolor=to_plot_color(self.theme.ink),
             borderpad=0.0,
             borderaxespad=0.0,

@@ -29,7 +29,7 @@ from robocov_app.report.analysis.tuning import choose_compared_groups, choose_tu
 from robocov_app.report.descriptions import list_lifetimes
 from robocov_app.report.embedding import MAX_BYTES, ReplayRun
 from robocov_app.report.pictures import draw_map, draw_run, has_path
-from robocov_app.report.plots.costs import build_cost_plots, build_final_cost_plots
+from robocov_app.report.plots.costs import build_cost_plots, build_final_distance_plots
 from robocov_app.report.plots.metrics import build_metric_plots
 from robocov_app.report.plots.pairs import build_pair_plots
 from robocov_app.report.plots.parameter_plots import build_parameter_plots
@@ -131,7 +131,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
         "costs": build_cost_plots(result, styles, f"{key}c"),
         "has_medians": any(len(group.runs) > 1 for group in list_variants(result)),
         "metrics": build_metric_plots(result, runs, styles, f"{key}m"),
-        "finals": build_final_cost_plots(result, styles, f"{key}f"),
+        "finals": build_final_distance_plots(result, styles, f"{key}f"),
         **_build_comparison_variables(result, styles, key),
         "parameter_plots": build_parameter_plots(result, f"{key}d"),
         "selection_note": selection.note if len(runs) > 1 else "",

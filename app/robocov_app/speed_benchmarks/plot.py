@@ -8,7 +8,15 @@ from typing import cast
 from matplotlib.axes import Axes
 
 from robocov_app.figures.files import plain_style, save_figure
-from robocov_app.figures.page import HEADING, SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
+from robocov_app.figures.page import (
+    HEADING_SIZE_PT,
+    SMALL_SIZE_PT,
+    TEXT_SIZE_PT,
+    FigurePage,
+    PageBox,
+    style_axes,
+    to_plot_color,
+)
 from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.speed_benchmarks.measure import Row
 
@@ -75,7 +83,11 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     with plain_style():
         page = FigurePage((_WIDTH_PX, height), theme, scale=1.0)
         page.write(
-            "Time as a multiple of the baseline's", _MARGIN_PX, _TITLE_CENTER_PX, points=HEADING, bold=True
+            "Time as a multiple of the baseline's",
+            _MARGIN_PX,
+            _TITLE_CENTER_PX,
+            points=HEADING_SIZE_PT,
+            bold=True,
         )
         page.write(NOTE, _MARGIN_PX, _NOTE_CENTER_PX, color=theme.faint)
         top = float(_TITLE_HEIGHT_PX)
@@ -91,7 +103,7 @@ def _compute_part_height(rows: Sequence[Row]) -> int:
 
 def _draw_part(page: FigurePage, heading: str, rows: Sequence[Row], top: float) -> None:
     """Draw the heading and the rows of a part, starting at the vertical position `top`, px."""
-    page.write(heading, _MARGIN_PX, top + _HEADING_OFFSET_PX, points=TEXT + 1.5, bold=True)
+    page.write(heading, _MARGIN_PX, top + _HEADING_OFFSET_PX, points=TEXT_SIZE_PT + 1.5, bold=True)
     axes_top = top + _HEADING_HEIGHT_PX - _AXES_OFFSET_PX
     width = _WIDTH_PX - _LEFT_PX - _RIGHT_PX
     axes = page.add_axes(PageBox(_LEFT_PX, axes_top, width, _ROW_HEIGHT_PX * len(rows)))
@@ -131,12 +143,12 @@ def _draw_row_texts(page: FigurePage, row: Row, y: float) -> None:
         f"{label}  /  {row.baseline}",
         _LEFT_PX - _TEXT_GAP_PX,
         y,
-        points=SMALL,
+        points=SMALL_SIZE_PT,
         max_width=_LEFT_PX - _MARGIN_PX - _TEXT_GAP_PX,
         align="right",
     )
     ratio_x = _WIDTH_PX - _RIGHT_PX + _TEXT_GAP_PX
-    page.write(f"{row.ratio:.2f}", ratio_x, y, points=SMALL, bold=row.meets_goals is False)
+    page.write(f"{row.ratio:.2f}", ratio_x, y, points=SMALL_SIZE_PT, bold=row.meets_goals is False)
 
 
 def _find_limits(rows: Sequence[Row]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from robocov_app.figures.dot_rows import MAX_POINTS, arrange_rows, create_row_axes
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.page import ValueAxis
 from robocov_app.figures.pairs import set_ratio_axis
 from robocov_app.look.curve_styles import choose_controller_styles
@@ -29,7 +29,7 @@ def create_axes(rows: float = 1.0) -> Axes:
 def plot_sample(values: np.ndarray) -> Axes:
     """Return axes with one row; the last of their lines is the mark of the controller."""
     samples = [Sample("name", STYLE, values)]
-    return plot_final_costs([("", samples)], ValueAxis("distance (m)"), width=420, scale=1.0).axes[0]
+    return plot_final_values([("", samples)], ValueAxis("distance (m)"), width=420, scale=1.0).axes[0]
 
 
 groups_of_rows = st.lists(

@@ -14,7 +14,7 @@ from page_layout import assert_layout_is_clear
 
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
-from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.page import FigurePage, ValueAxis, get_figure, to_plot_color
 from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.figures.statistics import bootstrap
@@ -57,7 +57,7 @@ def plot_bands(bands: list[Band], size: tuple[int, int] = (860, 360), unit: str 
 
 
 def plot_boxes(groups: list[tuple[str, list[Sample]]], width: int = 420) -> Axes:
-    return plot_final_costs(groups, ValueAxis("distance (m)"), width=width, scale=1.0).axes[0]
+    return plot_final_values(groups, ValueAxis("distance (m)"), width=width, scale=1.0).axes[0]
 
 
 def plot_ratios(pairs: Pairs) -> Axes:

@@ -182,7 +182,10 @@ def test_svg_is_xml_at_true_scale(tmp_path: Path) -> None:
 def test_svg_is_written_at_a_smaller_scale(tmp_path: Path, cluttered: Environment) -> None:
     path = tmp_path / "plan.svg"
     report = export_map(cluttered, path, options=WriteOptions(scale=0.05))
-    assert report.notes == ("1 mm is 0.05 m: 212 x 212 mm", "to import it again: --scale 0.05")
+    assert report.notes == (
+        "1 mm in the drawing is 0.05 m; the drawing measures 212 x 212 mm",
+        "import it again with --scale 0.05",
+    )
     again, _, _ = import_map(path, options=ReadOptions(scale=0.05), shaping=AS_IT_IS)
     assert again.free.symmetric_difference(cluttered.free).area < 1e-2
     with pytest.raises(Exception, match=r"expected at least 1 m, got .* at its own scale"):

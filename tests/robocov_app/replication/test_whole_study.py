@@ -37,7 +37,7 @@ from robocov_app.replication.execution import parts, runner
 from robocov_app.replication.execution.forecast import forecast_study
 from robocov_app.replication.execution.runner import StudyInterrupted, open_folder
 from robocov_app.replication.figures import figure_files
-from robocov_app.replication.figures.beyond_plots import build_gap_samples, plan_beyond_plots
+from robocov_app.replication.figures.beyond_plots import build_gap_samples, prepare_beyond_plots
 from robocov_app.replication.figures.figure_files import FigureFile
 from robocov_app.replication.figures.paper_figures import CAPTIONS, describe_figure, find_arrival_time
 from robocov_app.replication.formatting import format_amount
@@ -291,7 +291,7 @@ class TestBeyond:
             assert all(each.ratio.estimate == 1.0 for each in best)
 
     def test_all_figures_are_drawn(self, beyond):
-        drawn = plan_beyond_plots(beyond, "dark")
+        drawn = prepare_beyond_plots(beyond, "dark")
         assert set(drawn) == set(DRAWN)
         (axes,) = drawn["beyond-gaps"]().axes
         low, high = axes.get_xlim()

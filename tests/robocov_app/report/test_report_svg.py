@@ -8,13 +8,13 @@ import pytest
 from reported_results import HOSTILE, build_recorded_result, build_run
 
 from robocov_app.figures.cost_bands import Band, plot_cost_bands
-from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.gains import GainGrid, GainResults, plot_gain_grid, plot_gains
 from robocov_app.figures.page import ValueAxis
 from robocov_app.look.curve_styles import choose_controller_styles
 from robocov_app.look.theme import LIGHT
 from robocov_app.report.analysis.groups import choose_group_styles
-from robocov_app.report.plots.costs import build_cost_plots, build_final_cost_plots
+from robocov_app.report.plots.costs import build_cost_plots, build_final_distance_plots
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import list_css_colors
 
@@ -31,7 +31,7 @@ FIGURES = {
         PANEL,
         ValueAxis("distance (m)", "m"),
     ),
-    "boxes": lambda name="RAPF": plot_final_costs(
+    "boxes": lambda name="RAPF": plot_final_values(
         [
             (
                 "",
@@ -112,7 +112,7 @@ def test_the_same_figure_gives_the_same_bytes() -> None:
     assert first == second
 
 
-@pytest.mark.parametrize("build", [build_cost_plots, build_final_cost_plots])
+@pytest.mark.parametrize("build", [build_cost_plots, build_final_distance_plots])
 def test_panels_of_a_map_have_the_same_axis(build) -> None:
     finals = {("rooms", 4): 40.0, ("rooms", 8): 50.0, ("hall", 4): 0.5, ("hall", 8): 0.7}
     runs = [

@@ -367,7 +367,14 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     boundary, *obstacles = written.areas
     area_written = compute_free_area(boundary, obstacles)
     dropped = describe_unsupported(environment, names=False)
-    return ExportReport("geojson", (path,), environment.free_area, area_written, dropped, tuple(notes))
+    return ExportReport(
+        format="geojson",
+        files=(path,),
+        area=environment.free_area,
+        area_written=area_written,
+        dropped=dropped,
+        notes=tuple(notes),
+    )
 
 
 def _format_shapes(environment: Environment, plane: LocalPlane | None, digits: int) -> _WrittenShapes:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from matplotlib.artist import Artist
 
-from robocov_app.figures.page import SMALL, TITLE, FigurePage, PagePanel
+from robocov_app.figures.page import SMALL_SIZE_PT, TITLE_SIZE_PT, FigurePage, PagePanel
 from robocov_app.look.theme import Theme
 from robocov_app.render.panel_grid import choose_column_count
 
@@ -120,7 +120,7 @@ def lay_out_page(
 
 def measure_caption_indent(page: FigurePage, name: str) -> float:
     """Return the distance from the start of a caption to its facts, px."""
-    return page.measure_text(name, points=TITLE, bold=True) + _CAPTION_GAP_PX * page.scale
+    return page.measure_text(name, points=TITLE_SIZE_PT, bold=True) + _CAPTION_GAP_PX * page.scale
 
 
 def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list[str]:
@@ -136,13 +136,13 @@ def wrap_lines(page: FigurePage, lines: Sequence[str], max_width: float) -> list
 
 def _wrap_line(page: FigurePage, line: str, max_width: float) -> list[str]:
     """Break a line that is wider than `max_width`, px, into several; all but the first are indented."""
-    if page.measure_text(line, points=SMALL) <= max_width:
+    if page.measure_text(line, points=SMALL_SIZE_PT) <= max_width:
         return [line]
     wrapped: list[str] = []
     current = ""
     for word in line.split():
         extended = f"{current} {word}" if current else word
-        if current and page.measure_text(extended, points=SMALL) > max_width:
+        if current and page.measure_text(extended, points=SMALL_SIZE_PT) > max_width:
             wrapped.append(current)
             extended = f"{_CONTINUATION_INDENT}{word}"
         current = extended

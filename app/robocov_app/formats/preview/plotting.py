@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.environment import Environment, Gap
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.map_drawing import build_map_handles, draw_map
-from robocov_app.figures.page import HEADING, SMALL, TITLE, FigurePage, to_plot_color
+from robocov_app.figures.page import HEADING_SIZE_PT, SMALL_SIZE_PT, TITLE_SIZE_PT, FigurePage, to_plot_color
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.conversion.comparison import ImportComparison, compare_maps
 from robocov_app.formats.preview.layout import (
@@ -158,7 +158,12 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
     left = _get_left(layout)
     max_width = page.size[0] - left - page.margin
     page.write(
-        environment.name, left, _TITLE_Y_PX * page.scale, points=HEADING, bold=True, max_width=max_width
+        environment.name,
+        left,
+        _TITLE_Y_PX * page.scale,
+        points=HEADING_SIZE_PT,
+        bold=True,
+        max_width=max_width,
     )
     width, height = report.size
     label = FORMAT_LABELS.get(report.format, report.format)
@@ -169,7 +174,7 @@ def _write_title(layout: ImportPage, environment: Environment, report: ImportRep
 def _write_caption(page: FigurePage, caption: Caption, left: float, top: float, width: float) -> None:
     """Write a caption above the arena whose left and top edges are given, px."""
     y = top - _CAPTION_OFFSET_PX * page.scale
-    page.write(caption.name, left, y, points=TITLE, bold=True)
+    page.write(caption.name, left, y, points=TITLE_SIZE_PT, bold=True)
     indent = measure_caption_indent(page, caption.name)
     page.write(caption.facts, left + indent, y, color=page.theme.faint, max_width=width - indent)
 
@@ -180,7 +185,7 @@ def _write_lines(layout: ImportPage) -> None:
     left = _get_left(layout)
     for k, line in enumerate(reversed(layout.lines)):
         y = page.size[1] - (LINE_HEIGHT_PX * k + _LAST_LINE_OFFSET_PX) * page.scale
-        page.write(line, left, y, points=SMALL, color=page.theme.faint)
+        page.write(line, left, y, points=SMALL_SIZE_PT, color=page.theme.faint)
 
 
 def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport, theme: Theme) -> None:
@@ -215,7 +220,7 @@ def _draw_before(axes: Axes, comparison: ImportComparison, report: ImportReport,
             (x, y),
             (_POSITION_TEXT_OFFSET_PT, _POSITION_TEXT_OFFSET_PT),
             textcoords="offset points",
-            fontsize=SMALL,
+            fontsize=SMALL_SIZE_PT,
             color=ink,
             zorder=_MARK_ORDER,
             path_effects=halo,

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from robocov_app.figures.final_costs import Sample
+from robocov_app.figures.final_values import Sample
 from robocov_app.look.theme import Theme, get_theme
 from robocov_app.replication.design.contenders import OWN, TARGETS, TEAMS
 from robocov_app.replication.design.studies import DISTURBED
@@ -16,7 +16,7 @@ from robocov_app.replication.figures.comparison_plots import (
     Plots,
     draw_gaps,
     get_style,
-    plan_pairs_plot,
+    prepare_pairs_plot,
     select_plots,
 )
 from robocov_app.replication.figures.degradation_plot import draw_degradations
@@ -28,7 +28,7 @@ _HEIGHTS_ASPECT = 0.41
 _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 
-def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
+def prepare_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     """Return a function that draws each plot that is not in the paper, by the name of the plot."""
     theme = get_theme(theme)
     samples = build_gap_samples(results)
@@ -36,17 +36,17 @@ def plan_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     return select_plots(
         {
             "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
-            "beyond-pairs": plan_pairs_plot(
+            "beyond-pairs": prepare_pairs_plot(
                 _list_duel_rows(results), "our cost / cost of the other, per pair (1: equal)", theme
             ),
             "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
-            "beyond-targets": plan_pairs_plot(
+            "beyond-targets": prepare_pairs_plot(
                 _list_target_rows(results),
                 "cost / cost with the centroid, per pair (1: equal)",
                 theme,
             ),
             "beyond-density": _plan_density_figure(results, theme),
-            "beyond-teams": plan_pairs_plot(
+            "beyond-teams": prepare_pairs_plot(
                 _list_team_rows(results),
                 "mean time with cells by time / with cells by distance, per pair (1: equal)",
                 theme,

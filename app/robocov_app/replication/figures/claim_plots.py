@@ -11,15 +11,15 @@ from robocov_app.replication.figures.comparison_plots import (
     Plots,
     build_cost_samples,
     draw_gain_grids,
-    plan_costs_plot,
-    plan_pairs_plot,
+    prepare_cost_ratio_plot,
+    prepare_pairs_plot,
     select_plots,
 )
 from robocov_app.replication.results.outcomes import Outcomes
 from robocov_app.replication.results.study_results import PaperResults
 
 
-def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
+def prepare_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     """Return the functions that draw the plots of the paper's claims, by their names."""
     theme = get_theme(theme)
     claims = results.claims
@@ -34,18 +34,18 @@ def plan_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     has_gains = all(grid.select_complete().instances for grid in results.gains.values())
     return select_plots(
         {
-            "claim-1-convex": plan_pairs_plot(
+            "claim-1-convex": prepare_pairs_plot(
                 _list_convex_rows(results.convex), "RAPF relative to Lloyd, per pair (1: equal)", theme
             ),
-            "claim-2-nonconvex": plan_pairs_plot(
+            "claim-2-nonconvex": prepare_pairs_plot(
                 _list_nonconvex_rows(claims),
                 "RAPF relative to the other controller, per pair (1: equal)",
                 theme,
             ),
             "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
-            "claim-4-starts": plan_costs_plot(by_start, theme),
-            "claim-6-gap": plan_costs_plot([("", build_cost_samples(gap_rows))], theme),
-            "claim-7-limited": plan_pairs_plot(
+            "claim-4-starts": prepare_cost_ratio_plot(by_start, theme),
+            "claim-6-gap": prepare_cost_ratio_plot([("", build_cost_samples(gap_rows))], theme),
+            "claim-7-limited": prepare_pairs_plot(
                 _list_nonconvex_rows(results.limited),
                 "RAPF relative to the other controller, per pair (1: equal)",
                 theme,

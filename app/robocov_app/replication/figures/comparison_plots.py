@@ -11,9 +11,9 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.gains import GainGrid, draw_gain_grid
-from robocov_app.figures.page import TITLE, FigurePage, PageBox, ValueAxis
+from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, PageBox, ValueAxis
 from robocov_app.figures.pairs import Pairs, plot_pairs
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.look.theme import Theme
@@ -67,7 +67,7 @@ def get_style(controller: str) -> CurveStyle:
     return style._replace(name="other-0" if controller in OURS else "other-2")
 
 
-def plan_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw | None:
+def prepare_pairs_plot(rows: Iterable[PairsRow], label: str, theme: Theme) -> Draw | None:
     """Return a function that draws the ratios of pairs of runs; None if there are no pairs.
 
     Parameters
@@ -114,20 +114,22 @@ def build_cost_samples(rows: Iterable[CostRow]) -> list[Sample]:
     return [Sample(text, style, values) for text, style, values in zip(texts, styles, costs, strict=True)]
 
 
-def plan_costs_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Draw | None:
-    """Return a function that draws final costs in named groups; None if all groups are empty."""
-    with_samples = [group for group in groups if group[1]]
-    if not with_samples:
+def prepare_cost_ratio_plot(groups: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Draw | None:
+    """Return a function that draws final J/J_ref in named groups; None if all groups are empty."""
+    nonempty_groups = [(name, samples) for name, samples in groups if samples]
+    if not nonempty_groups:
         return None
-    value_axis = ValueAxis("J/J_ref at the end (1: the reference)", origin=1.0)
-    return partial(plot_final_costs, with_samples, value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
+    value_axis = ValueAxis("final J/J_ref (1 = reference)", origin=1.0)
+    return partial(
+        plot_final_values, nonempty_groups, value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme
+    )
 
 
 @plain_style()
 def draw_gaps(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw gaps, in percent, on a square-root axis, which shows small gaps as well as large ones."""
-    value_axis = ValueAxis("gap at the end (%)")
-    figure = plot_final_costs([("", samples)], value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
+    value_axis = ValueAxis("final gap (%)")
+    figure = plot_final_values([("", samples)], value_axis, width=WIDE_PX, scale=PAGE_SCALE, theme=theme)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low = min(float(values.min()), 0.0)
@@ -179,7 +181,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
             values=_compute_mean_gaps(grid, k_rep, rho_0),
         )
         draw_gain_grid(axes, gap_grid, theme)
-        page.write(name, x - left / 2, y - _GRID_NAME_RISE * PAGE_SCALE, points=TITLE, bold=True)
+        page.write(name, x - left / 2, y - _GRID_NAME_RISE * PAGE_SCALE, points=TITLE_SIZE_PT, bold=True)
     return page.figure
 
 

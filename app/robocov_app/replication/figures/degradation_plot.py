@@ -10,7 +10,14 @@ from matplotlib.figure import Figure
 from robocov.errors import format_count
 from robocov.typing import FloatArray
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, FigurePage, PageBox, style_axes, to_plot_color
+from robocov_app.figures.page import (
+    SMALL_SIZE_PT,
+    TEXT_SIZE_PT,
+    FigurePage,
+    PageBox,
+    style_axes,
+    to_plot_color,
+)
 from robocov_app.look.colors import mix
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles
 from robocov_app.look.theme import LIGHT, Theme, get_theme
@@ -80,12 +87,12 @@ def draw_degradations(degradations: Sequence[Degradation], theme: Theme | str = 
         loc="center right",
         bbox_to_anchor=page.to_figure(width - page.margin, 26),
         frameon=False,
-        fontsize=SMALL,
+        fontsize=SMALL_SIZE_PT,
         labelcolor=to_plot_color(theme.ink),
     )
     pairs = format_count(max(degradation.runs for degradation in degradations), "pair")
     note = f"medians of {pairs} of runs, and 95% intervals; only working robots count"
-    page.write(note, page.margin, height - 18, points=SMALL, color=quiet)
+    page.write(note, page.margin, height - 18, points=SMALL_SIZE_PT, color=quiet)
     return page.figure
 
 
@@ -117,7 +124,7 @@ def _draw_panel(axes: Axes, name: str, degradations: Sequence[Degradation], them
         _draw_curve(axes, x, own, style, theme)
     unit = f" ({UNITS[name]})" if UNITS[name] else ""
     title = f"{CAPTIONS[f'axis-{name}']}{unit}"
-    axes.set_title(title, fontsize=TEXT, color=to_plot_color(theme.ink), loc="left")
+    axes.set_title(title, fontsize=TEXT_SIZE_PT, color=to_plot_color(theme.ink), loc="left")
     labels = ["no limit" if value is None else f"{value:g}" for value in values]
     axes.set_xticks(range(len(values)), labels)
     axes.set_xlim(-0.4, len(values) - 0.6)

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from robocov.files.result_folder import report_folder_errors
 from robocov.record import Record
 from robocov_app.figures.files import save_figure
-from robocov_app.replication.figures.beyond_plots import plan_beyond_plots
-from robocov_app.replication.figures.claim_plots import plan_paper_plots
+from robocov_app.replication.figures.beyond_plots import prepare_beyond_plots
+from robocov_app.replication.figures.claim_plots import prepare_paper_plots
 from robocov_app.replication.figures.comparison_plots import Draw, Plots
 from robocov_app.replication.figures.paper_figures import (
     CAPTIONS,
@@ -75,12 +75,12 @@ def save_paper_figures(
         for number in FIGURES_OF_VARIANTS[variant]:
             runs_by_figure[name_figure(number, variant)] = (number, variant_runs)
 
-    def plan_plots(theme: str) -> Plots:
+    def prepare_plots(theme: str) -> Plots:
         plots: dict[str, Draw] = {}
         for name, (number, figure_runs) in runs_by_figure.items():
             plots[name] = partial(draw_figure, number, figure_runs, partition_run, theme)
         if results is not None:
-            plots.update(plan_paper_plots(results, theme))
+            plots.update(prepare_paper_plots(results, theme))
         return plots
 
     findings = {
@@ -89,16 +89,16 @@ def save_paper_figures(
     }
     if HALF_STEP in runs:
         findings[name_figure(4, HALF_STEP)] += f" {describe_half_step(runs[''], runs[HALF_STEP])}"
-    return _save_figures(folder, plan_plots, findings, quiet=quiet)
+    return _save_figures(folder, prepare_plots, findings, quiet=quiet)
 
 
 def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, FigureFile]:
     """Write the plots beyond the paper, and return them by name."""
-    return _save_figures(folder, partial(plan_beyond_plots, results), {}, quiet=quiet)
+    return _save_figures(folder, partial(prepare_beyond_plots, results), {}, quiet=quiet)
 
 
 def _save_figures(
-    folder: Path, plan_plots: Callable[[str], Plots], findings: Mapping[str, str], *, quiet: bool
+    folder: Path, prepare_plots: Callable[[str], Plots], findings: Mapping[str, str], *, quiet: bool
 ) -> dict[str, FigureFile]:
     """Write all plots in the light theme, in all formats, and in the dark theme as PNG.
 
@@ -106,7 +106,7 @@ def _save_figures(
     ----------
     folder : Path
         Folder of the study.
-    plan_plots : callable
+    prepare_plots : callable
         Takes the name of a theme, and returns the plots by name.
     findings : Mapping
         Observations by the name of the plot.
@@ -116,8 +116,8 @@ def _save_figures(
     target = folder / FIGURES_FOLDER
     with report_folder_errors(target):
         target.mkdir(exist_ok=True)
-    light = plan_plots("light")
-    dark = plan_plots("dark")
+    light = prepare_plots("light")
+    dark = prepare_plots("dark")
     files: dict[str, FigureFile] = {}
     with show_progress("figures", len(light), quiet=quiet) as update:
         for number, (name, draw) in enumerate(light.items(), start=1):

@@ -18,7 +18,7 @@ from robocov.observation.region import Region
 from robocov.typing import FloatArray
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, FigurePage, PageBox, style_axes, to_plot_color
+from robocov_app.figures.page import SMALL_SIZE_PT, FigurePage, PageBox, style_axes, to_plot_color
 from robocov_app.look.theme import Theme
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
@@ -227,7 +227,7 @@ def _draw_path(
     """Draw the path of the optimum with labeled heights, and the geometric median."""
     line = to_plot_color(theme.final)
     faint = to_plot_color(theme.faint)
-    label_style: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
+    label_style: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL_SIZE_PT}
     axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
     first, *inner, last = labeled
     for optimum in inner:
@@ -294,7 +294,7 @@ def _draw_distance(
         note,
         (0.04, 0.07),
         xycoords="axes fraction",
-        fontsize=SMALL,
+        fontsize=SMALL_SIZE_PT,
         color=to_plot_color(theme.ink),
         ha="left",
         va="bottom",

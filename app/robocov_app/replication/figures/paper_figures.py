@@ -21,7 +21,7 @@ from robocov.voronoi import partition
 from robocov_app.figures import map_drawing, robot_drawing, run_drawing
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TITLE, FigurePage, PageBox, to_plot_color
+from robocov_app.figures.page import SMALL_SIZE_PT, TITLE_SIZE_PT, FigurePage, PageBox, to_plot_color
 from robocov_app.look.legend import merge_legends
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 from robocov_app.replication.assets import ASSETS
@@ -273,8 +273,8 @@ def draw_side_by_side(records: Sequence[Record], headings: Iterable[tuple[str, s
         left = box.x0 * page.size[0]
         right = box.x1 * page.size[0]
         top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
-        page.write(f"({letter})  {title}", left, top, points=TITLE, bold=True)
-        page.write(cost, right, top, points=SMALL, color=theme.faint, align="right")
+        page.write(f"({letter})  {title}", left, top, points=TITLE_SIZE_PT, bold=True)
+        page.write(cost, right, top, points=SMALL_SIZE_PT, color=theme.faint, align="right")
     draw_panel_footer(page, boxes, environment, run_drawing.select_drawn(handles, panels))
     return page.figure
 

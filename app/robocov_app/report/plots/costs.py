@@ -10,7 +10,7 @@ from robocov.errors import format_count
 from robocov.typing import FloatArray
 from robocov_app.figures.cost_bands import Band, compute_quartiles, plot_cost_bands
 from robocov_app.figures.curves import DISTANCE
-from robocov_app.figures.final_costs import Sample, plot_final_costs
+from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.page import ValueAxis
 from robocov_app.report.analysis.scaling import compute_medians, scale_distances
 from robocov_app.report.plots.plot import (
@@ -107,15 +107,15 @@ def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[Reported
 def _build_cost_plot(panel: Panel, bands: list[Band], maximum: float) -> PagePlot:
     """Build the plot of the bands in a panel, with an axis from 0 to a maximum."""
     if panel.is_together:
-        label = "mean distance / initial mean distance"
+        axis_label = "mean distance / initial mean distance"
         unit = ""
     else:
-        label = DISTANCE
+        axis_label = DISTANCE
         unit = " m"
-    texts = "; ".join(_describe_band(band, unit) for band in bands)
-    description = f"{label} against time, up to {bands[0].time[-1]:.4g} s. {texts}."
+    band_descriptions = "; ".join(_describe_band(band, unit) for band in bands)
+    description = f"{axis_label} against time, up to {bands[0].time[-1]:.4g} s. {band_descriptions}."
     # The unit is in the label of the axis, because there is little space for the names of the curves.
-    draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(label, value_range=(0.0, maximum)))
+    draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(axis_label, value_range=(0.0, maximum)))
     return build_panel_plot(panel, description, draw, size=LARGE_PANEL_SIZE_PX)
 
 
@@ -129,7 +129,7 @@ def _describe_band(band: Band, unit: str) -> str:
     return text
 
 
-def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str) -> list[PagePlot]:
+def build_final_distance_plots(result: ReportedResult, styles: GroupStyles, key: str) -> list[PagePlot]:
     """Build the plots of the distributions of final mean distances.
 
     Parameters
@@ -160,28 +160,29 @@ def build_final_cost_plots(result: ReportedResult, styles: GroupStyles, key: str
             drawn_panels.append(DrawnPanel(panel, samples, values))
     ranges = compute_map_ranges(drawn_panels)
     return [
-        _build_final_cost_plot(drawn.panel, drawn.contents, ranges[drawn.panel.map_name])
+        _build_final_distance_plot(drawn.panel, drawn.contents, ranges[drawn.panel.map_name])
         for drawn in drawn_panels
     ]
 
 
-def _build_final_cost_plot(panel: Panel, samples: list[Sample], value_range: tuple[float, float]) -> PagePlot:
+def _build_final_distance_plot(
+    panel: Panel, samples: list[Sample], value_range: tuple[float, float]
+) -> PagePlot:
     """Build the plot of the samples in a panel, with an axis for a range of values."""
     if panel.is_together:
-        label = SCALED_DISTANCE_LABEL
+        axis_label = SCALED_DISTANCE_LABEL
         unit = ""
     else:
-        label = FINAL_DISTANCE_LABEL
+        axis_label = FINAL_DISTANCE_LABEL
         unit = " m"
-    texts = "; ".join(_describe_sample(sample, unit) for sample in samples)
-
-    value_axis = ValueAxis(label, value_range=value_range)
+    sample_descriptions = "; ".join(_describe_sample(sample, unit) for sample in samples)
+    value_axis = ValueAxis(axis_label, value_range=value_range)
 
     def draw(size: tuple[int, int]) -> Figure:
         width, _ = size
-        return plot_final_costs([("", samples)], value_axis, width=width, scale=1.0)
+        return plot_final_values([("", samples)], value_axis, width=width, scale=1.0)
 
-    return build_panel_plot(panel, f"{label}. {texts}.", draw)
+    return build_panel_plot(panel, f"{axis_label}. {sample_descriptions}.", draw)
 
 
 def _describe_sample(sample: Sample, unit: str) -> str:

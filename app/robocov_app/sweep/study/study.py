@@ -281,9 +281,10 @@ class Study:
         self._replace_field("teams", tuple(_combine(axes | condition_axes)))
 
     def _check_conditions(self, combinations: Sequence[Mapping[str, ParameterValue]]) -> None:
-        """Raise an error if conditions are impossible with one of the numbers of robots, or on a map."""
+        """Raise an error if a combination of conditions is invalid for a team size or on a map."""
         for values in combinations:
             for robots in self.robots:
+                # The checks do not depend on the seed.
                 conditions = build_conditions(values, seed=0, robots=robots)
                 for study_map in self.maps:
                     check_joins(study_map.environment, conditions)

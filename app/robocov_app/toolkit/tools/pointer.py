@@ -61,7 +61,7 @@ class PanGesture(Gesture):
     pan : callable
         Pans the map by the given numbers of pixels to the right and down.
     click : callable
-        Called with the event if the button is released before the mouse has really moved.
+        Called with the event if the button is released while the press is still a click.
     """
 
     is_pan = True
@@ -71,18 +71,21 @@ class PanGesture(Gesture):
     ) -> None:
         self._pan = pan
         self._click = click
-        self._waiting = (0, 0)  # motion so far, px, that is applied once it is more than a click
+        # Motion, px, that is held back while the press may still become a click.
+        self._pending_motion = (0, 0)
 
     def move(self, event: pygame.event.Event, *, is_click: bool) -> None:
         """Pan the map with the mouse, unless the press may still become a click."""
-        dx = self._waiting[0] + event.rel[0]
-        dy = self._waiting[1] + event.rel[1]
-        self._waiting = (dx, dy) if is_click else (0, 0)
-        if not is_click:
-            self._pan(dx, dy)
+        dx = self._pending_motion[0] + event.rel[0]
+        dy = self._pending_motion[1] + event.rel[1]
+        if is_click:
+            self._pending_motion = (dx, dy)
+            return
+        self._pending_motion = (0, 0)
+        self._pan(dx, dy)
 
     def release(self, event: pygame.event.Event, *, is_click: bool) -> None:
-        """Handle the click if the mouse has not moved."""
+        """Call `click` if the press is still a click."""
         if is_click:
             self._click(event)
 

@@ -327,5 +327,11 @@ def build_grid_report(
     free : (rows, columns) array of bool
     """
     area = float(np.count_nonzero(free)) * grid.cell**2
-    report = ExportReport(name, files, environment.free_area, area, describe_unsupported(environment))
+    report = ExportReport(
+        format=name,
+        files=files,
+        area=environment.free_area,
+        area_written=area,
+        dropped=describe_unsupported(environment),
+    )
     return replace(report, warnings=describe_lost_passages(environment, grid, free))

@@ -80,7 +80,7 @@ def build_environment(
     if foreign.primitives and shapely.get_num_coordinates(simplified.free) <= _MAX_CHECKED_VERTICES:
         layout = restore_primitives(layout, simplified, unsimplified, conversion)
     _report_deviation(layout.deviation, simplified.free, conversion)
-    environment = _to_environment(layout, simplified.free, conversion)
+    environment = _build_environment(layout, simplified.free, conversion)
     _report_unreachable(environment, conversion)
     return environment, _build_report(
         environment,
@@ -235,7 +235,7 @@ def _report_unreachable(environment: Environment, conversion: Conversion) -> Non
         )
 
 
-def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversion) -> Environment:
+def _build_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversion) -> Environment:
     """Build the environment from its boundary and obstacles; `free` is the free space between them, m."""
     foreign = conversion.foreign
     environment = Environment(
@@ -246,5 +246,5 @@ def _to_environment(layout: MapLayout, free: MultiPolygon, conversion: Conversio
         density=foreign.density,
         description=foreign.description[:_MAX_DESCRIPTION_CHARACTERS],
     )
-    # Written and read again, so that the rules of map files hold and every imported map can be saved.
+    # Convert to a map document and back, which checks the rules of map files, so that the map can be saved.
     return from_json(to_json(environment), conversion.source_name)

@@ -1,5 +1,6 @@
 """Writing maps as SVG drawings at true scale."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -103,17 +104,25 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     margin = _MARGIN * float(np.ptp(vertices, axis=0).max())
     low = vertices.min(axis=0) - margin
     high = vertices.max(axis=0) + margin
-    size = high - low
     with replace_file(path) as temporary:
         temporary.write_text(_build_page(environment, writer, low, high), encoding="utf-8")
+    width, height = ((high - low) / scale).tolist()
+    notes = [f"1 mm in the drawing is {scale:g} m; the drawing measures {width:.6g} x {height:.6g} mm"]
+    if options.scale is not None:
+        notes.append(f"import it again with --scale {scale:g}")
+    return _build_report(environment, path, writer, notes)
+
+
+def _build_report(
+    environment: Environment, path: Path, writer: _ShapeWriter, notes: Sequence[str]
+) -> ExportReport:
+    """Build the report about a written drawing, with notes for the user."""
+    # The area of the map as it is written, with rounded coordinates.
     obstacles = [transform_numbers(obstacle, writer.round_length) for obstacle in environment.obstacles]
     boundary = Polygon([(writer.round_length(x), writer.round_length(y)) for x, y in environment.boundary])
-    notes = [f"1 mm is {scale:g} m: {size[0] / scale:.6g} x {size[1] / scale:.6g} mm"]
-    if options.scale is not None:
-        notes.append(f"to import it again: --scale {scale:g}")
     return ExportReport(
-        "svg",
-        (path,),
+        format="svg",
+        files=(path,),
         area=environment.free_area,
         area_written=compute_free_area(boundary, [obstacle.polygon for obstacle in obstacles]),
         dropped=describe_unsupported(environment, names=False),

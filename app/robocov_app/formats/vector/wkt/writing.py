@@ -32,8 +32,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     if len(polygons) > 1:
         notes.append(f"the free space has {len(polygons)} parts: some programs accept only one polygon")
     return ExportReport(
-        "wkt",
-        (path,),
+        format="wkt",
+        files=(path,),
         area=environment.free_area,
         area_written=float(MultiPolygon(polygons).area),
         dropped=(

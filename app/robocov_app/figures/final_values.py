@@ -1,4 +1,4 @@
-"""Plots of the distributions of final costs, as horizontal boxes with points."""
+"""Plots of the distributions of final values, as horizontal boxes with points."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -19,7 +19,14 @@ from robocov_app.figures.dot_rows import (
     label_rows,
 )
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TEXT, PlotColor, ValueAxis, get_figure, set_value_limits, to_plot_color
+from robocov_app.figures.page import (
+    TEXT_SIZE_PT,
+    PlotColor,
+    ValueAxis,
+    get_figure,
+    set_value_limits,
+    to_plot_color,
+)
 from robocov_app.look.curve_styles import CurveStyle
 from robocov_app.look.theme import LIGHT, Theme
 
@@ -44,7 +51,7 @@ class Sample(NamedTuple):
 
 
 @plain_style()
-def plot_final_costs(
+def plot_final_values(
     groups: Sequence[tuple[str, Sequence[Sample]]],
     value_axis: ValueAxis,
     *,
@@ -97,7 +104,7 @@ def _write_headings(axes: Axes, names: Sequence[str], heights: Sequence[float], 
                 height,
                 name,
                 transform=axes.get_yaxis_transform(),
-                fontsize=TEXT,
+                fontsize=TEXT_SIZE_PT,
                 fontweight="bold",
                 va="center",
                 color=to_plot_color(theme.ink),
