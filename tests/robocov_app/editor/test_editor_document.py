@@ -112,9 +112,20 @@ def test_a_draft_may_contain_numbers_that_no_map_can_have():
             {**EMPTY, "obstacles": [{"kind": "box"}]},
             r"obstacles\[0\]\.kind: expected one of polygon, circle, wall, got \"box\"",
         ),
-        ({**EMPTY, "obstacles": [{"kind": "circle", "center": [0, 0]}]}, r"obstacles\[0\]\.radius: missing"),
+        (
+            {**EMPTY, "obstacles": [{"center": [0, 0]}]},
+            r"obstacles\[0\]\.kind: missing, expected one of polygon, circle, wall",
+        ),
+        (
+            {**EMPTY, "obstacles": [{"kind": ["circle"]}]},
+            r"obstacles\[0\]\.kind: expected one of polygon, circle, wall",
+        ),
+        (
+            {**EMPTY, "obstacles": [{"kind": "circle", "center": [0, 0]}]},
+            r"obstacles\[0\]\.radius: missing, expected a number",
+        ),
         ({**EMPTY, "obstacles": [{"kind": "wall", "points": [], "width": 1, "x": 1}]}, "unknown key 'x'"),
-        ({**EMPTY, "starts": {"a": {"kind": "disc"}}}, r"starts\.a\.center: missing"),
+        ({**EMPTY, "starts": {"a": {"kind": "disc"}}}, r"starts\.a\.center: missing, expected a point"),
         ({**EMPTY, "starts": []}, "starts: expected an object"),
         ({**EMPTY, "extra": 1}, "extra: expected an object"),
         ({**EMPTY, "boundary": [[0, float("nan")]]}, "finite"),

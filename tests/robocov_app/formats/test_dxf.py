@@ -369,7 +369,7 @@ def draw_many_entities(document: Any, space: Any) -> None:
             lambda d, m: m.add_lwpolyline([(k % 2, 0, 1e6) for k in range(3000)], format="xyb"),
             "(1 damaged shape (LWPOLYLINE",
         ),
-        (lambda d, m: None, "no closed outline and no line, expected a drawing"),
+        (lambda d, m: None, "expected at least one closed outline or line, got none"),
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )

@@ -187,7 +187,7 @@ def test_omissions_and_repairs_are_reported() -> None:
     )
     assert foreign.repaired == ("2 rings closed",)
     with pytest.raises(
-        MapError, match=r"no closed outline and no line \(1 text left out\), expected a drawing"
+        MapError, match=r"expected at least one closed outline or line, got none \(1 text left out\)"
     ):
         empty = collect_shapes()
         empty.count_omission("text")

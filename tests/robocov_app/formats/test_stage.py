@@ -171,7 +171,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
         ('\nmodel ( bitmap "no.png" )', r"no\.png: no such file"),
         ('include "hall.world"\nmodel ( )', "expected a file that does not include itself"),
         ("include model\nmodel ( )", "a file to include"),
-        ("window ( )", "expected a drawing"),
+        ("window ( )", "expected at least one closed outline or line, got none"),
         ("model ( " * 40, "nested deeper than 32"),
         ("define a model ( a ( ) )\na ( )", ":1: nested in more than 32 models"),
         ("model ( pose [1e300 0 0 0] )", "expected numbers within"),

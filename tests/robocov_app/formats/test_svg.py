@@ -270,8 +270,8 @@ def test_prologues_of_editors_are_accepted(tmp_path: Path) -> None:
             "<g>: a transform to coordinates beyond 1e+30",
         ),
         ('<svg viewBox="0 0 1"/>', "<svg>: expected four numbers"),
-        ("", "no closed outline and no line, expected a drawing"),
-        ("<g><text>Hall</text></g>", "expected a drawing"),
+        ("", "expected at least one closed outline or line, got none"),
+        ("<g><text>Hall</text></g>", "or line, got none (1 text left out)"),
     ],
 )
 def test_invalid_attributes_are_refused(tmp_path: Path, body: str, expected: str) -> None:

@@ -177,7 +177,7 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", ": no closed outline and no line, expected a drawing"),
+        ("", ": expected at least one closed outline or line, got none"),
         ("PLOYGON((0 0, 1 1))", ":1:1: expected one of POINT, LINESTRING"),
         ("POLYGON\n((0 0, 1 0, 1 x, 0 0))", ":2:13: expected a point such as 1.5 2"),
         ("POLYGON((0 0, 10 0, 10 5, 0 nan))", ":1:27: expected a point"),

@@ -595,7 +595,7 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
     content = json.loads(never.read_text())
     del content["lesson"]
     path.write_text(json.dumps(content))
-    with pytest.raises(MapError, match="lesson: missing"):
+    with pytest.raises(MapError, match="lesson: missing, expected an object with the chapters"):
         load_lesson(path)
     content = json.loads(never.read_text())
     content["lesson"]["chapters"][0]["edit"] = 9

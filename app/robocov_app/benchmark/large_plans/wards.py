@@ -26,15 +26,34 @@ _BED_MARGIN_M = 0.7
 """Distance of the first bed from the facade."""
 _TWO_BEDS_PROBABILITY = 0.6
 _STORE_WALL_M = 0.2
+_STORE_DOOR_M = 2.6
+"""Distance of the middle of the store's door from the outer wall."""
+_STORE_SHELF_DEPTH_M = 0.7
 _HUB_CORNER_M = 4.0
 """Width of the lifts, the stairs and the store in the corners of the hub."""
 _LIFT_WIDTH_M = 2.2
 _LIFT_DOOR_M = 1.2
 _LIFT_NICHE_M = 0.4
 _STAIRS_WIDTH_M = 1.5
-_COUNTER_M = 2.0
+_COUNTER_OFFSET_M = 2.0
 """Distance of the counter of the nurse station from its middle."""
 _COUNTER_DEPTH_M = 0.5
+_COUNTER_OPENING_M = 1.2
+_DESK_WIDTH_M = 0.8
+_DESK_LENGTH_M = 1.8
+_ENTRANCE_FRACTION = 0.45
+"""Distance of the entrance from the middle of the hub in x and y, as a fraction of half its side."""
+_CUPBOARD_DEPTH_M = 0.8
+_CUPBOARD_LENGTH_M = 2.0
+_TABLE_WIDTH_M = 1.2
+_TABLE_LENGTH_M = 1.8
+_TABLE_DEPTH_FRACTION = 0.45
+"""Distance of the table of the day room from the corridor, as a fraction of the depth of the rooms."""
+_SHELF_DEPTH_M = 0.6
+_SHELF_GAP_M = 1.2
+"""Space between the shelf along the facade and the one in the middle of the room."""
+_SHELF_MARGIN_M = 1.4
+"""Distance of the shelf in the middle of a room from the corridor."""
 _DIRECTIONS = ((0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 2, 3))
 """Directions of the wings in quarter turns, by layout: an L, a T, a cross, and a T upside down."""
 _ROOMS = (6, 4, 3, 4)
@@ -89,7 +108,7 @@ def draw_ward(rng: np.random.Generator, layout: int) -> FloorPlan:
         outline = part.to_plan(build_box(0.0, -half_hub, wing.end, half_hub))
         shapes.append(shapely.Polygon(outline))
     _draw_hub(drawing, half_hub)
-    entrance = (half_hub * 0.45, -half_hub * 0.45)
+    entrance = (half_hub * _ENTRANCE_FRACTION, -half_hub * _ENTRANCE_FRACTION)
     return FloorPlan(build_outline(shapes), drawing.obstacles, entrance=entrance)
 
 
@@ -102,24 +121,27 @@ def _draw_hub(drawing: Drawing, half_hub: float) -> None:
     drawing.add_block(inner, half_hub - _STAIRS_WIDTH_M, half_hub, half_hub)
     drawing.add_block(inner, inner, half_hub - _STAIRS_WIDTH_M, inner + _STAIRS_WIDTH_M)
     # A store with a shelf.
-    drawing.add_wall_with_doors((-half_hub, -inner), (-inner, -inner), [2.6], thickness=_STORE_WALL_M)
+    drawing.add_wall_with_doors(
+        (-half_hub, -inner), (-inner, -inner), [_STORE_DOOR_M], thickness=_STORE_WALL_M
+    )
     corner_y = -inner - _STORE_WALL_M / 2.0
     drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORE_WALL_M)
-    drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + 0.7)
+    drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + _STORE_SHELF_DEPTH_M)
 
 
 def _draw_nurse_station(drawing: Drawing) -> None:
-    """Draw a desk behind a counter that is open on its right side."""
+    """Draw a nurse station: a desk inside a square counter that is open on the right."""
+    half_opening = _COUNTER_OPENING_M / 2.0
     drawing.add_wall(
-        (_COUNTER_M, -0.6),
-        (_COUNTER_M, -_COUNTER_M),
-        (-_COUNTER_M, -_COUNTER_M),
-        (-_COUNTER_M, _COUNTER_M),
-        (_COUNTER_M, _COUNTER_M),
-        (_COUNTER_M, 0.6),
+        (_COUNTER_OFFSET_M, -half_opening),
+        (_COUNTER_OFFSET_M, -_COUNTER_OFFSET_M),
+        (-_COUNTER_OFFSET_M, -_COUNTER_OFFSET_M),
+        (-_COUNTER_OFFSET_M, _COUNTER_OFFSET_M),
+        (_COUNTER_OFFSET_M, _COUNTER_OFFSET_M),
+        (_COUNTER_OFFSET_M, half_opening),
         thickness=_COUNTER_DEPTH_M,
     )
-    drawing.add_centered_block(-0.4, 0.0, 0.8, 1.8)
+    drawing.add_centered_block(-_DESK_WIDTH_M / 2.0, 0.0, _DESK_WIDTH_M, _DESK_LENGTH_M)
 
 
 def _outline_lifts(half_hub: float, front: float) -> list[tuple[float, float]]:
@@ -144,7 +166,7 @@ def _draw_wing(rng: np.random.Generator, part: Drawing, wing: _Wing) -> None:
     right_side = part.open_part(0.0, -half_corridor, mirrored=True)
     _draw_wing_side(rng, right_side, wing, service_room=service_room)
     # A cupboard of the day room.
-    part.add_centered_block(wing.end - 0.4, 0.0, 0.8, 2.0)
+    part.add_centered_block(wing.end - _CUPBOARD_DEPTH_M / 2.0, 0.0, _CUPBOARD_DEPTH_M, _CUPBOARD_LENGTH_M)
 
 
 def _draw_wing_side(
@@ -170,7 +192,9 @@ def _draw_wing_side(
     side.add_wall_with_doors((wing.start, 0.0), (wing.rooms_end, 0.0), doors, width=_DOOR_WIDTH_M)
     side.add_partitions(partitions, wing.depth)
     # A table of the day room.
-    side.add_centered_block(wing.rooms_end + wing.day_room / 2.0, wing.depth * 0.45, 1.2, 1.8)
+    table_x = wing.rooms_end + wing.day_room / 2.0
+    table_y = wing.depth * _TABLE_DEPTH_FRACTION
+    side.add_centered_block(table_x, table_y, _TABLE_WIDTH_M, _TABLE_LENGTH_M)
 
 
 def _draw_patient_room(rng: np.random.Generator, room: Drawing, direction: float, depth: float) -> None:
@@ -186,5 +210,8 @@ def _draw_patient_room(rng: np.random.Generator, room: Drawing, direction: float
 
 def _draw_shelves(side: Drawing, low: float, high: float, depth: float) -> None:
     """Draw a shelf along the facade, and one in the middle of a room."""
-    side.add_block(low, depth - 0.6, high, depth)
-    side.add_block((low + high) / 2.0 - 0.3, 1.4, (low + high) / 2.0 + 0.3, depth - 1.8)
+    middle = (low + high) / 2.0
+    half_depth = _SHELF_DEPTH_M / 2.0
+    front = depth - _SHELF_DEPTH_M
+    side.add_block(low, front, high, depth)
+    side.add_block(middle - half_depth, _SHELF_MARGIN_M, middle + half_depth, front - _SHELF_GAP_M)

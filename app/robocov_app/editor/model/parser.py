@@ -39,6 +39,16 @@ _START_CLASSES: dict[str, Any] = {
 }
 _EXTENT_WITHOUT_BOUNDARY: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 """Extent of a density picture on a map without a boundary, m, unless the picture has its own extent."""
+_REQUIRED_VALUES = {
+    "center": "a point [x, y] in meters",
+    "points": "a list of points [x, y]",
+    "positions": "a list of points [x, y]",
+    "radius": "a number",
+    "speed": "a number",
+    "vertices": "a list of points [x, y]",
+    "width": "a number",
+}
+"""Descriptions of the values that obstacles, starts and paths must have, by key, for messages."""
 _Value = TypeVar("_Value")
 
 
@@ -231,11 +241,12 @@ class _Reader:
         expected = f"one of {', '.join(classes)}"
         members = self.require_type(dict, value, path, f"an object whose kind is {expected}")
         if "kind" not in members:
-            self.fail((*path, "kind"), "missing")
+            self.fail((*path, "kind"), f"missing, expected {expected}")
         kind = members["kind"]
+        # A tuple, because a value from JSON may be unhashable.
         if kind not in tuple(classes):
             self.fail((*path, "kind"), f"expected {expected}, got {quote_json(kind)}")
-        return self.read_fields(classes[kind], value, path, other_keys=("kind",))
+        return self.read_fields(classes[kind], members, path, other_keys=("kind",))
 
     def read_fields(
         self, cls: type[_Value], value: Any, path: JsonPath, other_keys: Sequence[str] = ()
@@ -254,5 +265,5 @@ class _Reader:
             if name in members and not is_default:
                 arguments[name] = self._readers[name](members[name], (*path, name))
             elif field.default is MISSING:
-                self.fail((*path, name), "missing")
+                self.fail((*path, name), f"missing, expected {_REQUIRED_VALUES[name]}")
         return cls(**arguments)

@@ -123,4 +123,5 @@ class EditorContext(WindowModel):
         """Replace the selection."""
         if selection != self.selection:
             self.document.history.selection = selection
+            # Not `_handle_change`: the map is the same, so the draft and the measurement stay.
             self.revision += 1

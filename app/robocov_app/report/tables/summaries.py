@@ -104,7 +104,7 @@ def _build_gap_column(result: ReportedResult) -> RunColumn:
 
     def format_gaps(runs: Sequence[ReportedRun]) -> str:
         gaps = [100.0 * result.compute_gap(run) for run in runs]
-        return format_quartiles([gap for gap in gaps if np.isfinite(gap)], 1)
+        return format_quartiles([gap for gap in gaps if np.isfinite(gap)], decimals=1)
 
     return RunColumn("Gap, %", format_gaps)
 

@@ -39,12 +39,16 @@ class SnapTargets:
         Points to snap to. The pointer can also be aligned with them horizontally or vertically.
     edges : Edges
         Edges that can be snapped to, as can their midpoints.
-    outlines : Edges
-        Edges that can be snapped to, but not their midpoints.
+    edges_without_midpoints : Edges
+        Edges without snapping to their midpoints, such as the visible outlines of walls and circles.
     """
 
     def __init__(
-        self, vertices: FloatArray, centers: FloatArray, edges: Edges, outlines: Edges = _NO_EDGES
+        self,
+        vertices: FloatArray,
+        centers: FloatArray,
+        edges: Edges,
+        edges_without_midpoints: Edges = _NO_EDGES,
     ) -> None:
         """Index the points by kind, the bounding boxes of the edges, and the coordinates for alignment."""
         middles = (edges.starts + edges.ends) / 2
@@ -52,14 +56,18 @@ class SnapTargets:
         self._trees = {
             kind: (cKDTree(points), points) for kind, points in points_by_kind.items() if len(points)
         }
-        self._starts = np.concatenate([edges.starts, outlines.starts])
-        self._ends = np.concatenate([edges.ends, outlines.ends])
+        self._starts = np.concatenate([edges.starts, edges_without_midpoints.starts])
+        self._ends = np.concatenate([edges.ends, edges_without_midpoints.ends])
         low = np.minimum(self._starts, self._ends)
         high = np.maximum(self._starts, self._ends)
-        self._edges = shapely.STRtree(shapely.box(*low.T, *high.T))
+        boxes = shapely.box(xmin=low[:, 0], ymin=low[:, 1], xmax=high[:, 0], ymax=high[:, 1])
+        self._edges = shapely.STRtree(boxes)
         # The pointer aligns with vertices and centers. Sorting by each coordinate allows a binary search.
-        marks = np.concatenate([vertices, centers])
-        self._sorted_marks = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
+        # It is stable, so that among equally good points the choice does not depend on the sorting algorithm.
+        alignment_points = np.concatenate([vertices, centers])
+        self._sorted_alignment_points = tuple(
+            alignment_points[np.argsort(alignment_points[:, axis], kind="stable")] for axis in (0, 1)
+        )
 
     def find_nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
         """Return the nearest target of a kind within `reach` meters; None if there is none."""
@@ -82,32 +90,33 @@ class SnapTargets:
         return [(_to_point(starts[k]), _to_point(ends[k])) for k in order]
 
     def find_aligned(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
-        """Return the mark that is best aligned with a point.
+        """Return the vertex or center that is best aligned with a point.
 
         Parameters
         ----------
         point : Point
             Position of the pointer, m.
         axis : int
-            0 for marks with nearly the same x coordinate, 1 for nearly the same y coordinate.
+            0 for points with nearly the same x coordinate, 1 for nearly the same y coordinate.
         reach : float
             Maximum difference of that coordinate, m.
         horizon : float
-            Maximum distance of the mark, m.
+            Maximum distance of the vertex or center, m.
 
         Returns
         -------
         Point or None
-            The mark with the smallest difference along the axis; among equals, the nearest.
+            The one with the smallest difference along the axis; among equals, the nearest.
         """
-        marks = self._sorted_marks[axis]
-        first, last = np.searchsorted(marks[:, axis], (point[axis] - reach, point[axis] + reach))
-        near = marks[first:last]
-        near = near[np.hypot(*(near - point).T) <= horizon]
+        alignment_points = self._sorted_alignment_points[axis]
+        bounds = (point[axis] - reach, point[axis] + reach)
+        first, last = np.searchsorted(alignment_points[:, axis], bounds)
+        near = alignment_points[first:last]
+        near = near[_compute_distances(near, point) <= horizon]
         if not len(near):
             return None
         differences = np.round(np.abs(near[:, axis] - point[axis]), 9)
-        order = np.lexsort((np.hypot(*(near - point).T), differences))
+        order = np.lexsort((_compute_distances(near, point), differences))
         return _to_point(near[order[0]])
 
 
@@ -118,6 +127,11 @@ def list_outline_edges(polygons: Sequence[shapely.Geometry]) -> Edges:
     # Consecutive points form an edge unless they belong to different rings.
     is_edge = ring_numbers[1:] == ring_numbers[:-1]
     return Edges(points[:-1][is_edge], points[1:][is_edge])
+
+
+def _compute_distances(points: FloatArray, point: Point) -> FloatArray:
+    """Return the distance of each of some points from a point, m."""
+    return np.asarray(np.linalg.norm(points - np.asarray(point), axis=1))
 
 
 def _to_point(coordinates: FloatArray) -> Point:

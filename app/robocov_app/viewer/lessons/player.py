@@ -102,7 +102,8 @@ def load_lesson(path: Path = FIRST_LESSON) -> SavedSession:
     """
     saved = load_session(path)
     if saved.lesson is None:
-        raise MapError.from_issues(str(path), [Issue.at_path(("lesson",), "missing")])
+        message = "missing, expected an object with the chapters of a lesson"
+        raise MapError.from_issues(str(path), [Issue.at_path(("lesson",), message)])
     for index, chapter in enumerate(saved.lesson.chapters):
         check_layer_names(f"{path}: lesson.chapters[{index}].show", chapter.show)
     return saved

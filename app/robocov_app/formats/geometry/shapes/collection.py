@@ -326,11 +326,11 @@ class Shapes:
         """
         self.labels.require_known_names()
         if world is None and not self.outlines and not self.lines:
-            reason = "no closed outline and no line"
+            message = "expected at least one closed outline or line, got none"
             omissions = "; ".join(self.omissions.describe())
             if omissions:
-                reason = f"{reason} ({omissions} left out)"
-            raise MapError(f"{self.source_name}: {reason}, expected a drawing")
+                message = f"{message} ({omissions} left out)"
+            raise MapError(f"{self.source_name}: {message}")
         result = interpret(self._build_drawing(world), solid=solid, overlap=overlap)
         if result.outside:
             self.count_omission("shape", "outside of the boundary", result.outside)

@@ -81,7 +81,7 @@ def parse_metadata(document: dict[str, files.Value], source_name: str) -> Metada
     negate = parser.parse_negate()
     occupied, free = parser.parse_thresholds()
     return Metadata(
-        image=parser.get_text("image"),
+        image=parser.get_text("image", expected="one file name"),
         mode=mode,
         resolution=resolution,
         origin=(x, y),
@@ -101,18 +101,22 @@ class _MetadataParser:
         self._document = document
         self._where = source_name
 
-    def get_text(self, key: str, default: str | None = None) -> str:
-        """Return the text of a key; raise MapError if the key is missing and has no default."""
+    def get_text(self, key: str, default: str | None = None, *, expected: str = "one value") -> str:
+        """Return the text of a key; raise MapError if the key is missing and has no default.
+
+        `expected` describes the value in the messages.
+        """
         value = self._document.get(key, default)
         if value is None:
-            raise MapError(f"{self._where}: {key}: missing")
+            raise MapError(f"{self._where}: {key}: missing, expected {expected}")
         if not isinstance(value, str):
-            raise MapError(f"{self._where}: {key}: expected one value, got {quote(value)}")
+            raise MapError(f"{self._where}: {key}: expected {expected}, got {quote(value)}")
         return value
 
     def parse_number(self, key: str, default: str | None = None) -> float:
         """Return the number of a key; raise MapError if it is invalid, or missing without a default."""
-        return _parse_number(self.get_text(key, default), f"{self._where}: {key}")
+        text = self.get_text(key, default, expected="a number")
+        return _parse_number(text, f"{self._where}: {key}")
 
     def parse_mode(self) -> Mode:
         """Return the mode of a map."""
