@@ -46,7 +46,7 @@ class NumberedScan:
         Number of the robot that took the scan.
     round_number : int
     time : float, s
-        Time at which it was taken.
+        Time at which the scan was taken.
     position : (2,) array, m
         Position of the robot at that time, as the robot knew it.
     distances : (rays,) uint16 array
@@ -339,9 +339,10 @@ class ScanLog:
         ----------
         checkpoint : Checkpoint
         late_scans : list of NumberedScan
-            Scans that its map lacks. The map of the previous checkpoint contains those of its own rounds.
+            Scans that the map of this checkpoint lacks. The map of the previous one contains those of its own
+            rounds.
         previous : Checkpoint
-            Checkpoint before it, which has been repaired.
+            The checkpoint before this one, already repaired.
 
         Returns
         -------

@@ -28,9 +28,9 @@ def plan_evasion(
     jam : JamState
         State after the robot's last plan.
     positions : (k, 2) array, m
-        Positions of the robots that it knows of, its own first.
+        Positions of the robot itself, which comes first, and of the others that it knows of.
     is_stuck : bool
-        Whether it has barely moved since its last plan, although it is not at its goal.
+        Whether the robot has barely moved since its last plan, although it is not at its goal.
     time : float, s
     robot : int
         Index of the robot.

@@ -47,7 +47,7 @@ class Digest:
     Attributes
     ----------
     time : float, s
-        Time at which it was sent.
+        Time at which the digest was sent.
     inventory : Inventory
         The scans that the robot has.
     is_neighbor : (n,) bool array
