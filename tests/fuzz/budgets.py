@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-REFUSED = (1.0, 200.0)
+REJECTED = (1.0, 200.0)
 """Limits of a rejected file: processor time in s, memory in MB."""
 
 READ = (10.0, 500.0)
@@ -42,9 +42,9 @@ class Cost:
     megabytes : float, MB
         Increase of the peak memory.
     outcome : str
-        Reason of a refusal, or number of vertices of the map.
+        Reason of the rejection, or number of vertices of the map.
     is_read : bool
-        Whether the file was read. Maps without space for a robot are refused only after that.
+        Whether the file was read. Maps without space for a robot are rejected only after that.
     """
 
     seconds: float
@@ -55,7 +55,7 @@ class Cost:
     @property
     def share(self) -> float:
         """Fraction of the budget that was used."""
-        limits = READ if self.is_read else REFUSED
+        limits = READ if self.is_read else REJECTED
         max_seconds, max_megabytes = limits
         return max(self.seconds / max_seconds, self.megabytes / max_megabytes)
 
@@ -255,7 +255,7 @@ def read(path: Path, seconds: float) -> Cost:
         _, report = build_environment(foreign, Shaping(), path.name)
         outcome = f"{report.vertices_kept} vertices"
     except RobocovError as error:
-        outcome = f"refused: {str(error).partition(': ')[2]}"
+        outcome = f"rejected: {str(error).partition(': ')[2]}"
         if importer.name == "dxf" and " shapes" in outcome:
             # The shapes are counted after ezdxf has read the file.
             is_read = True

@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def answer(job: dict[str, Any]) -> dict[str, Any]:
-    """Read a file, and return the outcome: read, refused with a message of one line, or a finding."""
+    """Read a file, and return the outcome: read, rejected with a message of one line, or a finding."""
     from robocov.errors import RobocovError
 
     start_time = time.process_time()
@@ -50,7 +50,7 @@ def answer(job: dict[str, Any]) -> dict[str, Any]:
                 outcome = {"outcome": "read", "text": text}
             except RobocovError as error:
                 _require_one_line(str(error))
-                outcome = {"outcome": "refused", "text": str(error)}
+                outcome = {"outcome": "rejected", "text": str(error)}
     except MemoryError as error:
         outcome = _build_finding("memory", error)
     except (Exception, SystemExit) as error:
@@ -164,8 +164,8 @@ def _misbehave(path: Path, job: dict[str, Any]) -> str:
         raise MapError("one\ntwo")
     if "warning" in word:
         warnings.warn("something is odd", RuntimeWarning, stacklevel=1)
-    if "refused" in word:
-        raise MapError(f"{path.name}: refused")
+    if "rejected" in word:
+        raise MapError(f"{path.name}: rejected")
     if "error" in word:
         raise KeyError(word)
     return "fine"

@@ -60,7 +60,7 @@ class Outcome:
     Attributes
     ----------
     outcome : str
-        ``read`` or ``refused``, or one of the findings ``error``, ``memory``, ``slow``, ``hang`` and
+        ``read`` or ``rejected``, or one of the findings ``error``, ``memory``, ``slow``, ``hang`` and
         ``crash``.
     text : str
         Description of what was read, or the error message.
@@ -80,7 +80,7 @@ class Outcome:
     @property
     def is_expected(self) -> bool:
         """Whether the outcome is not a finding."""
-        return self.outcome in ("read", "refused")
+        return self.outcome in ("read", "rejected")
 
 
 class Reader:

@@ -27,7 +27,7 @@ from fuzz_seeds import SEEDS, Case
 from fuzz_shrinking import shrink
 
 MAX_CORPUS_CASES = 300
-"""Maximum number of read cases in a corpus, and of refused ones."""
+"""Maximum number of read cases in a corpus, and of rejected ones."""
 
 _READ_FRACTION = 0.6
 """Fraction of the mutated cases that were read before."""
@@ -77,7 +77,7 @@ _SHAPING: dict[str, list[Any]] = {
 
 
 _REQUIRED_OPTIONS = {"image": "cell", "svg": "scale"}
-"""Options without which the seeds are refused."""
+"""Options without which the seeds are rejected."""
 
 
 def list_targets() -> list[str]:
@@ -149,7 +149,7 @@ class Tally:
         if not outcome.is_expected:
             self.findings.setdefault(outcome.signature, (case, job, outcome))
         kind = outcome.text
-        if outcome.outcome == "refused":
+        if outcome.outcome == "rejected":
             kind = re.sub(r"'[^']*'|\"[^\"]*\"|[-+\d.]+", "#", kind.partition(": ")[2])[:80]
         is_new = outcome.is_expected and kind not in self.kinds
         self.kinds.add(kind)
@@ -172,15 +172,15 @@ class Corpus:
     ----------
     read : list of Case
         Cases that were read, including the seeds.
-    refused : list of Case
+    rejected : list of Case
     """
 
     read: list[Case]
-    refused: list[Case] = field(default_factory=list)
+    rejected: list[Case] = field(default_factory=list)
 
     def keep(self, case: Case, outcome: Outcome, random: Random) -> None:
         """Add a case. It replaces another one if the corpus is full."""
-        cases = self.read if outcome.outcome == "read" else self.refused
+        cases = self.read if outcome.outcome == "read" else self.rejected
         if len(cases) < MAX_CORPUS_CASES:
             cases.append(case)
         else:
@@ -188,8 +188,8 @@ class Corpus:
 
     def draw(self, random: Random) -> Case:
         """Draw a case."""
-        is_read = random.random() < _READ_FRACTION or not self.refused
-        return random.choice(self.read if is_read else self.refused)
+        is_read = random.random() < _READ_FRACTION or not self.rejected
+        return random.choice(self.read if is_read else self.rejected)
 
 
 def fuzz(target: str, reader: Reader, seed: int, enough: Callable[[Tally], bool]) -> Tally:

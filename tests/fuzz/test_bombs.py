@@ -1,4 +1,4 @@
-"""Decompression bombs are refused with a message of one line, within limits of time and memory."""
+"""Decompression bombs are rejected with a message of one line, within limits of time and memory."""
 
 import os
 from collections.abc import Iterator
@@ -23,10 +23,10 @@ def reader() -> Iterator[Reader]:
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_bombs_are_refused(name: str, reader: Reader) -> None:
+def test_bombs_are_rejected(name: str, reader: Reader) -> None:
     build_case, job, message = BOMBS[name]
     outcome = reader.read(build_case(), job)
-    assert outcome.outcome == "refused", f"{outcome.text}\n{outcome.traceback}"
+    assert outcome.outcome == "rejected", f"{outcome.text}\n{outcome.traceback}"
     assert message in outcome.text
 
 

@@ -40,7 +40,7 @@ def test_every_seed_is_read(target: str, reader: Reader) -> None:
 
 
 @pytest.mark.parametrize("target", SEEDS)
-def test_fuzzed_files_are_read_or_refused(target: str, reader: Reader, tmp_path: Path) -> None:
+def test_fuzzed_files_are_read_or_rejected(target: str, reader: Reader, tmp_path: Path) -> None:
     case_count = CASE_COUNTS.get(target, CASE_COUNT)
     tally = importers.fuzz(target, reader, 0, lambda tally: sum(tally.counts.values()) >= case_count)
     for case, job, outcome in tally.findings.values():
@@ -63,7 +63,7 @@ def read_misbehaving_file(word: str, reader: Reader) -> Outcome:
     ("word", "kind", "text"),
     [
         ("fine", "read", "fine"),
-        ("refused", "refused", "word.txt: refused"),
+        ("rejected", "rejected", "word.txt: rejected"),
         ("error", "error", "KeyError: 'error'"),
         ("warning", "error", "RuntimeWarning: something is odd"),
         ("lines", "error", "UnexpectedEffectError: expected a message of one line"),
@@ -75,7 +75,7 @@ def test_unexpected_effects_are_findings(word: str, kind: str, text: str, reader
     outcome = read_misbehaving_file(word, reader)
     assert outcome.outcome == kind
     assert outcome.text.startswith(text)
-    assert outcome.is_expected == (kind in ("read", "refused"))
+    assert outcome.is_expected == (kind in ("read", "rejected"))
     assert bool(outcome.signature) == (not outcome.is_expected)
     # Further files can be read.
     assert read_misbehaving_file("fine", reader).outcome == "read"
@@ -93,10 +93,10 @@ def test_findings_with_the_same_cause_are_counted_as_one() -> None:
     tally = importers.Tally("map")
     for k in range(3):
         tally.note(Case({"a": b"x"}), Job("map"), Outcome("error", f"KeyError: {k}", "error-here"))
-    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "a: name: expected a string"))
-    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("refused", "b: name: expected a string"))
+    assert tally.note(Case({"a": b"x"}), Job("map"), Outcome("rejected", "a: name: expected a string"))
+    assert not tally.note(Case({"a": b"x"}), Job("map"), Outcome("rejected", "b: name: expected a string"))
     assert list(tally.findings) == ["error-here"]
-    assert tally.counts == {"error": 3, "refused": 2}
+    assert tally.counts == {"error": 3, "rejected": 2}
 
 
 def test_findings_are_shrunk() -> None:

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
-from robocov import k_median
 from robocov.k_median import (
     apply_best_swap,
     apply_best_swaps,
@@ -20,13 +19,16 @@ from robocov.k_median import (
     seed_sources,
 )
 
+SEEDS_WITH_STUCK_SWAPS = [5, 16, 194, 277]
+"""Random seeds for which swaps alone do not find the optimum."""
+
 
 def build_random_distances(seed: int, sources: int = 12, targets: int = 30) -> np.ndarray:
     """Return the distances of points in a square, (targets, sources), with a random weight per target."""
     rng = np.random.default_rng(seed)
     source_positions = rng.uniform(0, 10, (sources, 2))
     target_positions = rng.uniform(0, 10, (targets, 2))
-    distance = np.hypot(*(source_positions - target_positions[:, None]).T).T
+    distance = np.linalg.norm(source_positions - target_positions[:, None], axis=2)
     return distance * rng.uniform(0.5, 2.0, (targets, 1))
 
 
@@ -87,15 +89,15 @@ def test_rebuilding_lowers_the_cost_or_changes_nothing(seed: int, k: int, fixed_
     assert after is start or compute_cost(distance, after) < 0.95 * compute_cost(distance, start)
 
 
-@pytest.mark.parametrize("seed", [5, 16, 194, 277])
-def test_rebuilding_finds_the_optimum_where_swaps_do_not(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("seed", SEEDS_WITH_STUCK_SWAPS)
+def test_rebuilding_finds_the_optimum_where_swaps_do_not(seed: int) -> None:
     distance = build_random_distances(seed)
     start = np.arange(4)
     is_fixed = np.zeros(4, dtype=bool)
     best = min(compute_cost(distance, np.array(sources)) for sources in combinations(range(12), 4))
     assert compute_cost(distance, improve_sources(distance, start, is_fixed, 0.0)) == pytest.approx(best)
-    monkeypatch.setattr(k_median, "rebuild_sources", lambda table, sources, fixed, threshold: sources)
-    assert compute_cost(distance, improve_sources(distance, start, is_fixed, 0.0)) > 1.01 * best
+    without_rebuilding = improve_sources(distance, start, is_fixed, 0.0, removals=False)
+    assert compute_cost(distance, without_rebuilding) > 1.01 * best
 
 
 @settings(max_examples=count_examples(40))

@@ -165,7 +165,7 @@ class Listener:
             timer.cancel()
 
     async def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request; refuse other methods than GET and HEAD, and too many downloads at a time."""
+        """Answer a request; reject other methods than GET and HEAD, and too many downloads at a time."""
         # Versions of websockets before 17 accept only GET, and requests lack this attribute.
         method = getattr(request, "method", "GET")
         if method not in ("GET", "HEAD"):

@@ -58,13 +58,13 @@ class Upload:
         Name of the file.
     size : int
         Its size in bytes.
-    is_refused : bool
+    is_rejected : bool
         Whether the file is rejected. Its pieces are discarded, since the page may already have sent them.
     """
 
-    def __init__(self, name: str, size: int, *, is_refused: bool) -> None:
+    def __init__(self, name: str, size: int, *, is_rejected: bool) -> None:
         self.name = name
-        self.is_refused = is_refused
+        self.is_rejected = is_rejected
         self._remaining = size
         self._pieces: list[bytes] = []
 
@@ -78,7 +78,7 @@ class Upload:
         if len(piece) > self._remaining:
             raise ValueError(f"{self.name}: larger than announced")
         self._remaining -= len(piece)
-        if not self.is_refused:
+        if not self.is_rejected:
             self._pieces.append(piece)
 
     def save(self, folder: Path) -> Path:

@@ -204,7 +204,7 @@ class PageConnection:
             problem = problem or str(error)
         if problem:
             self._page.notify(problem)
-        self._page.upload = Upload(message.name, message.size, is_refused=bool(problem))
+        self._page.upload = Upload(message.name, message.size, is_rejected=bool(problem))
         await self._finish_upload()
 
     async def _add_piece(self, piece: bytes) -> None:
@@ -219,7 +219,7 @@ class PageConnection:
         if upload is None or not upload.is_complete:
             return
         self._page.upload = None
-        if upload.is_refused:
+        if upload.is_rejected:
             return
         if not self._is_controlling:
             self._page.notify(f"{upload.name}: not opened, another page controls the window now.")

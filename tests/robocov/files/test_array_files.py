@@ -28,7 +28,7 @@ def read(content: bytes, max_bytes: int = 1_000_000_000) -> dict[str, np.ndarray
 
 
 def build_header(size: int) -> bytes:
-    """Return the header of an array of some bytes."""
+    """Return the `.npy` header of a float64 array with `size` bytes of data."""
     head = io.BytesIO()
     header = {"descr": "<f8", "fortran_order": False, "shape": (size // 8,)}
     np.lib.format.write_array_header_1_0(head, header)
@@ -36,7 +36,7 @@ def build_header(size: int) -> bytes:
 
 
 def write_zeros(path: Path, arrays: int) -> None:
-    """Write a file of some arrays of zeros, each of `CLAIMED_BYTES` bytes, which it really contains."""
+    """Write an `.npz` file with arrays of zeros that really have `CLAIMED_BYTES` bytes each."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     head = packer.compress(build_header(CLAIMED_BYTES)) + packer.flush(zlib.Z_FULL_FLUSH)
     million = packer.compress(bytes(1_000_000)) + packer.flush(zlib.Z_FULL_FLUSH)
@@ -44,7 +44,7 @@ def write_zeros(path: Path, arrays: int) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         for k in range(arrays):
             archive.writestr(f"a{k}.npy", stream + bytes(7_000_000 - len(stream)))
-        for entry in archive.filelist:
+        for entry in archive.infolist():
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.file_size = CLAIMED_BYTES + len(build_header(CLAIMED_BYTES))
 
@@ -66,8 +66,9 @@ def patch_directory(content: bytes, **changes: object) -> bytes:
     buffer = io.BytesIO(content)
     with zipfile.ZipFile(buffer, "a") as archive:
         for name, value in changes.items():
-            setattr(archive.filelist[-1], name, value)
-        archive._didModify = True  # type: ignore[attr-defined]
+            setattr(archive.infolist()[-1], name, value)
+        # A new comment makes `zipfile` write the directory again.
+        archive.comment = b"patched"
     return buffer.getvalue()
 
 

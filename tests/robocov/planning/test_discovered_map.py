@@ -141,7 +141,8 @@ def test_dilated_cells_are_those_close_to_blocked_ones(seed: int, reach: float) 
     is_blocked = np.random.default_rng(seed).random((14, 11)) < 0.05
     row, column = np.mgrid[:14, :11]
     expected = np.zeros_like(is_blocked)
-    padded = np.pad(is_blocked, 5, constant_values=True)
-    for r, c in np.argwhere(padded) - 5:
+    margin = 5  # cells; more than any reach, because everything outside counts as blocked
+    padded = np.pad(is_blocked, margin, constant_values=True)
+    for r, c in np.argwhere(padded) - margin:
         expected |= (row - r) ** 2 + (column - c) ** 2 <= reach * reach
     assert np.array_equal(dilate(is_blocked, reach), expected)

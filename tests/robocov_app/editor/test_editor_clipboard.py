@@ -122,7 +122,7 @@ def test_unusable_text_raises_a_map_error(text):
 
 
 @given(st.text(max_size=30))
-def test_any_text_is_pasted_or_refused(text):
+def test_any_text_is_pasted_or_rejected(text):
     try:
         paste(Sketch(), text)
     except MapError as error:

@@ -284,7 +284,7 @@ def test_a_problem_is_fixed_by_the_button_next_to_it(driver: EditorDriver) -> No
     assert driver.message == "Circle “lamp” deleted"
 
 
-def test_a_refused_command_stays_for_correction(tmp_path: Path) -> None:
+def test_a_rejected_command_stays_for_correction(tmp_path: Path) -> None:
     with open_editor(tmp_path) as driver:
         driver.run_command("grid 99999")
         assert "99999" in open_palette(driver).error and open_palette(driver).text == "grid 99999"

@@ -115,7 +115,7 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, body: str, expected
     assert expected in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_file_without_an_arena_is_refused(tmp_path: Path) -> None:
+def test_a_file_without_an_arena_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "test.argos"
     path.write_text("<argos-configuration/>")
     with pytest.raises(MapError, match="no <arena>"):

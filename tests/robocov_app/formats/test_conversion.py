@@ -246,7 +246,7 @@ def test_unreachable_regions_are_noted() -> None:
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_unusable_maps_are_refused(
+def test_unusable_maps_are_rejected(
     parts: tuple[Polygon, ...], shaping: dict[str, Any], expected: str
 ) -> None:
     with pytest.raises(MapError) as caught:
@@ -269,7 +269,7 @@ def test_unusable_maps_are_refused(
         ({"default_start": "door"}, "default_start: expected one of room, uniform"),
     ],
 )
-def test_options_out_of_range_are_refused(options: dict[str, Any], expected: str) -> None:
+def test_options_out_of_range_are_rejected(options: dict[str, Any], expected: str) -> None:
     with pytest.raises(ParameterError, match=expected):
         Shaping(**options)
 
@@ -360,7 +360,7 @@ def test_a_map_of_many_vertices_has_a_note() -> None:
 
 
 @pytest.mark.parametrize(("most", "expected"), [("MAX_OBSTACLES", "obstacles"), ("MAX_VERTICES", "vertices")])
-def test_a_map_that_takes_too_long_is_refused(
+def test_a_map_that_takes_too_long_is_rejected(
     monkeypatch: pytest.MonkeyPatch, most: str, expected: str
 ) -> None:
     monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.environment.{most}", 0)

@@ -1,4 +1,4 @@
-"""Worlds of CoverageControl: their density, their robots, and refused files."""
+"""Worlds of CoverageControl: their density, their robots, and rejected files."""
 
 from pathlib import Path
 
@@ -81,6 +81,6 @@ def test_the_size_of_a_cell_scales_the_world(tmp_path: Path) -> None:
         ("CircularBND\n1 2 3 4\n", "1 2\n3\n", "world.pos: expected an x and a y for each robot"),
     ],
 )
-def test_other_files_are_refused(tmp_path: Path, content: str, positions: str | None, message: str) -> None:
+def test_other_files_are_rejected(tmp_path: Path, content: str, positions: str | None, message: str) -> None:
     with pytest.raises(MapError, match=message):
         import_map(write_world(tmp_path, content, positions))

@@ -99,7 +99,7 @@ def test_batches_agree_with_single_curves() -> None:
 
 
 @pytest.mark.parametrize("radius", [1e8, 1e12, 1e30, math.nan])
-def test_huge_curves_are_refused(radius: float) -> None:
+def test_huge_curves_are_rejected(radius: float) -> None:
     with pytest.raises(ValueError, match=f"expected at most {MAX_POINTS} points, got more"):
         flatten_circle(radius, sweep=math.tau)
     with pytest.raises(ValueError, match="expected at most 250000 points"):

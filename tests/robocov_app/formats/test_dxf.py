@@ -1,4 +1,4 @@
-"""DXF drawings written by ezdxf: entities, blocks, layers, units, and refused files."""
+"""DXF drawings written by ezdxf: entities, blocks, layers, units, and rejected files."""
 
 import io
 import logging
@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 from shapely import affinity, box
+from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
@@ -43,7 +44,8 @@ def read_drawing(
     return IMPORTERS["dxf"].read(path, ReadOptions(**options))
 
 
-def read_obstacles(folder: Path, draw: Draw, **options: Any) -> Any:
+def read_solid_area(folder: Path, draw: Draw, **options: Any) -> BaseGeometry:
+    """Return the area of the hall that is not free."""
     foreign = read_drawing(folder, draw, **options)
     assert not any("damaged" in line for line in foreign.dropped)
     return box(0, 0, 20, 10) - foreign.free
@@ -82,7 +84,7 @@ def read_obstacles(folder: Path, draw: Draw, **options: Any) -> Any:
     ],
 )
 def test_entities_become_areas_and_walls(tmp_path: Path, draw: Draw, expected: Any) -> None:
-    assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-4
+    assert read_solid_area(tmp_path, draw).symmetric_difference(expected).area < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -97,7 +99,7 @@ def test_entities_become_areas_and_walls(tmp_path: Path, draw: Draw, expected: A
     ],
 )
 def test_arcs_are_walls_of_half_a_ring(tmp_path: Path, draw: Draw) -> None:
-    wall = read_obstacles(tmp_path, draw, thickness=0.2)
+    wall = read_solid_area(tmp_path, draw, thickness=0.2)
     assert wall.area == pytest.approx(math.pi * 2 * 0.2, rel=2e-3)
     away = shapely.distance(shapely.Point(5, 5), shapely.points(shapely.get_coordinates(wall)))
     assert (away >= 1.9 - 2e-3).all()
@@ -105,20 +107,20 @@ def test_arcs_are_walls_of_half_a_ring(tmp_path: Path, draw: Draw) -> None:
 
 
 def test_closed_curves_are_areas(tmp_path: Path) -> None:
-    oval = read_obstacles(tmp_path, lambda d, m: m.add_ellipse((5, 5), (3, 0), 0.5))
+    oval = read_solid_area(tmp_path, lambda d, m: m.add_ellipse((5, 5), (3, 0), 0.5))
     assert oval.area == pytest.approx(math.pi * 3 * 1.5, rel=1e-3)
-    turned = read_obstacles(tmp_path, lambda d, m: m.add_ellipse((5, 5), (0, 3), 0.5))
+    turned = read_solid_area(tmp_path, lambda d, m: m.add_ellipse((5, 5), (0, 3), 0.5))
     assert turned.area == pytest.approx(oval.area, rel=1e-6)
-    lens = read_obstacles(
+    lens = read_solid_area(
         tmp_path, lambda d, m: m.add_lwpolyline([(3, 5, 1), (7, 5, 1)], format="xyb", close=True)
     )
     assert lens.area == pytest.approx(math.pi * 4, rel=1e-3)
     points = [(5, 3, 0), (8, 5, 0), (5, 7, 0), (2, 5, 0)]
-    spline = read_obstacles(tmp_path, lambda d, m: m.add_spline().set_closed(points))
+    spline = read_solid_area(tmp_path, lambda d, m: m.add_spline().set_closed(points))
     assert 4 < spline.area < 12
     assert spline.centroid.coords[0] == pytest.approx((5, 5), abs=1e-3)
     center = ezdxf.math.OCS((1, 0, 1)).from_wcs((5, 5, 0))
-    tilted = read_obstacles(
+    tilted = read_solid_area(
         tmp_path, lambda d, m: m.add_circle(center, 1, dxfattribs={"extrusion": (1, 0, 1)})
     )
     assert tilted.area == pytest.approx(math.pi * math.sqrt(0.5), rel=2e-3)
@@ -126,7 +128,7 @@ def test_closed_curves_are_areas(tmp_path: Path) -> None:
 
 def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
     control = [(2, 2), (6, 9), (10, 1), (14, 8)]
-    wall = read_obstacles(tmp_path, lambda d, m: m.add_open_spline(control, degree=3), thickness=0.02)
+    wall = read_solid_area(tmp_path, lambda d, m: m.add_open_spline(control, degree=3), thickness=0.02)
     t = np.linspace(0, 1, 500)[:, None]
     weights = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3]
     exact = shapely.points(sum(w * np.array(c) for w, c in zip(weights, control, strict=True)))
@@ -179,7 +181,7 @@ def test_blocks_are_drawn_where_they_are_inserted(tmp_path: Path) -> None:
     rows = [affinity.translate(seat, 15 + 1.5 * k, 1 + 2 * j) for k in range(2) for j in range(3)]
     mirrored = affinity.scale(pair, -1, 1, origin=(0, 0))
     expected = shapely.union_all([affinity.translate(pair, 3, 3), affinity.translate(mirrored, 12, 3), *rows])
-    assert read_obstacles(tmp_path, draw).symmetric_difference(expected).area < 1e-6
+    assert read_solid_area(tmp_path, draw).symmetric_difference(expected).area < 1e-6
 
 
 def test_circles_in_stretched_blocks_become_ellipses(tmp_path: Path) -> None:
@@ -187,7 +189,7 @@ def test_circles_in_stretched_blocks_become_ellipses(tmp_path: Path) -> None:
         document.blocks.new("table").add_circle((0, 0), 1)
         space.add_blockref("table", (5, 5), dxfattribs={"xscale": 3.0})
 
-    oval = read_obstacles(tmp_path, draw)
+    oval = read_solid_area(tmp_path, draw)
     assert oval.area == pytest.approx(math.pi * 3, rel=2e-3)
     assert oval.bounds == pytest.approx((2, 4, 8, 6), abs=2e-3)
 
@@ -205,9 +207,9 @@ def test_layers_are_selected_and_hidden_ones_omitted(tmp_path: Path) -> None:
         add_chair(document)
         space.add_blockref("chair", (10, 5), dxfattribs={"layer": "Furniture"})
 
-    assert read_obstacles(tmp_path, draw).area == pytest.approx(2.5)
-    assert read_obstacles(tmp_path, draw, skip=("furniture",)).area == pytest.approx(1.0)
-    assert read_obstacles(tmp_path, draw, skip=("CHAIR",)).area == pytest.approx(2.0)
+    assert read_solid_area(tmp_path, draw).area == pytest.approx(2.5)
+    assert read_solid_area(tmp_path, draw, skip=("furniture",)).area == pytest.approx(1.0)
+    assert read_solid_area(tmp_path, draw, skip=("CHAIR",)).area == pytest.approx(2.0)
     foreign = read_drawing(tmp_path, draw, only=("0", "walls"))
     assert foreign.free.area == pytest.approx(199.0)
     assert foreign.dropped == (
@@ -260,7 +262,7 @@ def test_multilines_are_their_lines(tmp_path: Path) -> None:
         line = space.add_mline([(5, 2), (9, 2)])
         line.set_justification(1)
 
-    assert read_obstacles(tmp_path, draw).area > 0.5
+    assert read_solid_area(tmp_path, draw).area > 0.5
 
 
 @pytest.mark.parametrize("unit", sorted(UNITS))
@@ -373,7 +375,7 @@ def draw_many_entities(document: Any, space: Any) -> None:
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_unusable_files_are_refused(tmp_path: Path, content: Any, expected: str) -> None:
+def test_unusable_files_are_rejected(tmp_path: Path, content: Any, expected: str) -> None:
     path = tmp_path / "plan.dxf"
     if isinstance(content, bytes):
         path.write_bytes(content)

@@ -210,7 +210,7 @@ def test_self_crossing_outlines_are_counted() -> None:
 
 
 @pytest.mark.parametrize("far", [1e300, np.nan, np.inf, 2e7])
-def test_coordinates_out_of_range_are_refused(far: float) -> None:
+def test_coordinates_out_of_range_are_rejected(far: float) -> None:
     for drawn in ({"lines": [[[0, 0], [far, 0]]]}, {"points": [[far, 0]]}):
         with pytest.raises(MapError, match=r"plan: expected coordinates from -10000000 to"):
             collect_shapes(**drawn)
@@ -220,7 +220,7 @@ def test_coordinates_out_of_range_are_refused(far: float) -> None:
         Shapes("plan", ReadOptions()).add_circle(np.zeros(2), far)
 
 
-def test_drawings_larger_than_any_map_are_refused() -> None:
+def test_drawings_larger_than_any_map_are_rejected() -> None:
     far = collect_shapes(build_square(0, 0, 1e6, 9))
     with pytest.raises(MapError, match=r"plan: expected at most 10 km, got 1e.06 x 9 m: is the scale right."):
         build_map(far)
@@ -231,13 +231,13 @@ def test_shapes_thinner_than_the_grid_are_omitted() -> None:
     assert build_map(slivers).free.area == pytest.approx(8 * 7)
 
 
-def test_too_many_vertices_are_refused() -> None:
+def test_too_many_vertices_are_rejected() -> None:
     collected = Shapes("plan", ReadOptions())
     with pytest.raises(MapError, match=r"plan: expected at most"):
         collected.add_line(WallLine(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
 
 
-def test_a_tangle_of_lines_is_refused() -> None:
+def test_a_tangle_of_lines_is_rejected() -> None:
     ends = np.random.default_rng(0).random((3000, 2, 2)) * 10
     with pytest.raises(MapError, match="crossings of lines"):
         build_map(collect_shapes(lines=ends.tolist()))

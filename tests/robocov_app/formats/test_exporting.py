@@ -1,4 +1,4 @@
-"""How a format to write is chosen; and out and in again changes less than a row of cells."""
+"""Choice of the export format, and maps that are exported and imported again."""
 
 import functools
 from dataclasses import fields, replace
@@ -31,19 +31,19 @@ from robocov_app.formats.geometry.conversion.starts import find_center_regions
 ROOM = Environment("room", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)))
 
 
-def test_every_format_says_what_it_is() -> None:
+def test_every_exporter_describes_its_format() -> None:
     known = {field.name for field in fields(WriteOptions)}
-    for name, one in EXPORTERS.items():
-        assert one.name == name
-        assert one.title and one.suffixes
-        assert one.options <= known
-        path = Path(f"a{one.suffixes[0]}")
-        assert one.list_files(path, WriteOptions())[0] == path
-        assert choose_exporter(path) is one
-        assert choose_exporter("anything", name) is one
+    for name, exporter in EXPORTERS.items():
+        assert exporter.name == name
+        assert exporter.title and exporter.suffixes
+        assert exporter.options <= known
+        path = Path(f"a{exporter.suffixes[0]}")
+        assert exporter.list_files(path, WriteOptions())[0] == path
+        assert choose_exporter(path) is exporter
+        assert choose_exporter("anything", name) is exporter
 
 
-def test_what_is_not_known(tmp_path: Path) -> None:
+def test_unknown_formats_and_options_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(
         ParameterError, match=r"a\.xyz: unknown format, expected a file ending in one of \.yaml, .*\.png"
     ):
@@ -65,20 +65,20 @@ def test_what_is_not_known(tmp_path: Path) -> None:
             WriteOptions(**options)  # type: ignore[arg-type]
 
 
-places = st.tuples(st.floats(0.3, 7.7), st.floats(0.3, 5.7))
+positions = st.tuples(st.floats(0.3, 7.7), st.floats(0.3, 5.7))
 obstacles: st.SearchStrategy[Obstacle] = st.one_of(
-    st.builds(CircleObstacle, places, st.floats(0.15, 0.9)),
+    st.builds(CircleObstacle, positions, st.floats(0.15, 0.9)),
     st.builds(
         lambda at, size, turn: PolygonObstacle(
             tuple(shapely.get_coordinates(
                 shapely.affinity.rotate(shapely.box(*at, at[0] + size[0], at[1] + size[1]), turn)
             )[:-1].tolist())  # type: ignore[arg-type]
         ),
-        places, st.tuples(st.floats(0.15, 2), st.floats(0.15, 2)), st.floats(0, 90),
+        positions, st.tuples(st.floats(0.15, 2), st.floats(0.15, 2)), st.floats(0, 90),
     ),
     st.builds(
         lambda ends, width: WallObstacle(tuple(ends), width),
-        st.lists(places, min_size=2, max_size=2, unique=True), st.floats(0.1, 0.3),
+        st.lists(positions, min_size=2, max_size=2, unique=True), st.floats(0.1, 0.3),
     ),
 )  # fmt: skip
 
@@ -94,7 +94,7 @@ def build_slanted_room(slant: float, obstacles: list[Obstacle]) -> Environment:
     st.floats(0, 1.5), st.lists(obstacles, max_size=5), st.sampled_from([0.05, 0.08]),
     st.sampled_from(["ros", "scale", "raw", "png-of-ros", "movingai", "image"]),
 )  # fmt: skip
-def test_out_and_in_again_changes_less_than_a_row_of_cells(
+def test_a_round_trip_changes_less_than_a_row_of_cells(
     tmp_path_factory: pytest.TempPathFactory,
     slant: float,
     obstacles: list[Obstacle],
@@ -105,41 +105,45 @@ def test_out_and_in_again_changes_less_than_a_row_of_cells(
     environment = build_slanted_room(slant, obstacles)
     if not Polygon(environment.boundary).is_valid or environment.free.is_empty:
         return
-    form = {"scale": "ros", "raw": "ros", "png-of-ros": "ros"}.get(format_name, format_name)
+    exporter_name = {"scale": "ros", "raw": "ros", "png-of-ros": "ros"}.get(format_name, format_name)
     options = WriteOptions(
         cell=cell,
         mode=format_name if format_name in ("scale", "raw") else None,  # type: ignore[arg-type]
         image="png" if format_name == "png-of-ros" else None,
     )
-    path = folder / f"drawn{EXPORTERS[form].suffixes[0]}"
+    path = folder / f"drawn{EXPORTERS[exporter_name].suffixes[0]}"
     written = export_map(environment, path, options=options)
-    read = ReadOptions(cell=cell) if form == "movingai" else ReadOptions()
+    read_options = ReadOptions()
+    if exporter_name == "movingai":
+        read_options = ReadOptions(cell=cell)
     try:
-        back, _, foreign = import_map(path, options=read, shaping=Shaping(keep="all", specks=0.0))
+        imported, _, foreign = import_map(path, options=read_options, shaping=Shaping(keep="all", specks=0.0))
     except MapError as error:
         assert "no position has enough clearance" in str(error)
         return
     row = cell * environment.free.length
     assert abs(written.area_written - environment.free_area) < 0.5 * row
     assert abs(foreign.free.area - environment.free_area) < 0.5 * row
-    assert abs(back.free_area - environment.free_area) < row
-    if form != "movingai":
-        assert back.free.symmetric_difference(environment.free).area < row
-    # what comes back once comes back the same, to half a cell of its walls
-    again = folder / f"again{EXPORTERS[form].suffixes[0]}"
-    export_map(back, again, options=options)
-    twice, _, _ = import_map(again, options=read, shaping=Shaping(keep="all", specks=0.0))
-    assert abs(twice.free_area - back.free_area) < row
+    assert abs(imported.free_area - environment.free_area) < row
+    if exporter_name != "movingai":
+        assert imported.free.symmetric_difference(environment.free).area < row
+    # A second round trip changes no more than the first one.
+    second_path = folder / f"again{EXPORTERS[exporter_name].suffixes[0]}"
+    export_map(imported, second_path, options=options)
+    imported_again, _, _ = import_map(
+        second_path, options=read_options, shaping=Shaping(keep="all", specks=0.0)
+    )
+    assert abs(imported_again.free_area - imported.free_area) < row
 
 
 PLACES = {
-    "the equator": (-78.5, 0.0), "the north": (8.4, 49.0), "the south": (151.2, -33.9),
-    "the antimeridian": (179.9999, 60.0), "a pole": (30.0, -89.0),
+    "equator": (-78.5, 0.0), "northern hemisphere": (8.4, 49.0), "southern hemisphere": (151.2, -33.9),
+    "antimeridian": (179.9999, 60.0), "near a pole": (30.0, -89.0),
 }  # fmt: skip
 FORMATS: dict[str, tuple[str, WriteOptions]] = {
     "ROS": (".yaml", WriteOptions()),
     "MovingAI": (".map", WriteOptions()),
-    "a picture": (".png", WriteOptions()),
+    "image": (".png", WriteOptions()),
     "SVG": (".svg", WriteOptions()),
     "WKT": (".wkt", WriteOptions()),
     "meters": (".geojson", WriteOptions()),
@@ -162,29 +166,33 @@ def get_map(name: str) -> Environment:
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MAPS]
 )
 @pytest.mark.parametrize("format_name", FORMATS)
-def test_maps_go_out_and_in(tmp_path: Path, name: str, format_name: str) -> None:
+def test_exported_maps_can_be_imported_again(tmp_path: Path, name: str, format_name: str) -> None:
     environment = get_map(name)
-    (suffix, options) = FORMATS[format_name]
+    suffix, options = FORMATS[format_name]
     path = tmp_path / f"map{suffix}"
-    read = ReadOptions()
+    read_options = ReadOptions()
     if "cell" in choose_exporter(path).options:
-        # blocks stand a whole number of their own cells apart: coarser ones all err to the same side
-        options = replace(options, cell=0.02 if name == "generated blocks" else 0.05)
-        read = ReadOptions(cell=options.cell) if suffix == ".map" else read
+        # Generated blocks are aligned to a grid: with coarser cells, all rounding errors have the same sign.
+        cell = 0.02 if name == "generated blocks" else 0.05
+        options = replace(options, cell=cell)
+        if suffix == ".map":
+            read_options = ReadOptions(cell=cell)
     report = export_map(environment, path, options=options)
-    back, _, _ = import_map(path, options=read)
-    assert back.free.is_valid
-    assert back.free_area == pytest.approx(environment.free_area, rel=0.005)
-    assert len(find_center_regions(back.free, DEFAULT_RADIUS_M)) == len(
+    imported, _, _ = import_map(path, options=read_options)
+    assert imported.free.is_valid
+    assert imported.free_area == pytest.approx(environment.free_area, rel=0.005)
+    assert len(find_center_regions(imported.free, DEFAULT_RADIUS_M)) == len(
         find_center_regions(environment.free, DEFAULT_RADIUS_M)
     )
-    drawn = [back.boundary_polygon, *(shape.polygon for shape in back.obstacles), *back.free.geoms]
-    for ring in shapely.get_rings(drawn):
-        assert np.hypot(*np.diff(shapely.get_coordinates(ring), axis=0).T).min() >= 1e-3
+    obstacles = [shape.polygon for shape in imported.obstacles]
+    shapes = [imported.boundary_polygon, *obstacles, *imported.free.geoms]
+    for ring in shapely.get_rings(shapes):
+        edges = np.diff(shapely.get_coordinates(ring), axis=0)
+        assert np.linalg.norm(edges, axis=1).min() >= 1e-3
     assert report.warnings == ()
 
 
-def test_a_map_around_a_pole_is_refused(tmp_path: Path) -> None:
+def test_a_map_around_a_pole_is_rejected(tmp_path: Path) -> None:
     size = 130_000.0
     corners = ((-size, -size), (size, -size), (size, size), (-size, size))
     with pytest.raises(ParameterError, match=r"origin: \(0, 89\): the map would span half of all longitudes"):
@@ -194,8 +202,8 @@ def test_a_map_around_a_pole_is_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_paths_of_obstacles_are_told_to_be_dropped(tmp_path: Path) -> None:
+def test_dropped_paths_of_obstacles_are_reported(tmp_path: Path) -> None:
     report = export_map(load_map("forklifts"), tmp_path / "forklifts.geojson")
     assert "the 2 paths of obstacles, which stand where they are at time zero" in report.dropped
-    standing = export_map(load_map("rooms"), tmp_path / "rooms.geojson")
-    assert not any("path" in line for line in standing.dropped)
+    without_paths = export_map(load_map("rooms"), tmp_path / "rooms.geojson")
+    assert not any("path" in line for line in without_paths.dropped)

@@ -1,4 +1,4 @@
-"""GeoJSON, compared with shapely's reader; degrees and meters; names; refused files."""
+"""GeoJSON, compared with shapely's reader; degrees and meters; names; rejected files."""
 
 import json
 from pathlib import Path
@@ -157,7 +157,7 @@ def test_invalid_geojson_is_reported_with_its_path(
     assert expected is None or expected in message
 
 
-def test_two_reference_systems_are_refused(tmp_path: Path) -> None:
+def test_two_reference_systems_are_rejected(tmp_path: Path) -> None:
     first = build_feature(HALL) | {"crs": {"properties": {"name": "EPSG:25832"}}}
     second = build_feature(HALL) | {"crs": {"properties": {"name": "EPSG:25833"}}}
     with pytest.raises(MapError, match=r"features\[1\]\.crs: expected the same system as before, EPSG:25832"):

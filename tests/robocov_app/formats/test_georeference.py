@@ -102,7 +102,7 @@ def test_a_given_reference_system_is_used() -> None:
         ("EPSG:4326", [[0, 0], [np.nan, 1]], r"expected longitude and latitude"),
     ],
 )
-def test_impossible_coordinates_are_refused(crs: str, points: Any, expected: str) -> None:
+def test_impossible_coordinates_are_rejected(crs: str, points: Any, expected: str) -> None:
     with pytest.raises(MapError, match=rf"^plan: {expected}.*--units meters") as caught:
         project_points(points, crs=crs)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Files made to do harm: each is refused in one line, within a second and 200 MB, in a process of its own."""
+"""Hostile files: each is rejected in one line, within a second and 200 MB, in a process of its own."""
 
 import io
 import json
@@ -136,7 +136,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured as Linux tells it")
-def test_hostile_rasters_are_refused(tmp_path: Path) -> None:
+def test_hostile_rasters_are_rejected(tmp_path: Path) -> None:
     files: list[tuple[Path, float | None]] = []
     for name, (file, content, options, _) in HOSTILE.items():
         folder = tmp_path / name.replace("^", "")

@@ -1,4 +1,4 @@
-"""Files that were made to take for ever, or all memory: refused at once, in one line."""
+"""Hostile files that would take forever or all memory: rejected at once, in one line."""
 
 import base64
 import json
@@ -147,7 +147,7 @@ def _build_files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-def test_hostile_files_are_refused_within_seconds_and_200_mb(tmp_path: Path) -> None:
+def test_hostile_files_are_rejected_within_seconds_and_200_mb(tmp_path: Path) -> None:
     files = _build_files(tmp_path)
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)

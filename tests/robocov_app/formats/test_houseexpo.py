@@ -1,4 +1,4 @@
-"""HouseExpo plans, on small examples: kept, repaired and refused plans."""
+"""HouseExpo plans, on small examples: kept, repaired and rejected plans."""
 
 import json
 import math
@@ -127,7 +127,7 @@ def test_starts_are_added(tmp_path: Path) -> None:
         (build_plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: expected at most 10 km"),
     ],
 )
-def test_invalid_plans_are_refused_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
+def test_invalid_plans_are_rejected_in_one_line(tmp_path: Path, document: Any, expected: str) -> None:
     path = write(tmp_path, document)
     with pytest.raises(MapError) as caught:
         import_plan(path)
@@ -150,7 +150,7 @@ def test_only_cut_corners_are_completed() -> None:
     assert sharpen_corners(holed, 0.02).area == pytest.approx(17.0)
 
 
-def test_options_out_of_range_are_refused(tmp_path: Path) -> None:
+def test_options_out_of_range_are_rejected(tmp_path: Path) -> None:
     path = write(tmp_path, build_plan(PLAN))
     for tolerance in (-1.0, math.nan, 11.0):
         with pytest.raises(ParameterError, match="simplify"):
@@ -171,7 +171,7 @@ def test_other_files_are_not_recognized(tmp_path: Path) -> None:
     st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), min_size=3, max_size=14),
     st.sampled_from([0.0, 0.02, 0.5]),
 )
-def test_any_ring_is_imported_or_refused(
+def test_any_ring_is_imported_or_rejected(
     tmp_path_factory: pytest.TempPathFactory, verts: list[tuple[int, int]], tolerance: float
 ) -> None:
     path = write(tmp_path_factory.getbasetemp(), build_plan([[x / 4, y / 4] for x, y in verts]))

@@ -1,4 +1,4 @@
-"""Pictures of every kind give the same brightness; broken or too large ones are refused."""
+"""Pictures of every kind give the same brightness; broken or too large ones are rejected."""
 
 import io
 import math
@@ -229,7 +229,7 @@ def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
     ],
     ids=["heights", "bytes", "nan", "whole"],
 )
-def test_a_tiff_of_unclear_samples_is_refused(tmp_path: Path, image: bytes, found: str) -> None:
+def test_a_tiff_of_unclear_samples_is_rejected(tmp_path: Path, image: bytes, found: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, image)
     message = str(caught.value)
@@ -314,7 +314,7 @@ WHOLE = save_png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 
     ],
     ids=map(str, range(99)),
 )  # fmt: skip
-def test_invalid_pictures_are_refused(tmp_path: Path, data: bytes, expected: str) -> None:
+def test_invalid_pictures_are_rejected(tmp_path: Path, data: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, data)
     message = str(caught.value)

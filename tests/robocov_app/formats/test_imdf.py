@@ -186,7 +186,7 @@ def build_many_files() -> bytes:
     ],
     ids=["bomb", "many", "cut", "mixed"],
 )
-def test_invalid_archives_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_invalid_archives_are_rejected(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "mill.zip"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:
@@ -195,7 +195,7 @@ def test_invalid_archives_are_refused(tmp_path: Path, content: bytes, expected: 
     assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
 
 
-def test_invalid_content_is_refused(tmp_path: Path) -> None:
+def test_invalid_content_is_rejected(tmp_path: Path) -> None:
     cases: list[tuple[str, Any, str]] = [
         ("level", [], "expected units on its levels, got none"),
         ("unit", [], "expected units on its levels, got none"),

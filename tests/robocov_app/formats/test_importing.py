@@ -52,7 +52,7 @@ def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
         import_map(tmp_path / "half.yaml")
 
 
-def test_unknown_files_are_refused(tmp_path: Path) -> None:
+def test_unknown_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "plan.xyz"
     path.write_text("nothing")
     expected = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), expected one of .*ros.*"
@@ -94,7 +94,7 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
         ({"trees": "green"}, "trees: expected one of obstacle, free"),
     ],
 )
-def test_options_out_of_range_are_refused(options: dict[str, object], expected: str) -> None:
+def test_options_out_of_range_are_rejected(options: dict[str, object], expected: str) -> None:
     with pytest.raises(ParameterError, match=expected):
         ReadOptions(**options)  # type: ignore[arg-type]
 

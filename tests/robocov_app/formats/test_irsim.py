@@ -27,7 +27,8 @@ def read(folder: Path, text: str, world: str = WORLD, **options: object) -> Fore
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
-def compute_obstacles(foreign: ForeignMap) -> shapely.Geometry:
+def compute_solid_area(foreign: ForeignMap) -> shapely.Geometry:
+    """Return the area of the space that is not free."""
     return SPACE - foreign.free
 
 
@@ -57,7 +58,7 @@ obstacle:
         shapely.Polygon([(7, 5), (8, 5), (8, 7)]),
         box(5.9, 3, 6.1, 5),
     ]
-    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
+    assert compute_solid_area(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
     assert foreign.boundary is not None and foreign.boundary.equals(SPACE)
 
 
@@ -80,7 +81,7 @@ obstacle:
     expected = [box(0, 3.5, 2, 4.5), box(3.5, 3.5, 4.5, 4.5), box(6.5, 3.5, 7.5, 4.5)]
     expected += [box(6.25, 4.95, 6.75, 5.05), box(1.25, 4.95, 1.75, 5.05)]
     expected += [box(3.95, 7.25, 4.05, 7.75), box(3.95, 2.25, 4.05, 2.75)]
-    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
+    assert compute_solid_area(foreign).symmetric_difference(shapely.union_all(expected)).area < 1e-5
 
 
 def test_parts_of_a_compound_have_poses_of_their_own(tmp_path: Path) -> None:
@@ -97,7 +98,7 @@ obstacle:
 """,
     )
     expected = shapely.MultiPolygon([box(3.75, 4, 4.25, 6), box(2.75, 4.5, 3.25, 5.5)])
-    assert compute_obstacles(foreign).symmetric_difference(expected).area < 1e-5
+    assert compute_solid_area(foreign).symmetric_difference(expected).area < 1e-5
 
 
 def test_random_and_non_colliding_shapes_are_counted(tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ obstacle:
   - {number: -3, distribution: {name: random}}
 """
     foreign = read(tmp_path, text)
-    assert compute_obstacles(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
+    assert compute_solid_area(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
     assert foreign.robots == ((0.0, 3.0), (1.0, 3.0))
     assert foreign.dropped == (
         "10 obstacles that IR-SIM places at random",
@@ -207,7 +208,7 @@ obstacle:
     expected = shapely.union_all(
         [box(1.5, 4.75, 2.5, 5.25), box(5.5, 4.75, 6.5, 5.25), box(3, 3.25, 5, 3.75)]
     )
-    assert compute_obstacles(foreign).symmetric_difference(expected).area < 1e-6
+    assert compute_solid_area(foreign).symmetric_difference(expected).area < 1e-6
 
 
 PARTS = ", ".join(["*a"] * 100)
@@ -252,7 +253,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
     cells[0, 0] = 0
     install_irsim(tmp_path, monkeypatch, build_pgm(cells))
     foreign = read(tmp_path, BUNDLED)
-    assert compute_obstacles(foreign).equals(box(-1, 7, 0, 8))
+    assert compute_solid_area(foreign).equals(box(-1, 7, 0, 8))
     assert "world.obstacle_map: 'cave.png' read from the installed ir-sim" in foreign.notes
     with pytest.raises(
         MapError, match=r"got 'hall.png'. The installed IR-SIM has no such image \(it has cave.png\)"
@@ -260,7 +261,7 @@ def test_a_bundled_map_is_found_where_irsim_is_installed(
         read(tmp_path, "  obstacle_map: hall.png\n")
     # A picture next to the file has priority.
     (tmp_path / "cave.png").write_bytes(build_pgm(np.full((6, 10), 255, np.uint8)))
-    assert compute_obstacles(read(tmp_path, BUNDLED)).is_empty
+    assert compute_solid_area(read(tmp_path, BUNDLED)).is_empty
 
 
 def test_a_bundled_map_requires_irsim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Files that are none, and files that are too large, are refused before they are read."""
+"""Files that are none, and files that are too large, are rejected before they are read."""
 
 import os
 from pathlib import Path
@@ -19,7 +19,7 @@ def test_heads_and_contents_are_read(tmp_path: Path) -> None:
         files.read_content(path, 1_000_000)
 
 
-def test_other_paths_are_refused(tmp_path: Path) -> None:
+def test_other_paths_are_rejected(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path, expected in (
         (tmp_path / "none", "no such file"),

@@ -100,7 +100,7 @@ def test_variants_of_the_header_are_accepted(tmp_path: Path) -> None:
     ],
     ids=map(str, range(99)),
 )
-def test_invalid_files_are_refused(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_files_are_rejected(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read(tmp_path, text)
     assert expected in str(caught.value)
@@ -109,7 +109,7 @@ def test_invalid_files_are_refused(tmp_path: Path, text: str, expected: str) -> 
 
 @settings(deadline=None, max_examples=count_examples(150))
 @given(st.binary(max_size=12), st.integers(0, len(GRID)), st.integers(0, 6))
-def test_a_damaged_grid_is_read_or_refused(
+def test_a_damaged_grid_is_read_or_rejected(
     tmp_path_factory: pytest.TempPathFactory, patch: bytes, at: int, gone: int
 ) -> None:
     data = GRID.encode()

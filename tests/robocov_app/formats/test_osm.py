@@ -1,4 +1,4 @@
-"""OpenStreetMap: buildings, relations of several ways, barriers, bounds, and refused files."""
+"""OpenStreetMap: buildings, relations of several ways, barriers, bounds, and rejected files."""
 
 import json
 import math
@@ -71,7 +71,8 @@ def list_corners(x: float, y: float, side: float) -> list[tuple[float, float]]:
     return [(x, y), (x + side, y), (x + side, y + side), (x, y + side)]
 
 
-def read_solid(folder: Path, extract: Extract, **options: Any) -> Any:
+def read_solid_area(folder: Path, extract: Extract, **options: Any) -> Any:
+    """Return the area of the town that is not free."""
     path = folder / "town.osm"
     path.write_text(extract.text())
     assert detect_format(path) is IMPORTERS["osm"]
@@ -84,10 +85,10 @@ def test_buildings_are_projected_with_north_up(tmp_path: Path) -> None:
     extract = Extract()
     extract.way(list_corners(10, 5, 8), building="yes")
     extract.way(list_corners(-30, -20, 5), building="church", name="St. Anna")
-    found = read_solid(tmp_path, extract)
+    found = read_solid_area(tmp_path, extract)
     expected = shapely.union_all([box(10, 5, 18, 13), box(-30, -20, -25, -15)])
     assert found.symmetric_difference(expected).area < 0.05
-    assert read_solid(tmp_path, extract, skip=("church",)).area == pytest.approx(64, abs=0.05)
+    assert read_solid_area(tmp_path, extract, skip=("church",)).area == pytest.approx(64, abs=0.05)
 
 
 @pytest.mark.parametrize("roles", [("outer", "outer", "inner"), ("", "", "")])
@@ -98,7 +99,7 @@ def test_a_relation_is_made_up_of_ways(tmp_path: Path, roles: tuple[str, str, st
     other = extract.way_through([corners[0], corners[3], corners[2]])  # against its direction
     court = extract.way(list_corners(5, 5, 10))
     extract.relation(*zip((one, other, court), roles, strict=True), building="school")
-    found = read_solid(tmp_path, extract)
+    found = read_solid_area(tmp_path, extract)
     assert found.symmetric_difference(box(0, 0, 20, 20) - box(5, 5, 15, 15)).area < 0.1
 
 
@@ -128,8 +129,8 @@ def test_water_is_an_obstacle_and_other_areas_are_not(tmp_path: Path) -> None:
     extract.way(list_corners(-20, 0, 10), highway="residential")
     extract.way_through([1, 2, 999, 1], building="yes")
     extract.way([(0, 20), (5, 20), (5, 25)], closed=False, building="yes")
-    assert read_solid(tmp_path, extract).area == pytest.approx(100, abs=0.05)
-    assert read_solid(tmp_path, extract, water="free").area < 0.05
+    assert read_solid_area(tmp_path, extract).area == pytest.approx(100, abs=0.05)
+    assert read_solid_area(tmp_path, extract, water="free").area < 0.05
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     assert foreign.dropped == (
         "1 element below the ground",
@@ -176,7 +177,7 @@ def build_crowded_extract() -> str:
     ],
     ids=map(str, range(13)),
 )  # fmt: skip
-def test_invalid_data_is_refused(tmp_path: Path, text: str, expected: str) -> None:
+def test_invalid_data_is_rejected(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "town.osm"
     path.write_text(text)
     with pytest.raises(MapError) as caught:
@@ -206,7 +207,7 @@ def test_a_degenerate_way_is_omitted(tmp_path: Path) -> None:
     extract.way_through([1, 2, 1], building="yes")
     extract.relation((999, "outer"), building="yes")
     extract.ways.append('<way id="999">' + '<nd ref="1"/>' * 3 + "</way>")
-    assert read_solid(tmp_path, extract).area == pytest.approx(25, abs=0.05)
+    assert read_solid_area(tmp_path, extract).area == pytest.approx(25, abs=0.05)
     foreign = IMPORTERS["osm"].read(tmp_path / "town.osm", ReadOptions())
     expected = ("1 outline without an area", "1 relation without an area", "1 way without an area")
     assert foreign.dropped == expected
@@ -294,7 +295,7 @@ def test_overpass_relations_contain_their_ways(tmp_path: Path) -> None:
         ('[{"type": "area", "id": 1}]', "no closed outline and no line"),
     ],
 )
-def test_invalid_overpass_json_is_refused(tmp_path: Path, elements: str, expected: str) -> None:
+def test_invalid_overpass_json_is_rejected(tmp_path: Path, elements: str, expected: str) -> None:
     path = tmp_path / "town.json"
     path.write_text('{"osm3s": {}, "elements": ' + elements + "}")
     with pytest.raises(MapError) as caught:

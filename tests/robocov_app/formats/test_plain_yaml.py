@@ -1,4 +1,4 @@
-"""Mappings of plain values; other features of YAML are refused."""
+"""Mappings of plain values; other features of YAML are rejected."""
 
 import pytest
 from hypothesis import given, settings
@@ -84,7 +84,7 @@ def test_merge_keys_add_missing_values() -> None:
     ],
     ids=map(str, range(99)),
 )
-def test_unsupported_yaml_is_refused(text: bytes, expected: str) -> None:
+def test_unsupported_yaml_is_rejected(text: bytes, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         parse(text, "m")
     assert expected in str(caught.value)
@@ -93,7 +93,7 @@ def test_unsupported_yaml_is_refused(text: bytes, expected: str) -> None:
 
 @settings(deadline=None, max_examples=count_examples(300))
 @given(st.one_of(st.binary(max_size=80), st.text(alphabet="ab:-[]{},&*!|>'\"#%@ \n\t01.?", max_size=60)))
-def test_any_text_is_a_mapping_or_refused(text: bytes | str) -> None:
+def test_any_text_is_a_mapping_or_rejected(text: bytes | str) -> None:
     try:
         result = parse(text if isinstance(text, bytes) else text.encode(), "m")
     except MapError as error:

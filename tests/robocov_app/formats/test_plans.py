@@ -92,12 +92,12 @@ def test_thin_strokes_are_dropped_and_walls_keep_their_corners(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("text", ["", "x", "-1", "1e9", "3 pixels", "nan", "px", "99999m"])
-def test_invalid_stroke_widths_are_refused(text: str) -> None:
+def test_invalid_stroke_widths_are_rejected(text: str) -> None:
     with pytest.raises(ParameterError, match="min_stroke: "):
         ReadOptions(min_stroke=text)
 
 
-def test_a_stroke_as_wide_as_a_hall_is_refused(tmp_path: Path) -> None:
+def test_a_stroke_as_wide_as_a_hall_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="min_stroke: expected at most 200 pixels, got 201"):
         import_picture(tmp_path, draw_flat(), min_stroke="201px")
 
@@ -196,7 +196,7 @@ def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
         ({"free_color": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colors, got 33"),
     ],
 )
-def test_invalid_colors_are_refused(options: dict[str, object], message: str) -> None:
+def test_invalid_colors_are_rejected(options: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         ReadOptions(**options)  # type: ignore[arg-type]
 

@@ -103,7 +103,7 @@ def test_a_ring_may_touch_itself_many_times() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [800, 3000, 20_000])
-def test_a_tangle_is_refused_early(count: int) -> None:
+def test_a_tangle_is_rejected_early(count: int) -> None:
     ring = np.random.default_rng(1).random((count, 2))
     with pytest.raises(MapError, match=f"knot: expected at most {MAX_CROSSINGS} crossings of lines"):
         CrossingCounter("knot").add([shapely.LinearRing(ring)])

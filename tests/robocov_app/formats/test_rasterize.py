@@ -1,4 +1,4 @@
-"""Cells that a map covers, compared with a point-by-point test, and refused grids."""
+"""Cells that a map covers, compared with a point-by-point test, and rejected grids."""
 
 from pathlib import Path
 from typing import Any
@@ -72,7 +72,7 @@ def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
     assert build_grid(build_room(), 0.7).columns == 8 + 2
 
 
-def test_cells_that_are_too_small_or_too_large_are_refused() -> None:
+def test_cells_that_are_too_small_or_too_large_are_rejected() -> None:
     with pytest.raises(ParameterError, match=r"cell: expected at most 64 million"):
         build_grid(build_room(), 1e-4)
     blocks = tuple(

@@ -89,7 +89,7 @@ def test_a_self_crossing_hole_beyond_the_outline_is_repaired(tmp_path: Path) -> 
         ([[[0, 0], [1, 1], [2, 2]]], "1 outline without an area"),
     ],
 )
-def test_invalid_rings_are_refused(tmp_path: Path, document: Any, expected: str) -> None:
+def test_invalid_rings_are_rejected(tmp_path: Path, document: Any, expected: str) -> None:
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(document))
     with pytest.raises(MapError) as caught:

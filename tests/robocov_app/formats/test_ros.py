@@ -1,4 +1,4 @@
-"""ROS maps: meaning of pixels in each mode, position of the map, and refused files."""
+"""ROS maps: meaning of pixels in each mode, position of the map, and rejected files."""
 
 import math
 import os
@@ -312,7 +312,7 @@ def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, n
         ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),
     ],
 )
-def test_invalid_maps_are_refused(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
+def test_invalid_maps_are_rejected(tmp_path: Path, keys: dict[str, object], expected: str) -> None:
     (tmp_path / "plan.pgm").write_bytes(build_pgm(draw_pixels(PLAN)))
     os.mkfifo(tmp_path / "pipe")
     keys = {"image": "plan.pgm"} | keys
@@ -325,14 +325,14 @@ def test_invalid_maps_are_refused(tmp_path: Path, keys: dict[str, object], expec
     assert "\n" not in str(caught.value)
 
 
-def test_maps_without_free_cells_are_refused(tmp_path: Path) -> None:
+def test_maps_without_free_cells_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(MapError, match=r"no cell is free \(--unknown free treats unknown"):
         read(write_ros_map(tmp_path, draw_pixels("##\n??")))
     with pytest.raises(MapError, match=r"no cell is free$"):
         read(write_ros_map(tmp_path, draw_pixels("##\n##")))
 
 
-def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
+def test_options_of_other_formats_are_rejected(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN))
     with pytest.raises(
         ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"

@@ -192,7 +192,7 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, text: str, expected
     assert "\n" not in str(caught.value)
 
 
-def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
+def test_a_bitmap_without_walls_is_rejected_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
     (tmp_path / "a.pgm").write_bytes(build_pgm(draw_pixels("...\n...")))
     with pytest.raises(MapError, match=r"a\.pgm: expected an image with dark walls, got only light pixels"):
         read(tmp_path, 'model ( bitmap "a.pgm" )')
@@ -204,7 +204,7 @@ def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp
 # Files that include each other
 
 
-def test_exponentially_nested_includes_are_refused(tmp_path: Path) -> None:
+def test_exponentially_nested_includes_are_rejected(tmp_path: Path) -> None:
     names = [f"part{k}.inc" for k in range(10)]
     body = "".join(f'include "{name}"\n' for name in names)
     for name in names:

@@ -1,4 +1,4 @@
-"""SVG drawings: positions, areas and walls, sizes, and refused files."""
+"""SVG drawings: positions, areas and walls, sizes, and rejected files."""
 
 import math
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 import shapely
 from shapely import box
+from shapely.geometry.base import BaseGeometry
 from vector_files import build_svg, read
 
 from robocov.environment import CircleObstacle
@@ -27,8 +28,8 @@ def read_shapes(
     return read(folder, "svg", build_svg(body, head), **{"scale": 0.01, **options})
 
 
-def compute_obstacles(folder: Path, body: str, **options: Any) -> Any:
-    """Read the shapes on a page of 10 x 6 m, y up."""
+def read_solid_area(folder: Path, body: str, **options: Any) -> BaseGeometry:
+    """Return the area of a page of 10 x 6 m, y up, that is not free."""
     return box(0, 0, 10, 6) - read_shapes(folder, PAGE + body, **options).free
 
 
@@ -88,22 +89,22 @@ def compute_obstacles(folder: Path, body: str, **options: Any) -> Any:
     ],
 )
 def test_shapes_are_where_they_are_drawn(tmp_path: Path, body: str, expected: Any) -> None:
-    assert compute_obstacles(tmp_path, body).symmetric_difference(expected).area < 1e-6
+    assert read_solid_area(tmp_path, body).symmetric_difference(expected).area < 1e-6
 
 
 def test_circles_and_ellipses_are_read(tmp_path: Path) -> None:
-    pillar = compute_obstacles(tmp_path, '<circle cx="500" cy="300" r="50"/>')
+    pillar = read_solid_area(tmp_path, '<circle cx="500" cy="300" r="50"/>')
     exact = CircleObstacle((5.0, 3.0), 0.5).polygon
     assert pillar.symmetric_difference(exact).area < 1e-5
-    oval = compute_obstacles(tmp_path, '<ellipse cx="500" cy="300" rx="200" ry="50"/>')
+    oval = read_solid_area(tmp_path, '<ellipse cx="500" cy="300" rx="200" ry="50"/>')
     assert oval.area == pytest.approx(math.pi * 2 * 0.5, abs=oval.length * 1e-3)
     assert oval.bounds == pytest.approx((3, 2.5, 7, 3.5), abs=1e-3)
-    same = compute_obstacles(tmp_path, '<circle cx="125" cy="300" r="50" transform="scale(4 1)"/>')
+    same = read_solid_area(tmp_path, '<circle cx="125" cy="300" r="50" transform="scale(4 1)"/>')
     assert same.symmetric_difference(oval).area < oval.length * 1e-3
-    rounded = compute_obstacles(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')
+    rounded = read_solid_area(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')
     assert rounded.area == pytest.approx(2 - (4 - math.pi) * 0.04, abs=1e-3)
     # radii are at most half a side, and one of them stands for both
-    pill = compute_obstacles(tmp_path, '<rect x="100" y="100" width="200" height="100" ry="900"/>')
+    pill = read_solid_area(tmp_path, '<rect x="100" y="100" width="200" height="100" ry="900"/>')
     assert pill.bounds == pytest.approx((1, 4, 3, 5))
     assert pill.area == pytest.approx(math.pi * 0.5, abs=pill.length * 1e-3)
 
@@ -274,7 +275,7 @@ def test_prologues_of_editors_are_accepted(tmp_path: Path) -> None:
         ("<g><text>Hall</text></g>", "or line, got none (1 text left out)"),
     ],
 )
-def test_invalid_attributes_are_refused(tmp_path: Path, body: str, expected: str) -> None:
+def test_invalid_drawings_are_rejected(tmp_path: Path, body: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read_shapes(tmp_path, body)
     assert str(caught.value).startswith(str(tmp_path / "plan.svg"))
@@ -345,7 +346,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
     ],
     ids=lambda value: value if isinstance(value, str) else "content",
 )
-def test_other_xml_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_other_xml_is_rejected(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "plan.svg"
     path.write_bytes(content)
     with pytest.raises(MapError) as caught:
@@ -372,7 +373,7 @@ def test_other_xml_is_refused(tmp_path: Path, content: bytes, expected: str) -> 
         ),
     ],
 )
-def test_uses_without_an_end_are_refused(tmp_path: Path, body: str, expected: str) -> None:
+def test_uses_without_an_end_are_rejected(tmp_path: Path, body: str, expected: str) -> None:
     with pytest.raises(MapError) as caught:
         read_shapes(tmp_path, body)
     assert expected in str(caught.value)

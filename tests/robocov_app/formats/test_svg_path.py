@@ -154,12 +154,12 @@ def test_transforms_are_parsed(text: str, point: tuple[float, float], expected: 
 @pytest.mark.parametrize(
     "text", ["spin(3)", "rotate(1 2)", "matrix(1 2 3)", "scale(x)", "translate(1) oops", "scale(1e99)"]
 )
-def test_invalid_transforms_are_refused(text: str) -> None:
+def test_invalid_transforms_are_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_transform(text)
 
 
-def test_huge_transforms_are_refused() -> None:
+def test_huge_transforms_are_rejected() -> None:
     with pytest.raises(ValueError, match="beyond 1e"):
         parse_transform("scale(1e20) scale(1e20)")
     with pytest.raises(ValueError, match="beyond"):
@@ -192,7 +192,7 @@ def test_lengths_are_parsed(text: str, expected: float) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "x", "10em", "10 px x", "%", "1e99px", "nan"])
-def test_invalid_lengths_are_refused(text: str) -> None:
+def test_invalid_lengths_are_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_length(text, 80.0)
     with pytest.raises(ValueError, match="expected"):

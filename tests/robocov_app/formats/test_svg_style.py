@@ -109,7 +109,7 @@ def test_declarations_are_parsed() -> None:
 
 
 @pytest.mark.slow
-def test_expensive_style_sheets_are_refused() -> None:
+def test_expensive_style_sheets_are_rejected() -> None:
     with pytest.raises(
         MapError, match=rf"plan\.svg: expected style sheets of at most {MAX_SHEET_CHARACTERS} characters"
     ):

@@ -54,7 +54,8 @@ def read(
     return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
 
 
-def compute_obstacles(foreign: ForeignMap, size: tuple[float, float] = (4, 3)) -> shapely.Geometry:
+def compute_solid_area(foreign: ForeignMap, size: tuple[float, float] = (4, 3)) -> shapely.Geometry:
+    """Return the area of a map of some size, m, that is not free."""
     return box(0, 0, *size) - foreign.free
 
 
@@ -65,7 +66,7 @@ def are_equal(one: shapely.Geometry, other: shapely.Geometry) -> bool:
 
 def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
     foreign = read(tmp_path, TILES.format(""), build_tiles("Ground"))
-    assert are_equal(compute_obstacles(foreign), WALLS)
+    assert are_equal(compute_solid_area(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
     assert foreign.notes == ("no tile size given: tiles 1 m wide assumed (--cell)",)
 
@@ -75,19 +76,19 @@ def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:
     floor = build_tiles("Floor", "1,1,1,1,1,1,1,1,1,1,1,1")
     upper = ROWS.replace("1", "0")
     for name in ("Walls", "collision", "Collision Layer 2", "is_solid"):
-        assert are_equal(compute_obstacles(read(tmp_path, plain, floor, build_tiles(name, upper))), WALLS)
+        assert are_equal(compute_solid_area(read(tmp_path, plain, floor, build_tiles(name, upper))), WALLS)
     marked = build_tiles("Things", upper).replace("<data", SOLID.format("collides", "") + "<data")
-    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, marked)), WALLS)
+    assert are_equal(compute_solid_area(read(tmp_path, plain, floor, marked)), WALLS)
     grouped = f'<group name="obstacles">{build_tiles("Things", upper)}</group>'
-    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, grouped)), WALLS)
+    assert are_equal(compute_solid_area(read(tmp_path, plain, floor, grouped)), WALLS)
     things = build_tiles("Things", upper)
     with pytest.raises(MapError, match=r"nothing is solid .* --only LAYER.* 'Floor', 'Things'"):
         read(tmp_path, plain, floor, things)
-    assert are_equal(compute_obstacles(read(tmp_path, plain, floor, things, only=("things",))), WALLS)
+    assert are_equal(compute_solid_area(read(tmp_path, plain, floor, things, only=("things",))), WALLS)
     with pytest.raises(ParameterError, match=r"only: unknown name 'thing': did you mean 'Things'\?"):
         read(tmp_path, plain, floor, things, build_tiles("Walls"), only=("thing",))
     assert are_equal(
-        compute_obstacles(
+        compute_solid_area(
             read(tmp_path, plain, floor, build_tiles("Walls"), things, skip=("walls",), only=("things",))
         ),
         WALLS,
@@ -102,13 +103,13 @@ def test_tiles_may_be_packed(tmp_path: Path, packing: str) -> None:
     raw = struct.pack("<12I", *(int(gid) for gid in ROWS.split(",")))
     text = base64.b64encode(PACKED[packing](raw)).decode()
     layer = build_tiles("a", text).replace('"csv"', f'"base64" compression="{packing}"')
-    assert are_equal(compute_obstacles(read(tmp_path, TILES.format(""), layer)), WALLS)
+    assert are_equal(compute_solid_area(read(tmp_path, TILES.format(""), layer)), WALLS)
 
 
 def test_tiles_may_be_elements(tmp_path: Path) -> None:
     inner = "".join(f'<tile gid="{int(gid)}"/>' if int(gid) > 1 else "<tile/>" for gid in ROWS.split(","))
     layer = f'<layer name="a" width="4" height="3"><data>{inner}</data></layer>'
-    assert are_equal(compute_obstacles(read(tmp_path, TILES.format(""), layer)), WALLS)
+    assert are_equal(compute_solid_area(read(tmp_path, TILES.format(""), layer)), WALLS)
 
 
 def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
@@ -119,16 +120,16 @@ def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
     layer = f'<layer name="a" width="4" height="3"><data encoding="csv">{chunks}</data></layer>'
     foreign = read(tmp_path, TILES.format(""), layer, head='infinite="1"')
     # columns -13 to -11, rows -1 to 1
-    assert are_equal(compute_obstacles(foreign, (3, 3)), box(0, 0, 1, 1) | box(1, 1, 2, 2))
+    assert are_equal(compute_solid_area(foreign, (3, 3)), box(0, 0, 1, 1) | box(1, 1, 2, 2))
 
 
 def test_tiles_need_not_be_square(tmp_path: Path) -> None:
     tile = 'tilewidth="16" tileheight="8"'
     foreign = read(tmp_path, TILES.format(""), build_tiles("a"), tile=tile, cell=0.5)
-    assert are_equal(compute_obstacles(foreign, (2, 0.75)), affinity.scale(WALLS, 0.5, 0.25, origin=(0, 0)))
+    assert are_equal(compute_solid_area(foreign, (2, 0.75)), affinity.scale(WALLS, 0.5, 0.25, origin=(0, 0)))
     assert foreign.cell == 0.5
     foreign = read(tmp_path, TILES.format(""), build_tiles("a"), tile=tile, scale=0.25)
-    assert are_equal(compute_obstacles(foreign, (16, 6)), affinity.scale(WALLS, 4, 2, origin=(0, 0)))
+    assert are_equal(compute_solid_area(foreign, (16, 6)), affinity.scale(WALLS, 4, 2, origin=(0, 0)))
     with pytest.raises(ParameterError, match="both say how large a tile is"):
         read(tmp_path, TILES.format(""), build_tiles("a"), scale=0.25, cell=1.0)
     environment, _, _ = import_map(tmp_path / "map.tmx", options=ReadOptions(cell=2.0))
@@ -142,10 +143,10 @@ def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None
     rows = ",".join(str(4 + flip) for flip in flips) + ",0" * 8
     foreign = read(tmp_path, TILES.format(corner), build_tiles("a", rows))
     quarters = [box(0, 2, 0.5, 2.5), box(1.5, 2, 2, 2.5), box(2, 2.5, 2.5, 3), box(3.5, 2.5, 4, 3)]
-    assert compute_obstacles(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
+    assert compute_solid_area(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
     # one as large as the cell is the cell, and one of a tall picture begins above it
     whole = corner.replace('y="8" width="8" height="8"', 'y="0" width="16" height="16"')
-    assert compute_obstacles(read(tmp_path, TILES.format(whole), build_tiles("a", "4" + ",0" * 11))).equals(
+    assert compute_solid_area(read(tmp_path, TILES.format(whole), build_tiles("a", "4" + ",0" * 11))).equals(
         box(0, 2, 1, 3)
     )
     tall = (
@@ -153,7 +154,7 @@ def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None
         '<tile id="0"><objectgroup><object x="0" y="8" width="8" height="24"/></objectgroup></tile></tileset>'
     )
     foreign = read(tmp_path, tall, build_tiles("a", "0,0,0,0,0,9,0,0,0,0,0,0"))
-    assert compute_obstacles(foreign).equals(box(1.25, 1, 1.75, 2.5))
+    assert compute_solid_area(foreign).equals(box(1.25, 1, 1.75, 2.5))
 
 
 def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
@@ -176,7 +177,7 @@ def test_objects_of_every_shape_are_read(tmp_path: Path) -> None:
         box(55, 28, 57, 44),
         box(48, 0, 64, 4),  # of tiles the lower left corner is given
     ]
-    assert compute_obstacles(foreign, (64, 48)).symmetric_difference(shapely.union_all(expected)).area < 1e-3
+    assert compute_solid_area(foreign, (64, 48)).symmetric_difference(shapely.union_all(expected)).area < 1e-3
     assert foreign.robots == ((8.0, 24.0),)
     assert foreign.dropped == ("1 object that is a text or a template, or has no area",)
     assert foreign.cell is None
@@ -189,13 +190,13 @@ def test_objects_next_to_tiles_are_solid_only_if_declared(tmp_path: Path) -> Non
     )
     ground = build_tiles("Ground", ROWS.replace("2", "1"))
     foreign = read(tmp_path, ground, things)
-    assert compute_obstacles(foreign).equals(box(3, 2, 4, 3))
+    assert compute_solid_area(foreign).equals(box(3, 2, 4, 3))
     assert foreign.dropped == ("1 object that is not solid by name or property (--only NAME selects it)",)
-    assert compute_obstacles(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
+    assert compute_solid_area(read(tmp_path, ground, things, only=("door",))).equals(box(0, 2, 1, 3))
     moved = build_objects("walls", square.format(""), more='offsetx="16" offsety="16"')
-    assert compute_obstacles(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
+    assert compute_solid_area(read(tmp_path, ground, moved)).equals(box(1, 1, 2, 2))
     shifted = build_tiles("walls", "2" + ",0" * 11, 'offsetx="8" offsety="4"')
-    assert compute_obstacles(read(tmp_path, ground, shifted)).equals(box(0.5, 1.75, 1.5, 2.75))
+    assert compute_solid_area(read(tmp_path, ground, shifted)).equals(box(0.5, 1.75, 1.5, 2.75))
 
 
 def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
@@ -206,12 +207,12 @@ def test_tilesets_of_the_same_folder_are_read(tmp_path: Path) -> None:
     (folder / "near.tsx").write_text(text)
     near = '<tileset firstgid="1" source="near.tsx"/>'
     far = '<tileset firstgid="1" source="../far.tsx"/>'
-    assert are_equal(compute_obstacles(read(folder, near, build_tiles("a"))), WALLS)
+    assert are_equal(compute_solid_area(read(folder, near, build_tiles("a"))), WALLS)
     with pytest.raises(
         MapError, match=r"map.tmx:3: .../far.tsx. is outside the folder of the file, expected the"
     ):
         read(folder, far, build_tiles("a"))
-    assert are_equal(compute_obstacles(read(folder, far, build_tiles("a"), anywhere=True)), WALLS)
+    assert are_equal(compute_solid_area(read(folder, far, build_tiles("a"), anywhere=True)), WALLS)
     (folder / "near.tsx").write_text("<map/>")
     with pytest.raises(MapError, match=r"near\.tsx: expected <tileset>, got <map>"):
         read(folder, near, build_tiles("a"))
@@ -251,13 +252,13 @@ def test_mistakes_are_reported_with_the_line(tmp_path: Path, parts: str, expecte
 
 
 @pytest.mark.parametrize("orientation", ["isometric", "staggered", "hexagonal"])
-def test_other_maps_are_refused_by_their_names(tmp_path: Path, orientation: str) -> None:
+def test_other_maps_are_rejected_by_their_names(tmp_path: Path, orientation: str) -> None:
     with pytest.raises(MapError, match=rf"map\.tmx:2: <map>: expected an orthogonal map, got {orientation}"):
         read(tmp_path, build_tiles("walls"), head=f'orientation="{orientation}"')
 
 
 @pytest.mark.slow
-def test_too_many_collision_objects_are_refused(tmp_path: Path) -> None:
+def test_too_many_collision_objects_are_rejected(tmp_path: Path) -> None:
     corner = '<tile id="3"><objectgroup><object x="0" y="8" width="8" height="8"/></objectgroup></tile>'
     rows = ",".join(["4"] * 150 * 150)
     path = tmp_path / "map.tmx"

@@ -192,7 +192,7 @@ def test_svg_is_written_at_a_smaller_scale(tmp_path: Path, cluttered: Environmen
         import_map(path)
 
 
-def test_impossible_exports_are_refused(
+def test_impossible_exports_are_rejected(
     tmp_path: Path, empty: Environment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(OutputError, match="cannot be written"):

@@ -84,7 +84,7 @@ def test_empty_and_full_grids_are_outlined() -> None:
     assert shapely.equals(trace_outline(np.ones((3, 4), dtype=bool), "grid"), shapely.box(0, 0, 4, 3))
 
 
-def test_a_grid_that_is_too_rough_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_grid_that_is_too_rough_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     chess = np.indices((20, 20)).sum(axis=0) % 2 == 0
     monkeypatch.setattr(limits, "MAX_VERTICES", 200)
     with pytest.raises(MapError, match=r"^grid: expected at most"):

@@ -1,4 +1,4 @@
-"""Well-known text, compared with shapely's reader; additions of other programs; refused texts."""
+"""Well-known text, compared with shapely's reader; additions of other programs; rejected texts."""
 
 from pathlib import Path
 from typing import Any
@@ -110,7 +110,7 @@ def test_holes_are_excluded_from_the_union(tmp_path: Path, others: list[Polygon]
         assert free.symmetric_difference(expected).area < 1e-6
 
 
-def test_many_holes_under_many_polygons_are_refused(tmp_path: Path) -> None:
+def test_many_holes_under_many_polygons_are_rejected(tmp_path: Path) -> None:
     hole = [box(x, y, x + 0.5, y + 0.5).exterior for x in range(1, 21) for y in range(1, 21)]
     areas = [
         Polygon(box(0, 0, 30, 30).exterior, hole),
@@ -213,7 +213,7 @@ def test_invalid_text_is_reported_with_its_position(tmp_path: Path, text: str, e
     assert "\n" not in str(caught.value)
 
 
-def test_invalid_bytes_are_refused(tmp_path: Path) -> None:
+def test_invalid_bytes_are_rejected(tmp_path: Path) -> None:
     (tmp_path / "plan.wkt").write_bytes(b"POLYGON((0 0, 1\xff 0))")
     with pytest.raises(MapError, match="byte 15: not UTF-8, expected text"):
         IMPORTERS["wkt"].read(tmp_path / "plan.wkt", ReadOptions())

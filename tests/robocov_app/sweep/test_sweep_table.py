@@ -25,7 +25,7 @@ from robocov_app.sweep.table import Table, build_columns, build_row, get_gain_co
 from robocov_app.sweep.tasks import generate_tasks
 from robocov_app.sweep.worker import METRICS
 
-FIGURED = Entry(
+COMPLETED = Entry(
     {
         **dict.fromkeys(METRICS, 0.1 + 0.2),
         "contacts": 3,
@@ -39,14 +39,14 @@ FIGURED = Entry(
 FAILED = Entry({}, 'a "start", and no room')
 
 
-def study_json(study: Study) -> bytes:
+def build_study_json(study: Study) -> bytes:
     return json.dumps(
         {"runs": len(study), "columns": [each._asdict() for each in build_columns(study)]}
     ).encode()
 
 
 def write_table(folder: Path, study: Study, entries: list[Entry], *, parquet: bool = False) -> None:
-    with Table(folder, build_columns(study), study_json(study), parquet=parquet) as table:
+    with Table(folder, build_columns(study), build_study_json(study), parquet=parquet) as table:
         for task, entry in zip(generate_tasks(study), entries, strict=True):
             table.add(build_row(task, entry))
 
@@ -73,7 +73,7 @@ def test_a_gain_with_the_name_of_a_column_gets_a_prefix() -> None:
 
 def test_the_table_contains_every_metric_exactly(tmp_path: Path) -> None:
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
-    entries = [FIGURED, FAILED, FIGURED, FIGURED]
+    entries = [COMPLETED, FAILED, COMPLETED, COMPLETED]
     write_table(tmp_path, study, entries)
     rows = list(read_results(tmp_path).rows())
     with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
@@ -97,13 +97,14 @@ def test_the_table_contains_every_metric_exactly(tmp_path: Path) -> None:
     assert rows[1]["attraction_limit"] is None, "repulsion alone has none"
 
 
-def test_names_that_look_like_formulas_are_escaped(tmp_path: Path) -> None:
+def test_texts_that_look_like_formulas_are_escaped(tmp_path: Path) -> None:
     study = build_small_study()
     task = replace(next(iter(generate_tasks(study))), map="=1+1", start="-1")
-    with Table(tmp_path, build_columns(study), study_json(study), parquet=True) as table:
+    with Table(tmp_path, build_columns(study), build_study_json(study), parquet=True) as table:
         table.add(build_row(task, FAILED._replace(error="+ of 'two'")))
     line = (tmp_path / "results.csv").read_text().splitlines()[1]
     assert line.startswith("'=1+1,")
+    # No field starts with a formula character, except for negative numbers.
     assert not re.search(r'(^|,)"?[=@+-][^,0-9]', line)
     (row,) = read_results(tmp_path).rows()
     assert (row["map"], row["start"], row["error"]) == ("=1+1", "-1", "+ of 'two'")
@@ -116,7 +117,7 @@ def test_names_that_look_like_formulas_are_escaped(tmp_path: Path) -> None:
 def test_parquet_has_the_same_rows_and_described_columns(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     study = build_small_study(max_speed=[0.5, 1.0], seeds=(2**63 - 1,))
-    write_table(tmp_path, study, [FIGURED, FAILED, FIGURED, FIGURED], parquet=True)
+    write_table(tmp_path, study, [COMPLETED, FAILED, COMPLETED, COMPLETED], parquet=True)
     assert pq.read_table(tmp_path / "results.parquet").to_pylist() == list(read_results(tmp_path).rows())
     schema = pq.read_schema(tmp_path / "results.parquet")
     assert schema.metadata[b"format"] == b"robocov-results"
@@ -136,7 +137,7 @@ def test_equal_rows_give_equal_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyP
     study = build_small_study(seeds=range(5))
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write_table(tmp_path / name, study, [FIGURED] * len(study), parquet=True)
+        write_table(tmp_path / name, study, [COMPLETED] * len(study), parquet=True)
     assert len(read_tables(tmp_path / "one")) == 2
     assert read_tables(tmp_path / "one") == read_tables(tmp_path / "two")
     groups = pq.ParquetFile(tmp_path / "one" / "results.parquet").metadata
@@ -153,7 +154,7 @@ def test_without_pyarrow_parquet_is_rejected_before_the_first_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = build_small_study()
-    write_table(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [COMPLETED] * len(study))
     assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
     message = 'pyarrow is not installed: pip install "robocov[parquet]"'
     for dry in ([], ["--dry-run"]):
@@ -172,7 +173,7 @@ def test_without_pyarrow_parquet_is_rejected_before_the_first_run(
 def test_an_existing_parquet_file_is_updated(tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     for study in (build_small_study(), build_small_study(seeds=range(5))):
-        write_table(tmp_path, study, [FIGURED] * len(study), parquet=len(study) == 4)
+        write_table(tmp_path, study, [COMPLETED] * len(study), parquet=len(study) == 4)
         assert pq.read_table(tmp_path / "results.parquet").num_rows == len(study)
 
 
@@ -189,7 +190,7 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
     tasks = list(generate_tasks(study))
     with Table(tmp_path, build_columns(study), b"{}", parquet=True) as table:
         for k, task in enumerate(tasks):
-            table.add(build_row(task, FIGURED))
+            table.add(build_row(task, COMPLETED))
             assert len((tmp_path / "results.csv").read_text().splitlines()) == k + 2
             assert not (tmp_path / "results.parquet").exists()
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(tasks)
@@ -205,9 +206,9 @@ def test_a_table_is_only_replaced_by_a_complete_or_longer_one(
     tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
     study = build_small_study()
-    write_table(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [COMPLETED] * len(study))
     if not finished:  # as a sweep leaves it that was killed
-        (tmp_path / "study.json").write_bytes(study_json(build_small_study(seeds=range(5))))
+        (tmp_path / "study.json").write_bytes(build_study_json(build_small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
     with Table(tmp_path, build_columns(study), b"{}") as table:
         for k, task in enumerate(list(generate_tasks(study))[:rows]):
@@ -226,7 +227,7 @@ def test_a_growing_table_replaces_that_of_a_killed_sweep_of_equal_length(
     tmp_path: Path,
 ) -> None:
     study = build_small_study()
-    write_table(tmp_path, study, [FIGURED] * len(study))
+    write_table(tmp_path, study, [COMPLETED] * len(study))
     (tmp_path / "study.json").unlink()
     lengths = []
     with Table(tmp_path, build_columns(study)) as table:
@@ -248,7 +249,7 @@ def test_folders_are_not_replaced(tmp_path: Path, name: str) -> None:
 def test_an_error_leaves_no_partial_table(tmp_path: Path) -> None:
     study = build_small_study()
     with pytest.raises(ZeroDivisionError), Table(tmp_path, build_columns(study)) as table:
-        table.add(build_row(next(generate_tasks(study)), FIGURED))
+        table.add(build_row(next(generate_tasks(study)), COMPLETED))
         raise ZeroDivisionError
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
@@ -273,7 +274,7 @@ class Full:
 
 def test_a_full_disk_leaves_no_partial_row(tmp_path: Path) -> None:
     study = build_small_study()
-    row = build_row(next(generate_tasks(study)), FIGURED)
+    row = build_row(next(generate_tasks(study)), COMPLETED)
     full = pytest.raises(OutputError, match=r"results.csv: cannot be written: No space left")
     with full, Table(tmp_path, build_columns(study)) as table:
         table.add(row)
@@ -301,7 +302,7 @@ def test_a_full_disk_leaves_no_partial_parquet_file(
     error = pytest.raises(OutputError, match=r"results.parquet: cannot be written: No space left")
     with error, Table(tmp_path, build_columns(study), parquet=True) as table:
         monkeypatch.setattr(pq.ParquetWriter, broken, fail_as_disk_is_full)
-        table.add(build_row(next(generate_tasks(study)), FIGURED))
+        table.add(build_row(next(generate_tasks(study)), COMPLETED))
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
 
@@ -325,6 +326,6 @@ def test_columns_have_unique_names_for_any_gains(tmp_path: Path) -> None:
     study = build_small_study(controllers=("rapf", "rpf", "lloyd", "odd.py:Odd"), folder=tmp_path)
     names = [column.name for column in build_columns(study)]
     assert len(set(names)) == len(names)
-    rows = [build_row(task, FIGURED) for task in generate_tasks(study) if task.seed == 1]
+    rows = [build_row(task, COMPLETED) for task in generate_tasks(study) if task.seed == 1]
     assert [(row["seed"], row.get("gain_seed")) for row in rows] == [(1, None)] * 3 + [(1, 1.0)]
     assert rows[-1]["k_rep"] == 2.0

@@ -630,7 +630,7 @@ def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixtu
         (("show",), ["goal"], r"chapters\[0\]\.show: unknown layer 'goal': did you mean 'goals'"),
     ],
 )
-def test_a_chapter_that_cannot_work_is_refused(
+def test_a_chapter_that_cannot_work_is_rejected(
     place: tuple[str], value: object, message: str, tmp_path: Path
 ) -> None:
     path = write_short_lesson(tmp_path)

@@ -226,7 +226,7 @@ def test_a_misspelled_command_is_answered_with_the_nearest_name() -> None:
 
 
 @given(st.text(max_size=12))
-def test_any_text_is_run_or_refused(text: str) -> None:
+def test_any_text_is_run_or_rejected(text: str) -> None:
     viewer = Presenter(start_session(robots=1), Costs(2, direct=True), set(), Path(), "hall")
     try:
         run_text(viewer, text)

@@ -266,7 +266,7 @@ def test_a_double_click_closes_a_polygon_and_adds_one_corner():
     assert len(session.displayed.environment.obstacles[-1].vertices) == 3
 
 
-def test_invalid_polygons_are_refused():
+def test_invalid_polygons_are_rejected():
     tool = AddPolygonTool()
     session = start_session()
     before = describe_state(session)

@@ -177,7 +177,7 @@ def test_robots_are_added_failed_and_revived_by_clicks(driver: Driver) -> None:
         (((0.4, 3.0), (1.2, 3.6), (1.2, 3.0), (0.4, 3.6)), "crosses itself"),
     ],
 )
-def test_an_invalid_obstacle_is_refused_with_the_reason(corners, reason: str, driver: Driver) -> None:
+def test_an_invalid_obstacle_is_rejected_with_the_reason(corners, reason: str, driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.press_key("p")
     for corner in corners:
@@ -188,7 +188,7 @@ def test_an_invalid_obstacle_is_refused_with_the_reason(corners, reason: str, dr
     assert driver.session.displayed.environment is before
 
 
-def test_an_obstacle_that_covers_the_floor_is_refused(driver: Driver) -> None:
+def test_an_obstacle_that_covers_the_floor_is_rejected(driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.press_key("p")
     for corner in ((0.01, 0.01), (5.99, 0.01), (5.99, 3.99), (0.01, 3.99)):

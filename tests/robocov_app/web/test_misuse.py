@@ -258,7 +258,7 @@ def test_many_changes_of_a_name_delay_no_other_page(display, viewer):
     check_health(display)
 
 
-def test_large_files_are_refused_without_reading_them(display, folder):
+def test_large_files_are_rejected_without_reading_them(display, folder):
     with (folder / "long.mp4").open("wb") as file:
         file.truncate(1 << 40)  # A sparse file occupies no disk space.
     display.saved_files = ("long.mp4",)

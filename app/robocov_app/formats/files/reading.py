@@ -81,7 +81,7 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     ----------
     path : Path
     separator : bytes
-        Bytes between two vertices. They are counted to refuse files with too many vertices before parsing.
+        Bytes between two vertices. They are counted to reject files with too many vertices before parsing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Elements of an XML file, read by expat. Entities that name files or expand without limit are refused."""
+"""Elements of an XML file, read by expat. Entities that name files or expand without limit are rejected."""
 
 from __future__ import annotations
 

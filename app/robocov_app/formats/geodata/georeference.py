@@ -127,7 +127,7 @@ def _unwrap_longitudes(points: FloatArray, center: float) -> FloatArray:
 def _parse_reference_system(crs: str, source_name: str) -> str:
     """Return the name of a reference system as AUTHORITY:CODE.
 
-    Full definitions are refused, because they may name files.
+    Full definitions are rejected, because they may name files.
     """
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:

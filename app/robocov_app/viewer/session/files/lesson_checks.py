@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from robocov_app.viewer.session.document import Node
 from robocov_app.viewer.session.editing.edits import AddRobot, Restart
-from robocov_app.viewer.session.files.maps import refuse_value
+from robocov_app.viewer.session.files.maps import reject_value
 from robocov_app.viewer.session.files.models import ChapterModel, ConditionModel, LessonModel
 
 _Path = tuple[str | int, ...]
@@ -32,7 +32,7 @@ def check_lesson_references(lesson: LessonModel, source_name: str, nodes: Sequen
         path: _Path = ("lesson", "chapters", index)
         if chapter.edit >= len(nodes):
             expected = f"the index of an edit, 0 to {len(nodes) - 1}"
-            refuse_value(source_name, (*path, "edit"), chapter.edit, expected)
+            reject_value(source_name, (*path, "edit"), chapter.edit, expected)
         _check_answer(chapter, source_name, path)
         _check_robot(chapter.robot, source_name, (*path, "robot"), robot_count)
         _check_condition(chapter.until, source_name, (*path, "until"), robot_count)
@@ -56,12 +56,12 @@ def _check_answer(chapter: ChapterModel, source_name: str, path: _Path) -> None:
     question = chapter.question
     if question is not None and question.right > len(question.answers):
         expected = f"the number of an answer, 1 to {len(question.answers)}"
-        refuse_value(source_name, (*path, "question", "right"), question.right, expected)
+        reject_value(source_name, (*path, "question", "right"), question.right, expected)
 
 
 def _check_robot(robot: int | None, source_name: str, path: _Path, robot_count: int) -> None:
     if robot is not None and robot > robot_count:
-        refuse_value(source_name, path, robot, f"a robot of the session, 1 to {robot_count}")
+        reject_value(source_name, path, robot, f"a robot of the session, 1 to {robot_count}")
 
 
 def _check_condition(condition: ConditionModel, source_name: str, path: _Path, robot_count: int) -> None:
@@ -72,8 +72,8 @@ def _check_condition(condition: ConditionModel, source_name: str, path: _Path, r
     content = condition.model_dump(exclude_none=True)
     if not content or has_robot != has_box:
         expected = '"step", "settled", "mean_distance_below", or "robot" with "inside" or "outside"'
-        refuse_value(source_name, path, content, expected)
+        reject_value(source_name, path, content, expected)
     _check_robot(condition.robot, source_name, (*path, "robot"), robot_count)
     for name, box in boxes.items():
         if box is not None and not (box[0] < box[2] and box[1] < box[3]):
-            refuse_value(source_name, (*path, name), box, "[left, bottom, right, top]")
+            reject_value(source_name, (*path, name), box, "[left, bottom, right, top]")

@@ -37,7 +37,7 @@ _DIGESTS_WITH_DESCRIPTION = {
 """Digests of the bundled maps in sessions of earlier versions, whose digests included the description."""
 
 
-def refuse_value(source_name: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
+def reject_value(source_name: str, path: tuple[str | int, ...], value: object, expected: str) -> NoReturn:
     """Raise a MapError about a value in a session file.
 
     Parameters
@@ -113,7 +113,7 @@ class FileContext:
     def _load_bundled_map(self, number: int, content: BundledMapModel) -> Environment:
         if content.bundled not in list_bundled_maps():
             path = ("maps", number, "bundled")
-            refuse_value(self.source_name, path, content.bundled, "the name of a bundled map")
+            reject_value(self.source_name, path, content.bundled, "the name of a bundled map")
         environment = load_map(content.bundled)
         digest = _compute_digest(to_json(environment))
         if content.digest not in (digest, _DIGESTS_WITH_DESCRIPTION.get(content.bundled)):

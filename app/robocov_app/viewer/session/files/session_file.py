@@ -20,7 +20,7 @@ from robocov.files.writing import replace_file
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.editing.edits import DragRobot, Restart, SessionEdit
 from robocov_app.viewer.session.files.lesson_checks import check_lesson_references
-from robocov_app.viewer.session.files.maps import FileContext, refuse_value
+from robocov_app.viewer.session.files.maps import FileContext, reject_value
 from robocov_app.viewer.session.files.models import LessonModel, NodeModel, SessionModel
 
 FORMAT = "robocov-session"
@@ -227,11 +227,11 @@ def parse_session(content: Any, source_name: str, controllers: Collection[str] =
     for node_model in model.edits:
         nodes.append(_NodeReader(source_name, nodes).read(node_model))
     if model.head >= len(nodes):
-        refuse_value(source_name, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
+        reject_value(source_name, ("head",), model.head, f"the index of an edit, 0 to {len(nodes) - 1}")
     head = nodes[model.head]
     if not head.first_step <= model.step <= head.last_step:
         expected = f"a step of the head, {head.first_step} to {head.last_step}"
-        refuse_value(source_name, ("step",), model.step, expected)
+        reject_value(source_name, ("step",), model.step, expected)
     if model.lesson is not None:
         check_lesson_references(model.lesson, source_name, nodes)
     return SavedSession(SessionDocument(nodes, model.lesson), head, model.step, model.view)
@@ -256,7 +256,7 @@ class _NodeReader:
         """Build the node, or raise a MapError."""
         self._check_parent(model)
         if not self._nodes and not isinstance(model.changes[0], Restart):
-            self._refuse(("changes", 0, "do"), model.changes[0].do, '"restart"')
+            self._reject(("changes", 0, "do"), model.changes[0].do, '"restart"')
         node = Node(
             len(self._nodes),
             None if model.parent is None else self._nodes[model.parent],
@@ -271,31 +271,31 @@ class _NodeReader:
         self._read_curves(model, node)
         return node
 
-    def _refuse(self, path: tuple[str | int, ...], value: object, expected: str) -> None:
-        refuse_value(self._where, ("edits", len(self._nodes), *path), value, expected)
+    def _reject(self, path: tuple[str | int, ...], value: object, expected: str) -> None:
+        reject_value(self._where, ("edits", len(self._nodes), *path), value, expected)
 
     def _check_parent(self, model: NodeModel) -> None:
         is_first = not self._nodes
         is_root = model.parent is None
         is_unknown = model.parent is not None and model.parent >= len(self._nodes)
         if is_root != is_first or is_unknown:
-            self._refuse(("parent",), model.parent, "null for the first, or the index of an earlier edit")
+            self._reject(("parent",), model.parent, "null for the first, or the index of an earlier edit")
 
     def _check_steps(self, model: NodeModel, node: Node) -> None:
         parent = node.parent
         if parent is not None and not parent.first_step <= model.at <= parent.last_step:
             steps = f"{parent.first_step} to {parent.last_step}"
-            self._refuse(("at",), model.at, f"a step of edit {model.parent}, {steps}")
+            self._reject(("at",), model.at, f"a step of edit {model.parent}, {steps}")
         edit_steps = [edit.step for edit in node.edits]
         is_ordered = edit_steps == sorted(edit_steps) and edit_steps[0] == node.first_step
         if not is_ordered or node.last_step < edit_steps[-1]:
-            self._refuse(("end",), model.end, "a step at or after its changes, whose steps must ascend")
+            self._reject(("end",), model.end, "a step at or after its changes, whose steps must ascend")
 
     def _read_curves(self, model: NodeModel, node: Node) -> None:
         for name, samples in model.curves.items():
             pane, _, quantity = name.partition(" ")
             if not pane.isdecimal() or quantity not in ("distance", "time") or len(samples) != 2:
-                self._refuse(("curves",), name, '"0 distance", "0 time", ... with times and values')
+                self._reject(("curves",), name, '"0 distance", "0 time", ... with times and values')
             times, values = samples
             for time, value in zip(times, values, strict=False):
                 node.curves[int(pane), quantity].add(time, value)
