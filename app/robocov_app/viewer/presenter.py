@@ -73,7 +73,10 @@ class Presenter(ViewerModel):
         """Switch to another tool, and show a hint on how to use it."""
         self.tool.cancel(self.session)
         self.toolbox.current = self.toolbox.by_name[name]
-        self.show_message(f"{self.tool.title}: {self.tool.hint}")
+        hint = self.tool.hint
+        if self.view.is_compact and self.tool.touch_hint:
+            hint = self.tool.touch_hint
+        self.show_message(f"{self.tool.title}: {hint}")
 
     def finish_drawing(self) -> str | None:
         """Complete the tool's drawing; return a message, or None if there was no drawing."""

@@ -13,6 +13,7 @@ import pytest
 from driven_window import Driver, open_viewer
 
 from robocov_app.toolkit.window.input import COMMAND_EVENT
+from robocov_app.toolkit.window.page_view import PageAppearance
 from robocov_app.viewer.lessons.player import LessonPlayer, LessonState
 from robocov_app.viewer.window.status import suggest_actions
 
@@ -178,6 +179,25 @@ def test_hints_on_a_phone_name_buttons_instead_of_keys(upright_phone: Driver) ->
     ]
     phone.viewer.session.timeline.is_settled = True
     assert suggest_actions(phone.viewer).startswith("The team has settled. Try:\ndraw a wall in a doorway · ")
+
+
+def test_hints_of_tools_on_a_phone_mention_neither_keys_nor_clicks(upright_phone: Driver) -> None:
+    for name in upright_phone.viewer.toolbox.by_name:
+        run_page_command(upright_phone, f"tool:{name}")
+        assert not re.search(r"click|Enter|Alt|Shift|wheel|\[", upright_phone.viewer.message), name
+
+
+def test_options_of_a_list_are_large_enough_for_fingers(phone: Driver) -> None:
+    phone.window.set_appearance(
+        PageAppearance(scale=RATIO, theme="light", shows_panel=False, is_compact=True, is_motion_reduced=True)
+    )
+    run_page_command(phone, "pane:add")
+    phone.run_frames(2)
+    box = phone.window.dialogs.box
+    assert phone.window.screen.get_rect().contains(box)
+    options = [widget.rect for widget in phone.window.dialogs.ui.widgets.values() if widget.kind == "option"]
+    assert min(option.height for option in options) >= 40 * RATIO
+    assert all(box.contains(option) for option in options)
 
 
 def test_answers_are_large_enough_for_fingers(upright_phone: Driver) -> None:

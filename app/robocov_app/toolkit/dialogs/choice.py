@@ -11,11 +11,20 @@ from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import ENTER_KEYS
 
-VISIBLE_OPTIONS = 9
-_TOP_PX = 64
-"""Distance from the upper edge of the window at scale 1."""
+MAX_VISIBLE_OPTIONS = 9
+_MIN_VISIBLE_OPTIONS = 3
 _FIELD = "text"
-_KEY_STEPS = {"up": -1, "down": 1, "page up": -VISIBLE_OPTIONS, "page down": VISIBLE_OPTIONS}
+_KEY_STEPS = {"up": -1, "down": 1, "page up": -MAX_VISIBLE_OPTIONS, "page down": MAX_VISIBLE_OPTIONS}
+
+# Lengths in pixels at scale 1.
+_TOP_PX = 64
+"""Maximum distance from the upper edge of the window."""
+_TITLE_GAP_PX = 4
+_OPTION_PX = 26
+_FINGER_OPTION_PX = 44
+_OPTION_GAP_PX = 1
+_OTHER_HEIGHT_PX = 160
+"""Height of everything except for the options, and of the margins above and below the list."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +97,7 @@ class Choice(Dialog):
     def show_content(self, ui: Ui) -> None:
         """Show the field and the list."""
         ui.paragraph(self.title, color=ui.theme.faint, bold=True)
+        ui.space(_TITLE_GAP_PX)
         if ui.edit is None or ui.focus != _FIELD:
             ui.focus = _FIELD
             ui.edit = TextEdit.append_to(self.text)
@@ -100,7 +110,7 @@ class Choice(Dialog):
         self._show_options(ui, options)
         ui.row(height=22, below=0)
         facts: list[str] = []
-        if len(options) > VISIBLE_OPTIONS:
+        if len(options) > self._visible_count:
             facts.append(f"{len(options)} in all")
         if self.has_key_hints:
             facts.append(self.hint)
@@ -108,10 +118,10 @@ class Choice(Dialog):
 
     def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
         """Show the visible lines of the list, and accept the one that is clicked."""
-        ui.row(height=26, below=1)
+        ui.row(height=self._option_height, below=_OPTION_GAP_PX)
         if not options:
             ui.label(self.empty_text, style="unit")
-        for number in range(self.top, min(self.top + VISIBLE_OPTIONS, len(options))):
+        for number in range(self.top, min(self.top + self._visible_count, len(options))):
             option = options[number]
             is_clicked = ui.option(
                 option.text,
@@ -123,9 +133,24 @@ class Choice(Dialog):
             if is_clicked:
                 self._accept(option, ui)
 
+    @property
+    def _option_height(self) -> int:
+        """Height of an option at scale 1, px; enough for a finger on a phone."""
+        return _OPTION_PX if self.has_key_hints else _FINGER_OPTION_PX
+
+    @property
+    def _visible_count(self) -> int:
+        """Maximum number of options that are visible at once."""
+        if self.has_key_hints:
+            return MAX_VISIBLE_OPTIONS
+        free_height = self.window_height - _OTHER_HEIGHT_PX
+        count = min(free_height / (self._option_height + _OPTION_GAP_PX), MAX_VISIBLE_OPTIONS)
+        return max(int(count), _MIN_VISIBLE_OPTIONS)
+
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
         """Move the box to the upper part of the screen; its top edge stays there while the list grows."""
-        box.midtop = screen.width // 2, round(_TOP_PX * scale)
+        free_height = max(screen.height - box.height, 0)
+        box.midtop = screen.width // 2, min(round(_TOP_PX * scale), free_height // 2)
 
     def read_widgets(self, ui: Ui) -> None:
         """Read the typed text after each event, because several events may arrive within one frame."""
@@ -177,7 +202,7 @@ class Choice(Dialog):
         """Highlight the line `step` lines below, and scroll it into view."""
         last = max(len(self.options(self.text)) - 1, 0)
         self.highlighted = min(max(self.highlighted + step, 0), last)
-        self.top = min(max(self.top, self.highlighted - VISIBLE_OPTIONS + 1), self.highlighted)
+        self.top = min(max(self.top, self.highlighted - self._visible_count + 1), self.highlighted)
 
 
 def create_list_choice(

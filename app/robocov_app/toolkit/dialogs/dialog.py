@@ -1,5 +1,7 @@
 """Base class of dialogs."""
 
+import math
+
 from pygame import Rect
 
 from robocov_app.toolkit.widgets.ui import Ui
@@ -25,6 +27,8 @@ class Dialog:
         Whether it has been answered and is about to close.
     has_key_hints : bool
         Whether it mentions keys, which a phone does not have.
+    window_height : float
+        Height of the window at scale 1, px; infinite until the dialog is drawn.
     """
 
     width = 560.0
@@ -33,6 +37,7 @@ class Dialog:
     closes_on_outside_click = False
     is_done = False
     has_key_hints = True
+    window_height = math.inf
 
     def show_content(self, ui: Ui) -> None:
         """Show the widgets of the dialog, and handle their input; called in every run of the page."""

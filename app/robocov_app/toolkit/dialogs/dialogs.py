@@ -161,6 +161,7 @@ class Dialogs:
         if dialog is None:
             return
         self._is_drawn = True
+        dialog.window_height = screen.get_height() / scale
         ui = self.ui
         if ui is None or ui.theme is not theme or ui.scale != scale:
             ui = self._create_ui(dialog, theme, scale)

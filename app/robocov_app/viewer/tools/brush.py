@@ -39,6 +39,7 @@ class BrushTool(ViewerTool):
     title = "Brush"
     key = "g"
     hint = "paint where coverage matters more; the right button lowers it; the wheel, [ and ] change the size"
+    touch_hint = "paint where coverage matters more"
     uses_right_button = True
     uses_wheel = True
     is_resizable = True

@@ -17,6 +17,7 @@ class EraserTool(ViewerTool):
     title = "Delete"
     key = "x"
     hint = "click an obstacle or a robot to delete it"
+    touch_hint = "tap an obstacle or a robot to delete it"
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
@@ -38,6 +39,7 @@ class AddRobotTool(ViewerTool):
     title = "Add robot"
     key = "a"
     hint = "click where a robot should join"
+    touch_hint = "tap where a robot should join"
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:
         """Add a robot at the free position nearest to the cursor."""
@@ -51,6 +53,7 @@ class FailureTool(ViewerTool):
     title = "Fail robot"
     key = "d"
     hint = "click a robot to make it fail; click it again to revive it"
+    touch_hint = "tap a robot to make it fail; tap it again to revive it"
     takes_robots = True
 
     def press(self, session: Session, event: ViewerPointerEvent) -> str | None:

@@ -41,6 +41,7 @@ class HandTool(ViewerTool):
         "click or drag a robot or an obstacle; Alt-drag copies it; Shift-drag selects several; "
         "right click: menu; drag the floor to pan"
     )
+    touch_hint = "tap or drag a robot or an obstacle; hold it for a menu; drag the floor to pan"
     takes_robots = True
 
     inspection: Inspection

@@ -106,6 +106,7 @@ class AddPolygonTool(OutlineTool):
     title = "Polygon"
     key = "p"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
+    touch_hint = "tap the corners; a double tap or a tap on the first corner closes it"
 
     outline: DrawnOutline = field(
         default_factory=lambda: DrawnOutline(min_points=3, can_close=True), repr=False
@@ -130,6 +131,7 @@ class AddWallTool(OutlineTool):
     title = "Wall"
     key = "w"
     hint = "drag, or click its points; Enter or a double click ends it; [ and ] change its width"
+    touch_hint = "drag, or tap its points; a double tap ends it"
     is_resizable = True
     end_fraction = WALL_END_FRACTION
 

@@ -62,6 +62,8 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
 
     Attributes
     ----------
+    touch_hint : str
+        The hint on a phone, which has no keys and no mouse; empty if it is the same.
     takes_robots : bool
         Whether a press acts on the robot under the cursor.
     uses_right_button : bool
@@ -74,6 +76,7 @@ class ViewerTool(Tool[Session, ViewerPointerEvent]):
         Whether the tool is painting the density right now.
     """
 
+    touch_hint = ""
     takes_robots = False
     uses_right_button = False
     uses_wheel = False
