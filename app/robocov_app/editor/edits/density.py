@@ -23,6 +23,7 @@ from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
 MIN_PEAK_WEIGHT = 1e-6  # minimum weight of a hot spot, and of a density without features
+WEIGHT_DECIMALS = 9  # decimal places of weights, so that saved maps contain exactly the weights of the editor
 
 
 def list_features(sketch: Sketch) -> tuple[Feature, ...]:
@@ -244,4 +245,4 @@ def _round_weight(weight: float, minimum: float) -> float:
     if not minimum <= weight <= MAX_WEIGHT:
         bound = "above" if minimum else "from"
         raise MapError(f"weight: expected a number {bound} 0, got {weight:g}")
-    return float(weight)
+    return round(float(weight), WEIGHT_DECIMALS)
