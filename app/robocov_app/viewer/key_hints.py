@@ -10,8 +10,17 @@ def explain_pause(view: ViewState) -> str:
     return "It is paused: press Space or Play to continue."
 
 
-def explain_recovery(view: ViewState) -> str:
-    """Return a hint on how to open unsaved work that is kept."""
+def explain_kept_session(view: ViewState) -> str:
+    """Return a hint that the session before the opened one is kept as a draft."""
+    return f"Your unsaved session is kept: {_explain_recovery(view)}"
+
+
+def explain_kept_edits(view: ViewState) -> str:
+    """Return a hint that the user's edits after taking over from a lesson are kept as a draft."""
+    return f"What you have changed is kept: {_explain_recovery(view)}"
+
+
+def _explain_recovery(view: ViewState) -> str:
     if view.is_compact:
         return "More, Commands, Recover a session opens it."
     return "Ctrl+Shift+O opens it."

@@ -10,7 +10,7 @@ from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
-from robocov_app.viewer.key_hints import explain_lesson_start, explain_pause, explain_recovery
+from robocov_app.viewer.key_hints import explain_kept_session, explain_lesson_start, explain_pause
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.files.session_file import SUFFIX, load_session, save_session
 from robocov_app.viewer.session.files.workspace import (
@@ -220,7 +220,7 @@ class FileActions:
         else:
             hints.append(explain_pause(self._viewer.view))
         if keeps_draft:
-            hints.append(self._describe_kept_session())
+            hints.append(explain_kept_session(self._viewer.view))
         message = f"session opened: {path}"
         if hints:
             message += f". {' '.join(hints)}"
@@ -238,12 +238,8 @@ class FileActions:
         keeps_draft = self._replace_workspace(workspace, view)
         message = f"recovered: {describe_draft(draft)}. {explain_pause(self._viewer.view)}"
         if keeps_draft:
-            message += f" {self._describe_kept_session()}"
+            message += f" {explain_kept_session(self._viewer.view)}"
         return message
-
-    def _describe_kept_session(self) -> str:
-        """Return a hint that the session before the opened one is kept as a draft."""
-        return f"Your unsaved session is kept: {explain_recovery(self._viewer.view)}"
 
     def _add_recent(self, path: Path) -> None:
         name = str(path.absolute())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
-from robocov_app.viewer.key_hints import explain_lesson_repetition, explain_recovery, explain_staying
+from robocov_app.viewer.key_hints import explain_kept_edits, explain_lesson_repetition, explain_staying
 from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.maps import find_bundled_name
@@ -424,10 +424,6 @@ class LessonPlayer:
             self._workspace.ignore_edits()
         return self._workspace.close()
 
-    def _describe_draft(self) -> str:
-        """Return a hint that the user's edits after taking over are kept as a draft."""
-        return f"What you have changed is kept: {explain_recovery(self._viewer.view)}"
-
     def end(self) -> None:
         """End the lesson, and restore the session from before it."""
         viewer = self._viewer
@@ -437,7 +433,7 @@ class LessonPlayer:
         if self._suspended.has_work:
             message = "the lesson has ended; your session from before is back"
         if keeps_draft:
-            message += f". {self._describe_draft()}"
+            message += f". {explain_kept_edits(self._viewer.view)}"
         viewer.show_message(message)
         self._fit_view()
         self.is_done = True
@@ -467,7 +463,7 @@ class LessonPlayer:
         self._viewer.files.workspace = self._workspace
         _show_start(self._viewer, self.session, self.chapter)
         if keeps_draft:
-            self._viewer.show_message(self._describe_draft())
+            self._viewer.show_message(explain_kept_edits(self._viewer.view))
         self._fit_view()
         if self.chapter.question is None:
             self._enter_state(LessonState.PLAYING)
