@@ -1,4 +1,4 @@
-"""New maps, drawn from the generators of the suite, and a test of whether gaps are larger on new maps.
+"""New maps, sampled from the generators of the suite, and a test of whether gaps are larger on new maps.
 
 A map with a new seed is statistically like any other map of its family. Unless a controller or its gains are
 fitted to the maps of the suite, its gap on a new map is equally likely to have any rank among its gaps on the
@@ -124,7 +124,7 @@ def _sample_map(family: str, rng: np.random.Generator) -> NewMap:
             continue
         start_seed = int(rng.integers(_MAX_MAP_SEED))
         return NewMap(f"{family}-{seed}", family, start_seed, environment)
-    raise ParameterError(f"--new-maps: no new map of the family {family} can be drawn")
+    raise ParameterError(f"--new-maps: no seed gives a map of the family {family}")
 
 
 def compare_gaps(

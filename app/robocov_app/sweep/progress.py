@@ -99,7 +99,11 @@ class SweepProgress:
 
     def describe_all(self) -> str:
         """Return the numbers of runs and the outlook in one line."""
-        return ", ".join(filter(None, (self.describe(), self.describe_outlook())))
+        numbers = self.describe()
+        outlook = self.describe_outlook()
+        if numbers and outlook:
+            return f"{numbers}, {outlook}"
+        return numbers or outlook
 
 
 class ProgressReporter:

@@ -67,8 +67,8 @@ def test_changes_on_disk_are_noticed(tmp_path):
 def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     path = tmp_path / "map.json"
     write_sketch(SKETCH, path)
-    (first, disk_of_first) = read_sketch(path)
-    (second, disk_of_second) = read_sketch(path)
+    first, disk_of_first = read_sketch(path)
+    second, disk_of_second = read_sketch(path)
     one, _ = first.with_obstacles([CircleObstacle((1.0, 1.0), 0.5)])
     other, _ = second.with_obstacles([CircleObstacle((2.0, 2.0), 0.5)])
     disk_of_first = write_sketch(one, path, disk_of_first)

@@ -298,7 +298,7 @@ def test_shift_moves_objects_along_multiples_of_45_degrees(driver: EditorDriver)
     driver.hold_keys("shift")
     driver.drag_at((3, 3), (3.5, 3.6), (4.2, 4.0))
     driver.hold_keys()
-    (x, y) = driver.shapes[0].vertices[0]
+    x, y = driver.shapes[0].vertices[0]
     assert x > 2.5
     assert x - 2 == pytest.approx(y - 2, abs=1e-3)
 

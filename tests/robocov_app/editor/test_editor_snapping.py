@@ -75,7 +75,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
     centers += [spec.center for _, spec in sketch.starts if isinstance(spec, DiscStart)]
     for _, spec in sketch.starts:
         if isinstance(spec, DiscStart):
-            (x, y) = spec.center
+            x, y = spec.center
             r = spec.radius
             marks += [(x + r, y), (x - r, y), (x, y + r), (x, y - r)]
     for item in sketch.obstacles:

@@ -151,8 +151,8 @@ def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
     if chord == 0.0 or abs(bulge) < 1e-3:
         return
     # its height over the chord is the bulge times half the chord, to the right where it is positive
-    (x, y) = a
-    (u, v) = b
+    x, y = a
+    u, v = b
     height = ((points[:, 0] - x) * (v - y) - (points[:, 1] - y) * (u - x)) / chord
     assert (height.max() if bulge > 0 else -height.min()) == pytest.approx(abs(bulge) * chord / 2, abs=2e-3)
 

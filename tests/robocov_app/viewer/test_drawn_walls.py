@@ -72,7 +72,7 @@ def test_corners_come_before_walls() -> None:
     assert snapper.snap(build_room(), (9.98, 3.0), 0.1) == pytest.approx((10.0, 3.0))
 
 
-def test_a_wall_in_a_doorway_is_in_line_with_the_walls_beside_it(tmp_path: Path) -> None:
+def test_a_wall_in_a_doorway_is_in_line_with_the_walls_next_to_it(tmp_path: Path) -> None:
     below = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.2)
     above = WallObstacle(((5.0, 3.5), (5.0, 6.0)), 0.2)
     with open_viewer(tmp_path, RAPF, environment=build_room(below, above), robots=2) as driver:

@@ -133,7 +133,7 @@ def test_each_of_four_panes_shows_its_cost(
         assert measure_text(f"{name}  8.888  +88.8%", text_size, True) <= free_width
 
 
-def test_a_controller_name_is_not_cut_beside_a_large_cost(tmp_path: Path, drawn_texts: list[str]) -> None:
+def test_a_controller_name_is_not_cut_next_to_a_large_cost(tmp_path: Path, drawn_texts: list[str]) -> None:
     with open_viewer(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
         for pane, value in zip(driver.session.timeline.panes, (1.856, 4.023), strict=True):
             pane.distance_curve.add(0.0, value)

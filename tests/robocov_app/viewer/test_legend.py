@@ -202,7 +202,7 @@ def test_in_a_small_window_a_menu_replaces_the_presets(tmp_path: Path) -> None:
         assert [row.name for row in menu.rows if row] == [f"preset:{preset.name}" for preset in LAYER_PRESETS]
 
 
-def test_the_tool_tip_of_a_chip_says_what_a_click_does(tmp_path: Path, monkeypatch) -> None:
+def test_the_tooltip_of_a_chip_says_what_a_click_does(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr("robocov_app.toolkit.widgets.tool_tip.TIP_DELAY_S", 0.0)
     tips = []
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Arrows beside the lines of a robot's report."""
+"""Arrows next to the lines of a robot's report."""
 
 import numpy as np
 import pygame

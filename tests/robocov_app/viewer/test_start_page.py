@@ -100,7 +100,7 @@ def test_cards_and_maps_are_reached_by_tab_arrows_and_enter() -> None:
         assert page.choice == choose_map(name)
 
 
-def test_all_maps_are_reached_by_the_arrows_beside_the_thumbnails() -> None:
+def test_all_maps_are_reached_by_the_arrows_next_to_the_thumbnails() -> None:
     with open_page() as page:
         seen = set()
         for _ in range(len(list_bundled_maps())):

@@ -65,7 +65,7 @@ def test_a_click_on_the_floor_clears_the_selection_and_a_drag_pans(driver: Drive
 def test_moving_an_obstacle_can_be_undone_and_redone(driver: Driver) -> None:
     before = driver.session.displayed.environment
     driver.drag_at((4.2, 1.2), (4.6, 1.6), (5.0, 1.8))
-    (pillar, _) = driver.session.displayed.environment.obstacles
+    pillar, _ = driver.session.displayed.environment.obstacles
     assert pillar.center == pytest.approx((5.0, 1.8), abs=0.03)
     assert driver.viewer.message.startswith("Circle “pillar” moved")
     driver.press_key("ctrl+z")

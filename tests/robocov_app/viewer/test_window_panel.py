@@ -135,7 +135,7 @@ def test_a_dragged_slider_sets_its_gain(driver: Driver) -> None:
     assert driver.session.timeline.events[-1].kind == "law"
 
 
-def test_a_click_beside_the_knob_moves_it_there(driver: Driver) -> None:
+def test_a_click_next_to_the_knob_moves_it_there(driver: Driver) -> None:
     slider = driver.get_widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
     assert driver.session.timeline.panes[0].setup.properties.max_speed > 4.0

@@ -25,10 +25,10 @@ _PALLET_SIZE_M = (1.2, 0.8)
 _PALLET_PROBABILITY = 0.7
 _CAGE_M = 7.0
 _CAGE_GATE_M = 1.2
-_FENCE_M = 0.1
+_FENCE_THICKNESS_M = 0.1
 _OFFICE_WIDTH_M = 6.5
 _OFFICE_HEIGHT_M = 6.0
-_CUT_M = (13.0, 11.0)
+_CUT_SIZE_M = (13.0, 11.0)
 """Width and height of the missing upper right corner of an L-shaped hall."""
 
 
@@ -45,14 +45,14 @@ class _Hall:
     @property
     def right_height(self) -> float:
         """Height of the right part of the hall."""
-        return self.height - _CUT_M[1] if self.is_l_shaped else self.height
+        return self.height - _CUT_SIZE_M[1] if self.is_l_shaped else self.height
 
     @property
     def outline(self) -> shapely.Geometry:
         """Shape of the hall without its loading bays."""
         hall = shapely.box(0.0, 0.0, self.width, self.height)
         if self.is_l_shaped:
-            cut_left = self.width - _CUT_M[0]
+            cut_left = self.width - _CUT_SIZE_M[0]
             hall -= shapely.box(cut_left, self.right_height, self.width, self.height)
         return hall
 
@@ -109,7 +109,7 @@ def _draw_racks_across(rng: np.random.Generator, drawing: Drawing, hall: _Hall) 
     last_left = cage_left - 2.0 - _RACK_DEPTH_M
     for left in np.arange(1.4, last_left, _RACK_DEPTH_M + aisle).tolist():
         right = left + _RACK_DEPTH_M
-        is_below_cut = right > hall.width - _CUT_M[0] - 1.0
+        is_below_cut = right > hall.width - _CUT_SIZE_M[0] - 1.0
         top = (hall.right_height if is_below_cut else hall.height) - _WALL_AISLE_M
         drawing.add_block(left, hall.dock_depth, right, cross_y - _CROSS_AISLE_M / 2.0)
         if top - cross_y > 4.0:
@@ -149,13 +149,13 @@ def _draw_cage(rng: np.random.Generator, drawing: Drawing, bounds: tuple[float, 
     The bounds are left, bottom, right and top; walls of the hall are on the right and above.
     """
     left, bottom, right, top = bounds
-    drawing.add_wall((left, top), (left, bottom), thickness=_FENCE_M)
+    drawing.add_wall((left, top), (left, bottom), thickness=_FENCE_THICKNESS_M)
     drawing.add_wall_with_doors(
-        (left - _FENCE_M / 2.0, bottom),
+        (left - _FENCE_THICKNESS_M / 2.0, bottom),
         (right, bottom),
         [rng.uniform(1.2, 2.0)],
         width=_CAGE_GATE_M,
-        thickness=_FENCE_M,
+        thickness=_FENCE_THICKNESS_M,
     )
     for x in np.arange(left + 1.2, right - 1.0, 1.9).tolist():
         drawing.add_block(x, bottom + 1.8, x + 0.7, top - 1.1)

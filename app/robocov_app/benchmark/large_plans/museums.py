@@ -18,17 +18,17 @@ from robocov_app.benchmark.large_plans.drawing import (
 )
 from robocov_app.benchmark.plan_shapes import FloorPlan
 
-_WALL_M = 0.4
+_WALL_THICKNESS_M = 0.4
 _DOOR_WIDTH_M = 1.2
-_COLUMN_M = 0.6
+_COLUMN_SIDE_M = 0.6
 _COLUMN_DISTANCE_M = 3.4
 _COLUMN_INSET_M = 2.4
 """Distance of the columns of an atrium from its walls."""
 _ENFILADE = 0.64
 """Position of the aligned doors of galleries, as a fraction of their depth from the inner wall."""
-_PORTICO_M = 2.4
+_PORTICO_DEPTH_M = 2.4
 """Depth of the portico in front of the entrance hall."""
-_PROJECTION_M = 1.4
+_PROJECTION_DEPTH_M = 1.4
 """Depth by which the corner pavilions project from the facades."""
 _APSE_RADIUS_M = 4.6
 _HALF_MIDDLE_GALLERY_M = 3.6
@@ -96,10 +96,12 @@ def _build_floor_parts(building: _Building, *, has_apse: bool, has_pavilions: bo
     depth = building.depth
     left = building.middle - building.half_hall
     right = building.middle + building.half_hall
-    parts = [shapely.box(0.0, 0.0, width, height), shapely.box(left, -_PORTICO_M, right, 1.0)]
+    parts = [shapely.box(0.0, 0.0, width, height), shapely.box(left, -_PORTICO_DEPTH_M, right, 1.0)]
     if has_pavilions:
         for x, y in itertools.product((0.0, building.inner_right), (0.0, building.inner_top)):
-            parts.append(shapely.box(x, y, x + depth, y + depth).buffer(_PROJECTION_M, join_style="mitre"))
+            parts.append(
+                shapely.box(x, y, x + depth, y + depth).buffer(_PROJECTION_DEPTH_M, join_style="mitre")
+            )
     if has_apse:
         parts.append(shapely.Polygon(build_octagon(building.middle, height, _APSE_RADIUS_M)))
     return parts
@@ -161,10 +163,10 @@ def _draw_row(
     hall : float, m, or None
         x of a point in the entrance hall, which has no exhibits.
     """
-    add_wall = partial(part.add_wall_with_doors, width=_DOOR_WIDTH_M, thickness=_WALL_M)
+    add_wall = partial(part.add_wall_with_doors, width=_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M)
     # The inner wall extends to the outer corners of the partitions.
-    start = partitions[0] - _WALL_M / 2.0
-    end = partitions[-1] + _WALL_M / 2.0
+    start = partitions[0] - _WALL_THICKNESS_M / 2.0
+    end = partitions[-1] + _WALL_THICKNESS_M / 2.0
     add_wall((start, 0.0), (end, 0.0), [door - start for door in inner_doors])
     enfilade = depth * _ENFILADE
     for x in partitions:
@@ -204,7 +206,7 @@ def _draw_entrance(drawing: Drawing, building: _Building) -> None:
     left = building.middle - building.half_hall
     right = building.middle + building.half_hall
     for x in np.linspace(left + 1.0, right - 1.0, 4).tolist():
-        drawing.add_centered_block(x, -1.4, _COLUMN_M, _COLUMN_M)
+        drawing.add_centered_block(x, -1.4, _COLUMN_SIDE_M, _COLUMN_SIDE_M)
     drawing.add_centered_block(building.middle, building.depth - 2.6, 3.0, 0.8)
     drawing.add_block(left, building.depth - 1.6, left + 0.8, building.depth)
 
@@ -217,7 +219,7 @@ def _draw_two_atriums(rng: np.random.Generator, drawing: Drawing, building: _Bui
     right = building.middle + _HALF_MIDDLE_GALLERY_M
     for x in (left, right):
         drawing.add_wall_with_doors(
-            (x, bottom), (x, top), [(top - bottom) / 2.0], width=_DOOR_WIDTH_M, thickness=_WALL_M
+            (x, bottom), (x, top), [(top - bottom) / 2.0], width=_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M
         )
     for shift in (3.4, -3.4):
         _draw_exhibits(rng, drawing.open_part(building.middle, building.height / 2.0 + shift), 4.0, 4.0)
@@ -243,9 +245,9 @@ def _draw_atrium(drawing: Drawing, building: _Building, left: float, right: floa
     highest = building.inner_top - inset
     columns_y = divide_evenly(lowest, highest, _COLUMN_DISTANCE_M).tolist()
     for x, y in itertools.product(columns_x, (columns_y[0], columns_y[-1])):
-        drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+        drawing.add_centered_block(x, y, _COLUMN_SIDE_M, _COLUMN_SIDE_M)
     for y, x in itertools.product(columns_y[1:-1], (columns_x[0], columns_x[-1])):
-        drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+        drawing.add_centered_block(x, y, _COLUMN_SIDE_M, _COLUMN_SIDE_M)
     drawing.add_octagon((left + right) / 2.0, building.height / 2.0, 1.3)
 
 
@@ -260,7 +262,7 @@ def _draw_rotunda_court(drawing: Drawing, building: _Building) -> None:
     distance = (middle - _MAX_ROTUNDA_RADIUS_M - building.depth) / 2.0
     for x in (building.depth + distance, building.inner_right - distance):
         for y in divide_evenly(building.depth, building.inner_top, 4.4)[1:-1].tolist():
-            drawing.add_centered_block(x, y, _COLUMN_M, _COLUMN_M)
+            drawing.add_centered_block(x, y, _COLUMN_SIDE_M, _COLUMN_SIDE_M)
 
 
 def _draw_rotunda(part: Drawing, radius: float) -> None:
@@ -273,7 +275,7 @@ def _draw_rotunda(part: Drawing, radius: float) -> None:
         start = _stop_at_door(first, corners[number - 1])
         end = _stop_at_door(second, corners[(number + 2) % 8])
         points = [(float(x), float(y)) for x, y in (start, first, second, end)]
-        part.add_wall(*points, thickness=_WALL_M)
+        part.add_wall(*points, thickness=_WALL_THICKNESS_M)
 
 
 def _stop_at_door(corner: FloatArray, next_corner: FloatArray) -> FloatArray:

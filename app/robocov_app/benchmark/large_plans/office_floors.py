@@ -15,7 +15,7 @@ from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
 
 _CORE_WALL_M = 0.25
 """Thickness of the walls around the core."""
-_COLUMN_M = 0.5
+_COLUMN_SIDE_M = 0.5
 _LOBBY_WIDTH_M = 3.2
 _LIFT_WIDTH_M = 2.2
 _LIFT_DEPTH_M = 2.4
@@ -256,7 +256,7 @@ def _draw_open_space(
     the recess in the facade.
     """
     for x in divide_evenly(0.0, length, _COLUMN_DISTANCE_M)[1:-1].tolist():
-        part.add_centered_block(x, 0.3, _COLUMN_M, _COLUMN_M)
+        part.add_centered_block(x, 0.3, _COLUMN_SIDE_M, _COLUMN_SIDE_M)
     pitch = rng.uniform(3.4, 3.9)
     benches = int((length - 2.0) / pitch)
     first_x = (length - (benches - 1) * pitch) / 2.0

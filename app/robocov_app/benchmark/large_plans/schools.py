@@ -13,8 +13,8 @@ from robocov.environment import Point
 from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
 from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
 
-_WALL_M = 0.2
-_CORRIDOR_M = 2.6
+_WALL_THICKNESS_M = 0.2
+_CORRIDOR_WIDTH_M = 2.6
 _DOOR_WIDTH_M = 1.0
 _HALL_DOOR_WIDTH_M = 1.2
 _CLASS_LENGTH_M = 8.8
@@ -30,13 +30,13 @@ _FIRST_ROW_M = 3.2
 _FOUR_ROWS_PROBABILITY = 0.35
 _FOUR_ROWS_PITCH_M = 1.6
 _THREE_ROWS_PITCH_M = 2.0
-_STAIRS_M = 2.6
+_STAIRS_LENGTH_M = 2.6
 """Length of the stairs at the end of a wing."""
-_STORE_M = 3.2
+_STORE_WIDTH_M = 3.2
 """Width of the store of the gym."""
-_DOUBLE_WING_M = 2.0 * _CLASS_DEPTH_M + _CORRIDOR_M
+_DOUBLE_WING_WIDTH_M = 2.0 * _CLASS_DEPTH_M + _CORRIDOR_WIDTH_M
 """Width of a wing with classrooms on both sides of its corridor."""
-_SINGLE_WING_M = _CLASS_DEPTH_M + _CORRIDOR_M
+_SINGLE_WING_WIDTH_M = _CLASS_DEPTH_M + _CORRIDOR_WIDTH_M
 """Width of a wing with classrooms on one side of its corridor."""
 _CLASSES = 2
 """Number of classrooms along a wing."""
@@ -58,51 +58,53 @@ def draw_school(rng: np.random.Generator, layout: int) -> FloorPlan:
 def _draw_comb(rng: np.random.Generator, drawing: Drawing, hall_depth: float) -> _Layout:
     """Draw two wings above the hall, with classrooms on both sides, and the common rooms below it."""
     yard_width = rng.uniform(8.0, 11.0)
-    right_wing_left = _DOUBLE_WING_M + yard_width
-    length = right_wing_left + _DOUBLE_WING_M
+    right_wing_left = _DOUBLE_WING_WIDTH_M + yard_width
+    length = right_wing_left + _DOUBLE_WING_WIDTH_M
     depth = rng.uniform(12.0, 13.0)
     shapes: list[shapely.Geometry] = [shapely.box(0.0, -depth, length, hall_depth)]
     for left in (0.0, right_wing_left):
-        wing = drawing.open_part(left + _DOUBLE_WING_M / 2.0, hall_depth, 1)
+        wing = drawing.open_part(left + _DOUBLE_WING_WIDTH_M / 2.0, hall_depth, 1)
         shapes.append(_draw_double_wing(rng, wing))
     _draw_common_rooms(rng, drawing, length, depth)
-    _draw_benches(drawing, _DOUBLE_WING_M + 1.0, right_wing_left - 1.0, hall_depth)
+    _draw_benches(drawing, _DOUBLE_WING_WIDTH_M + 1.0, right_wing_left - 1.0, hall_depth)
     return shapes, (length * 0.55, hall_depth / 2.0)
 
 
 def _draw_z(rng: np.random.Generator, drawing: Drawing, hall_depth: float) -> _Layout:
     """Draw a wing above the left end of the hall, and one below its right end, next to the gym."""
-    length = _DOUBLE_WING_M + rng.uniform(26.0, 29.0)
-    upper = drawing.open_part(_DOUBLE_WING_M / 2.0, hall_depth, 1)
-    lower = drawing.open_part(length - _DOUBLE_WING_M / 2.0, 0.0, 3)
+    length = _DOUBLE_WING_WIDTH_M + rng.uniform(26.0, 29.0)
+    upper = drawing.open_part(_DOUBLE_WING_WIDTH_M / 2.0, hall_depth, 1)
+    lower = drawing.open_part(length - _DOUBLE_WING_WIDTH_M / 2.0, 0.0, 3)
     shapes = [
         shapely.box(0.0, 0.0, length, hall_depth),
         _draw_double_wing(rng, upper),
         _draw_double_wing(rng, lower),
     ]
     depth = rng.uniform(12.0, 14.0)
-    gym_length = length - _DOUBLE_WING_M - 3.0
+    gym_length = length - _DOUBLE_WING_WIDTH_M - 3.0
     shapes.append(shapely.box(0.0, -depth, gym_length, 1.0))
     _draw_gym_and_assembly_hall(drawing, gym_length, depth)
-    rooms_left = _DOUBLE_WING_M + 2.0
+    rooms_left = _DOUBLE_WING_WIDTH_M + 2.0
     shapes.append(_draw_classrooms(rng, drawing.open_part(rooms_left, hall_depth), _CLASSES))
     _draw_benches(drawing, rooms_left, length - rooms_left, hall_depth)
-    return shapes, (_DOUBLE_WING_M + 3.0, hall_depth / 2.0)
+    return shapes, (_DOUBLE_WING_WIDTH_M + 3.0, hall_depth / 2.0)
 
 
 def _draw_e(rng: np.random.Generator, drawing: Drawing, hall_depth: float) -> _Layout:
     """Draw three wings above the hall, with classrooms on one side, and the common rooms below it."""
-    pitch = _SINGLE_WING_M + rng.uniform(8.0, 10.0)
-    length = 2.0 * pitch + _SINGLE_WING_M
+    pitch = _SINGLE_WING_WIDTH_M + rng.uniform(8.0, 10.0)
+    length = 2.0 * pitch + _SINGLE_WING_WIDTH_M
     depth = rng.uniform(11.0, 12.0)
     shapes: list[shapely.Geometry] = [shapely.box(0.0, -depth, length, hall_depth)]
     for number in range(3):
         left = number * pitch
-        rooms = drawing.open_part(left + _CORRIDOR_M, hall_depth, 1, mirrored=True)
+        rooms = drawing.open_part(left + _CORRIDOR_WIDTH_M, hall_depth, 1, mirrored=True)
         shapes.append(_draw_classrooms(rng, rooms, _CLASSES))
-        shapes.append(shapely.box(left, hall_depth - 0.5, left + _CORRIDOR_M, hall_depth + _WING_LENGTH_M))
+        shapes.append(
+            shapely.box(left, hall_depth - 0.5, left + _CORRIDOR_WIDTH_M, hall_depth + _WING_LENGTH_M)
+        )
     _draw_common_rooms(rng, drawing, length, depth)
-    _draw_benches(drawing, _SINGLE_WING_M + 1.0, length - _SINGLE_WING_M - 1.0, hall_depth)
+    _draw_benches(drawing, _SINGLE_WING_WIDTH_M + 1.0, length - _SINGLE_WING_WIDTH_M - 1.0, hall_depth)
     return shapes, (length * 0.55, hall_depth / 2.0)
 
 
@@ -111,15 +113,15 @@ def _draw_yard(rng: np.random.Generator, drawing: Drawing, hall_depth: float) ->
     yard_width = 4.0 * _CLASS_LENGTH_M
     depth = rng.uniform(11.5, 12.5)
     top = hall_depth + _WING_LENGTH_M
-    left = -_SINGLE_WING_M
-    right = yard_width + _SINGLE_WING_M
-    drawing.add_block(0.0, hall_depth, yard_width, top - _CORRIDOR_M)
+    left = -_SINGLE_WING_WIDTH_M
+    right = yard_width + _SINGLE_WING_WIDTH_M
+    drawing.add_block(0.0, hall_depth, yard_width, top - _CORRIDOR_WIDTH_M)
     north = drawing.open_part(0.0, top)
-    west = drawing.open_part(-_CORRIDOR_M, hall_depth, 1)
-    east = drawing.open_part(yard_width + _CORRIDOR_M, hall_depth, 1, mirrored=True)
+    west = drawing.open_part(-_CORRIDOR_WIDTH_M, hall_depth, 1)
+    east = drawing.open_part(yard_width + _CORRIDOR_WIDTH_M, hall_depth, 1, mirrored=True)
     shapes = [
         shapely.box(left, -depth, right, hall_depth),
-        shapely.box(-_CORRIDOR_M, hall_depth - 0.5, yard_width + _CORRIDOR_M, top),
+        shapely.box(-_CORRIDOR_WIDTH_M, hall_depth - 0.5, yard_width + _CORRIDOR_WIDTH_M, top),
         _draw_classrooms(rng, north, 4),
         _draw_classrooms(rng, west, _CLASSES),
         _draw_classrooms(rng, east, _CLASSES),
@@ -137,13 +139,13 @@ def _draw_double_wing(rng: np.random.Generator, part: Drawing) -> shapely.Geomet
     geometry, m
         Outline of the wing, in the coordinates of the plan.
     """
-    half = _CORRIDOR_M / 2.0
+    half = _CORRIDOR_WIDTH_M / 2.0
     for side in (part.open_part(0.0, half), part.open_part(0.0, -half, mirrored=True)):
         _draw_classrooms(rng, side, _CLASSES)
     length = _WING_LENGTH_M
-    end = length + _STAIRS_M
+    end = length + _STAIRS_LENGTH_M
     # The stairs are solid; in front of them is a landing.
-    part.add_block(length + _STAIRS_M / 2.0, -half, end, 0.0)
+    part.add_block(length + _STAIRS_LENGTH_M / 2.0, -half, end, 0.0)
     half_width = half + _CLASS_DEPTH_M
     rooms = shapely.Polygon(part.to_plan(build_box(-0.5, -half_width, length, half_width)))
     stairs = shapely.Polygon(part.to_plan(build_box(length - 0.5, -half, end, half)))
@@ -163,8 +165,10 @@ def _draw_classrooms(rng: np.random.Generator, part: Drawing, classes: int) -> s
     for x in walls[:-1]:
         _draw_classroom(rng, part.open_part(x, 0.0))
     doors = [x + _CLASS_DOOR_M for x in walls[:-1]]
-    part.add_wall_with_doors((0.0, 0.0), (length, 0.0), doors, width=_DOOR_WIDTH_M, thickness=_WALL_M)
-    part.add_partitions(walls, _CLASS_DEPTH_M, thickness=_WALL_M)
+    part.add_wall_with_doors(
+        (0.0, 0.0), (length, 0.0), doors, width=_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M
+    )
+    part.add_partitions(walls, _CLASS_DEPTH_M, thickness=_WALL_THICKNESS_M)
     return shapely.Polygon(part.to_plan(build_box(0.0, -0.5, length, _CLASS_DEPTH_M)))
 
 
@@ -192,7 +196,7 @@ def _draw_common_rooms(rng: np.random.Generator, drawing: Drawing, length: float
     _add_hall_wall(part, length, doors)
     _draw_gym(part, gym_end, depth)
     _draw_assembly_hall(part, gym_end, assembly_end, depth)
-    part.add_partitions(partitions[:-1], depth, thickness=_WALL_M)
+    part.add_partitions(partitions[:-1], depth, thickness=_WALL_THICKNESS_M)
     for door in room_doors[:-1]:
         part.add_centered_block(door, depth * 0.6, 0.9, depth * 0.35)
     # The shelves of the library.
@@ -212,21 +216,23 @@ def _draw_gym_and_assembly_hall(drawing: Drawing, length: float, depth: float) -
 def _list_hall_doors(gym_end: float, assembly_end: float) -> list[float]:
     """Return the x of the doors from the hall to the gym, its store, and the assembly hall."""
     middle = (gym_end + assembly_end) / 2.0
-    return [gym_end * 0.5, gym_end - _STORE_M / 2.0, middle - 2.5, middle + 2.5]
+    return [gym_end * 0.5, gym_end - _STORE_WIDTH_M / 2.0, middle - 2.5, middle + 2.5]
 
 
 def _add_hall_wall(part: Drawing, length: float, doors: list[float]) -> None:
     """Add the wall between the hall and the rooms below it."""
-    part.add_wall_with_doors((0.0, 0.0), (length, 0.0), doors, width=_HALL_DOOR_WIDTH_M, thickness=_WALL_M)
+    part.add_wall_with_doors(
+        (0.0, 0.0), (length, 0.0), doors, width=_HALL_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M
+    )
 
 
 def _draw_gym(part: Drawing, end: float, depth: float) -> None:
     """Draw a gym with benches for spectators, and a store with equipment on its right."""
-    store = end - _STORE_M
+    store = end - _STORE_WIDTH_M
     part.add_wall_with_doors(
-        (store, 0.0), (store, depth), [depth * 0.5], width=_HALL_DOOR_WIDTH_M, thickness=_WALL_M
+        (store, 0.0), (store, depth), [depth * 0.5], width=_HALL_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M
     )
-    part.add_partitions([end], depth, thickness=_WALL_M)
+    part.add_partitions([end], depth, thickness=_WALL_THICKNESS_M)
     part.add_block(end - 1.0, depth * 0.25, end, depth * 0.45)
     part.add_block(end - 1.0, depth * 0.6, end, depth * 0.85)
     part.add_block(1.2, depth - 0.8, store - 1.2, depth)

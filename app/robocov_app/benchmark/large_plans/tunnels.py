@@ -15,7 +15,7 @@ from robocov_app.benchmark.plan_shapes import FloorPlan, build_box, round_points
 
 _MIN_PILLAR_AREA_M2 = 2.0
 """Minimum area of the rock between tunnels; smaller pieces are cut away."""
-_SIMPLIFICATION_M = 0.08
+_SIMPLIFICATION_TOLERANCE_M = 0.08
 """Maximum distance by which the walls are moved when needless corners are removed."""
 _SHAFT_RADIUS_M = 2.2
 """Radius of the chamber in which the robots start."""
@@ -52,7 +52,7 @@ class _Network:
         if not isinstance(union, shapely.Polygon):
             # Tunnels that are not connected to the others are left out.
             union = max(union.geoms, key=lambda part: part.area)
-        space = shapely.simplify(union.normalize(), _SIMPLIFICATION_M)
+        space = shapely.simplify(union.normalize(), _SIMPLIFICATION_TOLERANCE_M)
         boundary = round_points(np.asarray(space.exterior.coords)[:-1])
         obstacles: list[Obstacle] = []
         for ring in space.interiors:

@@ -25,7 +25,7 @@ _BED_PITCH_M = 1.6
 _BED_MARGIN_M = 0.7
 """Distance of the first bed from the facade."""
 _TWO_BEDS_PROBABILITY = 0.6
-_STORE_WALL_M = 0.2
+_STORE_WALL_THICKNESS_M = 0.2
 _STORE_DOOR_M = 2.6
 """Distance of the middle of the store's door from the outer wall."""
 _STORE_SHELF_DEPTH_M = 0.7
@@ -122,10 +122,10 @@ def _draw_hub(drawing: Drawing, half_hub: float) -> None:
     drawing.add_block(inner, inner, half_hub - _STAIRS_WIDTH_M, inner + _STAIRS_WIDTH_M)
     # A store with a shelf.
     drawing.add_wall_with_doors(
-        (-half_hub, -inner), (-inner, -inner), [_STORE_DOOR_M], thickness=_STORE_WALL_M
+        (-half_hub, -inner), (-inner, -inner), [_STORE_DOOR_M], thickness=_STORE_WALL_THICKNESS_M
     )
-    corner_y = -inner - _STORE_WALL_M / 2.0
-    drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORE_WALL_M)
+    corner_y = -inner - _STORE_WALL_THICKNESS_M / 2.0
+    drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORE_WALL_THICKNESS_M)
     drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + _STORE_SHELF_DEPTH_M)
 
 

@@ -88,7 +88,7 @@ def _hatch_area(view: View, image: Surface, box: Rect, area: _HatchedArea) -> No
             mask.draw_outline(ring, _WHITE, 1)
         else:
             mask.fill_polygon(ring, _TRANSPARENT)
-    lines = draw_hatch_pattern(box, area.color, view.scale, area.strength)
+    lines = render_hatch_pattern(box, area.color, view.scale, area.strength)
     mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
     image.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
     for ring, is_outer in zip(rings, outline.outer, strict=True):
@@ -96,7 +96,7 @@ def _hatch_area(view: View, image: Surface, box: Rect, area: _HatchedArea) -> No
             edges.draw_outline(ring, area.color, edges.scale_width(1.0))
 
 
-def draw_hatch_pattern(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
+def render_hatch_pattern(box: Rect, color: Color, scale: float, strength: float = 1.0) -> Surface:
     """Draw an image of diagonal lines over a tint.
 
     Parameters

@@ -5,7 +5,7 @@ from functools import partial
 from pygame import Rect
 
 from robocov_app.editor.canvas import overlay
-from robocov_app.editor.canvas.hatching import draw_hatch_pattern
+from robocov_app.editor.canvas.hatching import render_hatch_pattern
 from robocov_app.editor.canvas.sheet_view import choose_hull_excess_color, choose_hull_excess_edge
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.look.colors import Color, mix
@@ -100,5 +100,5 @@ def _draw_cut_off_area(canvas: Canvas, x: float, y: float) -> None:
 
 def _draw_hatching(canvas: Canvas, x: float, y: float, color: Color) -> None:
     size = round(_HATCHING_SIDE_PX * canvas.scale)
-    pattern = draw_hatch_pattern(Rect(0, 0, size, size), color, canvas.scale)
+    pattern = render_hatch_pattern(Rect(0, 0, size, size), color, canvas.scale)
     canvas.surface.blit(pattern, (round(x - size / 2), round(y - size / 2)))

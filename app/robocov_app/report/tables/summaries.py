@@ -114,7 +114,7 @@ def _build_scaled_column(result: ReportedResult) -> RunColumn:
     scales = compute_medians(result)
     return RunColumn(
         _SCALED_HEADING,
-        lambda runs: format_quartiles(scale_distances(runs, scales).tolist(), 3),
+        lambda runs: format_quartiles(scale_distances(runs, scales).tolist(), decimals=3),
     )
 
 

@@ -101,13 +101,13 @@ class ImportPreview:
         """Draw both maps with captions; if `sheet` is not None, draw the first map in its own colors."""
         look = (*(camera.view for camera in self.cameras), scale, theme, sheet is not None)
 
-        def draw_maps() -> Surface:
+        def render_maps() -> Surface:
             picture = _draw_comparison(screen.get_size(), imported.comparison, self.cameras, scale, theme)
             if sheet is not None:
                 sheet.draw(picture, self.cameras[0], imported.comparison.bounds)
             return picture
 
-        screen.blit(self._picture.get(imported, look, draw_maps), (0, 0))
+        screen.blit(self._picture.get(imported, look, render_maps), (0, 0))
         captions = _list_captions(imported, theme, has_own_colors=sheet is not None)
         for camera, caption in zip(self.cameras, captions, strict=True):
             self._draw_caption(screen, camera, caption, scale, theme)
