@@ -54,7 +54,7 @@ def test_results_have_the_areas_of_shapely_and_cover_the_same_points(shapes, nam
         return
     results = [change.sketch.get_item(key).shape for key in change.selection.items]
     assert len(results) == len(change.sketch.obstacles)
-    # every vertex may move by half of a tenth of a millimeter each way, and crumbs go
+    # Every vertex may move by 0.05 mm in x and in y, and tiny pieces are removed.
     assert sum(shape.polygon.area for shape in results) == pytest.approx(
         wanted[name].area, abs=2e-4 * perimeter
     )
@@ -100,7 +100,7 @@ def test_booleans_preserve_holes():
         change.sketch.with_obstacles([build_box(2.5, 2.5, 10.0, 1.0)])[0], Selection.of(a, 1)
     )
     assert cut.selection
-    # from a plate, a smaller one cuts a hole
+    # A smaller shape cuts a hole into a larger one.
     sketch, keys = Sketch().with_obstacles([build_box(0.0, 0.0, 4.0, 4.0), CircleObstacle((2.0, 2.0), 1.0)])
     (item,) = boolean.subtract(sketch, Selection.of(*keys)).sketch.obstacles
     assert len(item.shape.holes) == 1
@@ -173,7 +173,7 @@ def test_an_offset_has_the_given_distance(shape, by):
     after = unite_shapes(change.sketch)
     if by > 0:
         assert after.buffer(2e-3).covers(before.buffer(by * 0.99))
-        # sharp corners are cut off half as far again, which leaves two farther out; holes may close
+        # Sharp corners are beveled, which leaves vertices at up to twice the distance; holes may close.
         outline = shapely.Polygon(before.exterior)
         assert outline.buffer(2.0 * by + 2e-3).covers(after)
     else:
@@ -232,7 +232,7 @@ def test_walls_and_circles_become_polygons_of_the_same_area(sketch):
 
 
 def test_outlines_are_valid_on_their_grid():
-    # a spike thinner than the grid, a crumb, and a hole no wider than a millimeter
+    # Examples: a spike thinner than the grid, a tiny piece, and a hole of at most a millimeter.
     spike = shapely.Polygon([(0, 0), (1, 0), (1, 0.5), (1.3, 0.50001), (1, 0.50002), (1, 1), (0, 1)])
     (shape,) = extract_polygons(spike)
     assert shape.polygon.is_valid

@@ -32,7 +32,7 @@ def test_copied_objects_can_be_pasted(sketch):
     assert after.starts == sketch.starts
     assert after.boundary == sketch.boundary
     assert change.selection == Selection.select_all(after)
-    # between windows: the same text says the same of what was pasted
+    # A copy of the pasted obstacles has the same content as the original text.
     assert json.loads(copy_selection(after, change.selection))["obstacles"] == json.loads(text)["obstacles"]
 
 

@@ -62,7 +62,7 @@ def test_an_invalid_density_is_reported_with_its_path():
     text = json.dumps(to_json(Environment("heavy", RING)) | {"density": {"kind": "gausians"}})
     with pytest.raises(MapError, match=r"density\.kind"):
         parse_sketch(text, "mine.json")
-    # a draft without a boundary may have one all the same
+    # A draft without a boundary may have a density.
     document = to_json(Environment("heavy", RING, density=ONE))
     del document["boundary"]
     assert build_sketch(document).density == ONE
@@ -166,12 +166,12 @@ def test_hot_spots_are_edited_by_mouse_and_keyboard(tmp_path):
         driver.type("6.5")
         driver.press_key("return")
         assert density_edits.list_features(driver.sketch)[0].weight == 6.5
-        # the rim
+        # Dragging the rim changes the size.
         rim = driver.find_pixel((peak.center[0], peak.center[1] + peak.sigma))
         driver.wait()
         driver.drag(rim, *(driver.find_pixel((peak.center[0], peak.center[1] + away)) for away in (2.5, 3.0)))
         assert density_edits.list_features(driver.sketch)[0].sigma == pytest.approx(3.0, abs=0.1)
-        # the middle
+        # Dragging the middle moves the hot spot.
         driver.wait()
         driver.drag(*(driver.find_pixel(point) for point in (peak.center, (4, 4), (6, 5))))
         assert density_edits.list_features(driver.sketch)[0].center == pytest.approx((6.0, 5.0), abs=0.06)

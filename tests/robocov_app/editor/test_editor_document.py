@@ -273,7 +273,7 @@ def test_valid_shapes_keep_their_geometry():
 
 
 def test_shapes_beyond_the_limits_of_maps_cover_nothing():
-    # a circle of 1e12 m would be a polygon of millions of sides
+    # A circle with a radius of 1e12 m would be a polygon with millions of sides.
     for shape in (
         CircleObstacle((1.0, 1.0), 1e12),
         CircleObstacle((1e9, 1.0), 1.0),

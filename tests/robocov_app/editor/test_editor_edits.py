@@ -182,7 +182,7 @@ def test_circles_walls_and_starts_turn_too(sketch):
     assert change.sketch.get_start("two") == PointsStart(((-1.0, 9.0), (-1.0, 10.0)))
     assert change.sketch.get_start("all") == UniformStart()
     assert change.sketch.boundary == ((0.0, 0.0), (0.0, 12.0), (-8.0, 12.0), (-8.0, 0.0))
-    # about its middle by default
+    # By default, the center of rotation is the middle of the object.
     assert transform.rotate(sketch, Selection.of(0), 90.0).sketch.get_item(0).shape.vertices == (
         (2.5, 0.5),
         (2.5, 2.5),
@@ -218,7 +218,7 @@ def test_resizing_gives_the_typed_size(shape, width, height):
         try:
             change = transform.resize(sketch, Selection.of(key), *size)
         except MapError as error:
-            # a level wall is as high as it is wide
+            # The height of a horizontal wall is its width.
             assert isinstance(shape, WallObstacle)
             assert "walls keep their width" in str(error)
             continue
@@ -307,7 +307,7 @@ def test_objects_are_renamed_and_annotated(sketch):
     titled = properties.set_title(sketch, "Office").sketch
     change = properties.set_description(titled, "One floor.")
     assert (change.sketch.name, change.sketch.description) == ("Office", "One floor.")
-    # halves of characters, which no file could hold, do not come in
+    # Lone surrogates, which files cannot contain, are removed.
     assert properties.rename(sketch, 0, "a\ud800b").sketch.get_item(0).shape.name == "ab"
 
 

@@ -302,7 +302,7 @@ def test_abandoned_drafts_are_offered_and_recovered(folders: Path) -> None:
         assert isinstance(get_dialog_title, Question) and "Recover" in get_dialog_title.title
         EditorDriver(window).press_key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.history.has_unsaved_changes
-    # the window went without a decision: it is offered again
+    # The window was closed without a decision, so the draft is offered again.
     with open_launched_editor(folders) as window:
         assert window.editor.dialogs.current is not None
         EditorDriver(window).press_key("l")

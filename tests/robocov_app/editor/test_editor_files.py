@@ -41,7 +41,7 @@ def test_an_existing_file_is_not_overwritten_without_permission(tmp_path):
     assert path.read_text() == "precious"
     disk = write_sketch(SKETCH, path, overwrites=True)
     assert write_sketch(SKETCH, path, disk).digest == disk.digest
-    # known of, but by another name
+    # The known state of one file does not allow overwriting another file.
     (tmp_path / "other.json").write_text("precious")
     with pytest.raises(FileChangedError):
         write_sketch(SKETCH, tmp_path / "other.json", disk)

@@ -152,7 +152,7 @@ def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) 
         x = round(pixel_x)
         y = round(pixel_y)
         assert np.abs(after - before)[y + 10 : y + 45, x + 10 : x + 100].max() > 60
-        # guides: an angle of 90° from the last corner
+        # The guides include an angle of 90° at the last corner.
         assert any(guide.kind == "angle" for guide in driver.editor.tool.guides)
 
 

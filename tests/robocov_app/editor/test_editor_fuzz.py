@@ -203,7 +203,7 @@ def play_events(name: str, seed: int, tmp_path: Path, events: int) -> None:
                 sketch = driver.sketch
                 assert parse_sketch(dump_sketch(sketch), "map") == renumber(sketch)
                 assert driver.editor.selection.restrict_to(sketch) == driver.editor.selection
-        # and back to the beginning, exactly
+        # Undoing everything leads exactly to the first state.
         pygame.event.clear()
         if driver.window.play_mode.window is not None:
             driver.window.play_mode.window.returns_to_editor = True

@@ -169,11 +169,11 @@ def test_a_click_on_the_preview_changes_a_color_and_the_preview(driver: EditorDr
     driver.click(*before.tolist())
     import_dialog, widgets = get_dialog(driver)
     assert import_dialog.form.texts == {"free_color": "#e0e0ff"}
-    # the rows of colors are in sight, and do not move the maps
+    # The rows of colors are visible and do not move the maps.
     chip = widgets["button:color:#e0e0ff"]
     assert chip.text.strip() == "free"
     assert get_pixel(driver, import_dialog.preview.cameras[1].to_pixels(np.array(RUG))) != solid
-    # a click into the right map still keeps a part
+    # A click on the right map still keeps a part.
     driver.click(*import_dialog.preview.cameras[1].to_pixels(np.array((8.0, 1.0))).tolist())
     import_dialog, _ = get_dialog(driver)
     assert [float(word) for word in import_dialog.form.texts["inside"].split()] == pytest.approx(

@@ -102,7 +102,7 @@ def wait_for_import(dialog: ImportDialog) -> None:
 
 @pytest.mark.slow
 def test_the_newest_settings_win_in_another_process(plan: Path) -> None:
-    # every older import is given up
+    # Without patience, each older import is canceled.
     worker: Any = LatestWorker(
         "robocov_app.editor.ui.importing.service:ImportService", "imports", patience=0.0
     )

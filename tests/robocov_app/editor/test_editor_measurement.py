@@ -61,7 +61,7 @@ def test_reach_agrees_with_a_raster(sketch, radius):
     assert len(reached) >= (sizes * cell**2 > 4 * cell).sum() - 1
     assert free.buffer(1e-6).covers(opened)
     assert (untouched - free).area < 1e-6
-    # no robot touches what it never touches
+    # The opened space hardly overlaps the space that robots never touch.
     assert shapely.intersection(opened, untouched).area < 1e-3 * perimeter
     # The remainder is small: none of its points is farther from the swept space than the radius.
     crumbs = free - opened - untouched.buffer(2e-3)
@@ -86,7 +86,7 @@ def test_robots_pass_doors_wider_than_they_are(width, radius, passes):
         assert result.cut_off.is_empty
         assert words == []
     else:
-        # the door is marked, and nothing else; one of the two rooms is cut off
+        # Only the door is marked, and one of the two rooms is cut off.
         (mark,) = result.impassable.geoms
         assert mark.distance(shapely.Point(6.0, 4.0)) == 0.0
         assert math.pi * (width / 2) ** 2 * 0.99 <= mark.area <= width * (0.2 + 2 * radius)
@@ -110,7 +110,7 @@ def test_one_of_three_doors_is_too_narrow():
 
 
 def test_a_passage_that_returns_to_the_same_room_is_marked():
-    # two blocks 0.3 m apart in the middle of the hall: the way round is open
+    # Two blocks 0.3 m apart in the middle of the hall; a robot can drive around them.
     blocks = [
         PolygonObstacle(((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0))),
         PolygonObstacle(((5.3, 3.0), (7.3, 3.0), (7.3, 5.0), (5.3, 5.0))),
@@ -118,9 +118,9 @@ def test_a_passage_that_returns_to_the_same_room_is_marked():
     result = measure(Sketch(boundary=HALL).with_obstacles(blocks)[0], 0.2)
     assert len(result.reached) == 1
     (mark,) = result.impassable.geoms
-    # the slot, and half a disc at either end
+    # The mark consists of the slot and half a disc at each end.
     assert mark.area == pytest.approx(0.3 * 2.0 + math.pi * 0.15**2, abs=0.01)
-    # no more than a crack is taken for touching
+    # Blocks with a gap of 1.5 mm count as touching.
     closed = [blocks[0], PolygonObstacle(((5.0015, 3.0), (7.3, 3.0), (7.3, 5.0), (5.0015, 5.0)))]
     result = measure(Sketch(boundary=HALL).with_obstacles(closed)[0], 0.2)
     assert result.impassable.is_empty

@@ -37,7 +37,7 @@ def test_the_first_waypoint_starts_a_path_at_the_center() -> None:
     change = paths.add_waypoint(sketch, 0, (1.0, 3.00004), speed=0.3)
     assert get_path(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
     assert change.selection == Selection.of(0)
-    # where it is drawn it stays
+    # At time 0, the obstacle is where it was drawn.
     assert change.sketch.build_environment().at(0.0).obstacles[0].polygon.equals(DESK.polygon)
     more = paths.add_waypoint(change.sketch, 0, (1.0, 1.0)).sketch
     between = paths.add_waypoint(more, 0, (3.0, 6.0), 1).sketch
@@ -88,7 +88,7 @@ def test_the_nearest_waypoint_and_leg_are_found() -> None:
     assert paths.find_waypoint(ROUND, (8.1, 2.1), 0.2) == 1
     assert paths.find_waypoint(ROUND, (5.0, 2.0), 0.2) is None
     assert paths.find_leg(ROUND, (5.0, 2.1), 0.2) == 1
-    # the leg back to the first waypoint is one of loops only
+    # Only loops have a leg back to the first waypoint.
     assert paths.find_leg(ROUND, (5.0, 4.0), 0.2) == 3
     assert paths.find_leg(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
 
@@ -150,7 +150,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         driver.click_all((6.0, 2.0), (6.0, 5.0))
         points = np.array(get_path(driver.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
-        # a click on a leg puts a waypoint into it
+        # A click on a leg inserts a waypoint.
         driver.click_all((4.0, 2.0))
         assert len(get_path(driver.sketch).points) == 4
         np.testing.assert_allclose(get_path(driver.sketch).points[1], (4.0, 2.0), atol=0.03)

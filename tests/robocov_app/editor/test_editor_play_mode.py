@@ -47,7 +47,7 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
         driver.window.run_frame(0.0)
         arena = np.s_[40:500, :500]
         apart = np.abs(driver.copy_frame() - picture)[arena].max(axis=2)
-        assert (apart > 40).mean() < 0.05  # but for the message, as it was
+        assert (apart > 40).mean() < 0.05  # only the message differs
         driver.press_key("ctrl+z")
         assert len(driver.shapes) == 1
 

@@ -51,7 +51,7 @@ def test_a_click_finds_the_topmost_obstacle(sketch):
     assert find_owner_at(sketch, (4.0, 4.0), 0.1) == 1
     assert find_owners(sketch, (4.0, 4.0), 0.1) == (1, 0)
     assert find_owner_at(sketch, (1.2, 1.2), 0.1) == 0
-    # through a hole there is nothing, but near its edge there is
+    # A click in a hole finds nothing, but a click near its edge finds the obstacle.
     assert find_owner_at(sketch, (2.7, 2.3), 0.05) is None
     assert find_owner_at(sketch, (2.7, 2.05), 0.1) == 0
 
@@ -119,7 +119,7 @@ def test_boxes_select_objects(sketch):
     assert everything == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}), boundary=True)
     touched = find_in_box(sketch, (4.9, 0.5), (8.5, 6.5), includes_partial=True)
     assert touched == Selection(frozenset({0, 1, 2}), starts=frozenset({"disc", "two"}))
-    # a disc that the corner of the box does not reach
+    # The corner of the box does not reach the disc.
     assert not find_in_box(sketch, (5.3, 2.8), (6.0, 3.0), includes_partial=True).starts
     assert find_in_box(Sketch(), (0.0, 0.0), (1.0, 1.0), includes_partial=True) == Selection()
     corners = find_vertices_in_box(sketch, (0.0, 0.0), (2.5, 2.5), [0, BOUNDARY, 2])

@@ -87,7 +87,7 @@ def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
         at = build_view(center, theme=theme)
         page = copy_page(kept.draw(at, sketch, lifted), at)
         anew = copy_page(Sheet().draw(at, sketch, lifted), at)
-        # a smooth line that is cut by a patch's edge may differ by a shade in its pixels there
+        # At the edge of a patch, the pixels of an antialiased line may differ slightly.
         apart = np.abs(page.astype(int) - anew.astype(int)).max(axis=2)
         assert (apart > 40).sum() <= 6, (kind, x, y)
 

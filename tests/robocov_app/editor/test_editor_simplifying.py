@@ -39,13 +39,13 @@ def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
     assert after.polygon.is_valid
     outline = after.polygon.exterior
     assert max(outline.distance(shapely.Point(point)) for point in ring) <= tolerance + 1e-9
-    # in the order in which they were, none moved
+    # The remaining vertices have the same positions and the same order.
     places = [ring.index(point) for point in after.vertices]
     assert places == sorted(places)
 
 
 def test_holes_do_not_cross_their_outline():
-    # a thin frame: a coarse tolerance would let the hole stick out
+    # In a thin frame, the hole would protrude with a coarse tolerance.
     outer = build_wobbly_ring(120, 0, 3.0, 0.0)
     inner = build_wobbly_ring(120, 1, 2.9, 0.0)
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(outer, (inner,))])
@@ -82,7 +82,7 @@ def test_traced_plans_become_straight():
     assert change.description == "1 outline straightened"
     with pytest.raises(MapError, match="no edge to straighten"):
         straighten(change.sketch, Selection.of(key))
-    # several edges in a row come to lie on one line, slanted ones stay
+    # Several edges in a row are moved onto one line; slanted ones stay.
     wall = WallObstacle(((0.0, 0.0), (2.0, 0.04), (4.0, 0.0), (6.0, 2.0), (6.02, 5.0)), 0.1)
     sketch, (key,) = Sketch().with_obstacles([wall])
     assert straighten(sketch, Selection.of(key)).sketch.get_item(key).shape.points == (

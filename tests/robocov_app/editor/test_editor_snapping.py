@@ -64,7 +64,7 @@ def test_a_snap_stays_within_reach_and_has_a_guide(sketch, point, reach, grid, k
     else:
         assert math.dist(moved.point, (0.3, -0.2)) <= reach
     if len(kinds) == 1 and snap.guides:
-        # what has snapped stays where it is
+        # A point that has snapped snaps to itself.
         assert math.dist(snap_point(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7
 
 
@@ -102,7 +102,7 @@ def test_the_nearest_vertex_wins(sketch, point, reach):
         ((2.21, 1.07), ("edge", "grid"), (2.2, 1.0), "edge"),
         ((9.23, 6.58), ("grid",), (9.2, 6.6), "grid"),
         ((7.54, 5.04), ("vertex",), (7.54, 5.04), "vertex"),
-        # in line with a corner of the box, and with another
+        # Alignment with corners of the box.
         ((4.06, 6.5), ("aligned",), (4.0, 6.5), "in line"),
         ((4.06, 6.5), ("aligned", "grid"), (4.0, 6.5), "in line"),
         ((11.0, 3.04), ("aligned",), (11.0, 3.0), "in line"),
@@ -115,12 +115,12 @@ def test_nearby_targets_are_snapped_to(targets, point, kinds, snapped_point, wor
 
 
 def test_crossings_of_lines_win_over_single_lines(targets):
-    # in line with the pillar's rim at the right, and with the top of the box
+    # The point is aligned with the right end of the pillar and with the top of the box.
     snap = snap_point((7.5, 3.05), targets, build_settings("aligned", "grid"))
     assert snap.point == pytest.approx((7.54, 3.0))
     assert [guide.kind for guide in snap.guides] == ["aligned", "aligned"]
     assert {guide.line[0] for guide in snap.guides} == {(4.0, 3.0), (7.54, 5.04)}
-    # an angle from the point before, up to an edge
+    # A ray from the previous point ends at an edge.
     snap = snap_point((2.02, 1.04), targets, build_settings("angle", "edge"), origin=(1.0, 0.0))
     assert snap.point == pytest.approx((2.0, 1.0))
     assert {guide.label for guide in snap.guides} == {"45°", "edge"}
@@ -142,14 +142,14 @@ def test_angles_and_grid_are_combined(targets):
     assert snap.guides[0].label == "0°"
     snap = snap_point((9.02, 1.05), targets, replace(build_settings("angle", "grid"), grid=0.25), origin)
     assert snap.point == pytest.approx((9.0, 1.0))
-    # along a slanted ray the length is a multiple of the grid
+    # Along a slanted ray, the length is a multiple of the grid.
     snap = snap_point((8.72, 1.71), targets, replace(build_settings("angle", "grid"), grid=0.5), origin)
     assert math.dist(snap.point, origin) == pytest.approx(1.0)
     assert snap.guides[0].label == "45°"
-    # upwards and to the left
+    # To the left, and downward.
     assert snap_point((7.0, 1.02), targets, build_settings("angle"), origin).guides[0].label == "180°"
     assert snap_point((8.02, 0.0), targets, build_settings("angle"), origin).guides[0].label == "270°"
-    # too near to tell
+    # At points near the origin, the angle is undefined.
     assert snap_point((8.05, 1.05), targets, build_settings("angle"), origin).guides == ()
 
 
@@ -178,7 +178,7 @@ def test_dragged_objects_are_no_targets():
     one = collect_snap_targets(sketch, without=[Vertex(key, 0, 0)])
     assert snap_point(near, one, build_settings("vertex", "edge", "midpoint")).guides == ()
     assert snap_point((4.02, 2.97), one, build_settings("vertex")).point == (4.0, 3.0)
-    # its edges go with it, the others stay
+    # The edges of the ignored vertex are ignored too, but not the other edges.
     assert snap_point((2.2, 1.02), one, build_settings("edge", "midpoint")).guides == ()
     assert snap_point((2.2, 2.98), one, build_settings("edge")).point == pytest.approx((2.2, 3.0))
     # The same holds for the positions of a start.
@@ -211,11 +211,11 @@ def test_faces_of_walls_and_rims_of_circles_are_targets():
 
 def test_a_move_snaps_by_its_nearest_point(targets):
     corners = [(10.0, 6.0), (11.0, 6.0), (11.0, 7.0), (10.0, 7.0)]
-    # the lower left corner comes near the upper right one of the box
+    # The lower left corner comes near the upper right corner of the box.
     snap = snap_move(corners, -5.96, -2.95, targets, build_settings("vertex"))
     assert snap.point == pytest.approx((-6.0, -3.0))
     assert snap.guides[0].line == ((4.0, 3.0),)
-    # the grid is for the first point
+    # Only the first point snaps to the grid.
     snap = snap_move(corners, -0.52, 0.03, targets, build_settings("grid"))
     assert snap.point == pytest.approx((-0.5, 0.0))
     assert snap_move(corners, 0.3, 0.2, targets, build_settings()).point == (0.3, 0.2)

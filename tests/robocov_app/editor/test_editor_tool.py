@@ -30,7 +30,7 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
     if distance(origin, to) > 1e-3:
         angle = np.degrees(np.arctan2(to[1] - origin[1], to[0] - origin[0]))
         assert abs(angle / SHIFT_ANGLE_DEG - round(angle / SHIFT_ANGLE_DEG)) < 1e-3
-    # no other line at a round angle comes nearer
+    # No other ray at a multiple of the angle is nearer.
     directions = np.radians(np.arange(0, 180, SHIFT_ANGLE_DEG))
     across = np.abs(
         (point[0] - origin[0]) * np.sin(directions) - (point[1] - origin[1]) * np.cos(directions)

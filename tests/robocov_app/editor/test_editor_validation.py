@@ -233,7 +233,7 @@ def test_a_broken_object_does_not_hide_other_problems():
         "polygon 1: its outline crosses or touches itself at (2, 2)",
         "wall 3: it has no length: it needs two different points",
         "start “a”: position 1 at (6, 6) is inside circle 2",
-        # of the bow tie's two halves, one place lies in one; the other is free
+        # One position is inside a half of the bow tie; the other one is free.
         "start “b”: position 1 at (1.5, 2) is inside polygon 1",
     ]
 
@@ -249,7 +249,7 @@ def test_possible_mistakes_are_warnings():
     assert list_warnings(build_hall(CircleObstacle((20.0, 3.0), 1.0, "lamp"))) == [
         "circle “lamp” lies outside the boundary"
     ]
-    # one that only touches from outside does nothing either
+    # An obstacle that only touches the boundary from outside has no effect either.
     beside = PolygonObstacle(((12.0, 1.0), (13.0, 1.0), (13.0, 2.0)))
     assert list_warnings(build_hall(beside)) == ["polygon 1 lies outside the boundary"]
     twice = CircleObstacle((5.0, 5.0), 1.0, "a")

@@ -204,7 +204,7 @@ def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, len
     assert len(points) == 4
     np.testing.assert_allclose(points[1], (length, 0.0), atol=1e-4)
     np.testing.assert_allclose(points[-2], (length * math.cos(angle), length * math.sin(angle)), atol=1e-4)
-    # the circle that touches both edges there: its center lies on the bisector
+    # The circle touches both edges there, so its center is on the bisector.
     radius = length * math.tan(angle / 2)
     center = np.array([length, radius])
     rounded = vertices.round_corners(sketch, select_vertices(Vertex(key, 0, 1)), radius)
@@ -222,7 +222,7 @@ def test_corners_of_rings_are_cut_all_at_once(sketch):
     assert shape.polygon.is_valid
     assert shape.polygon.area == pytest.approx(16.0 - 4 * 0.125 - (1.0 - 4 * 0.125))
     assert len(shape.vertices) == 8
-    # cuts that meet in the middle of an edge leave one vertex there
+    # Cuts that meet in the middle of an edge share one vertex.
     assert len(shape.holes[0]) == 4
     bounded = vertices.bevel_corners(sketch, select_vertices(Vertex(BOUNDARY, 0, 0)), 1.0).sketch.boundary
     assert bounded == ((0.0, 1.0), (1.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))

@@ -469,7 +469,7 @@ def test_an_idle_window_is_not_redrawn(tmp_path: Path, monkeypatch: pytest.Monke
         drawn.clear()
         driver.run_frames(1)
         assert drawn
-        driver.press_key("ctrl+k")  # what is asked does not move by itself
+        driver.press_key("ctrl+k")  # an open dialog needs no frames
         driver.run_frames(320)
         drawn.clear()
         driver.run_frames(20)

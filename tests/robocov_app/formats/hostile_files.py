@@ -26,7 +26,7 @@ def main(paths: list[str]) -> None:
     from robocov.errors import RobocovError
     from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, files
 
-    importlib.import_module("pyproj")  # what imports need is the fault of no file
+    importlib.import_module("pyproj")  # imported in advance: its memory does not count for files
     importlib.import_module("ezdxf")
     for suffix in ("svg", "wkt"):
         warm = Path(paths[0]).with_name(f"warm.{suffix}")

@@ -42,7 +42,7 @@ def test_bodies_have_the_positions_of_the_file(tmp_path: Path) -> None:
         + '<light id="l" position="0,0,1"/>'
     )
     foreign = read(tmp_path, body)
-    # turned counter-clockwise, y up
+    # Rotations are counter-clockwise, with y up.
     turned = affinity.rotate(box(1.5, -1.25, 2.5, -0.75), 30, origin="center")
     solid = [box(0, 0.75, 2, 1.25), turned, CircleObstacle((-1.0, -1.0), 0.3).polygon]
     assert foreign.free.symmetric_difference(ARENA - shapely.union_all(solid)).area < 1e-5
@@ -76,7 +76,7 @@ def test_grids_are_read_and_random_distributions_counted(tmp_path: Path) -> None
         distribute(GRID, 3, POST) + distribute(CHANCE, 30, POST) + distribute(CHANCE, 7, '<e-puck id="e"/>')
     )
     foreign = read(tmp_path, body)
-    # as ARGoS counts: from the far corner on, x first
+    # ARGoS counts from the far corner, along x first.
     posts = [box(x - 0.25, y - 0.25, x + 0.25, y + 0.25) for x, y in ((2, 0.5), (0, 0.5), (2, -0.5))]
     assert foreign.free.equals(ARENA - shapely.union_all(posts))
     assert foreign.dropped == (
@@ -134,7 +134,7 @@ def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
 
 
 def test_the_room_with_the_robots_is_kept(tmp_path: Path) -> None:
-    # walls within the arena, as in most experiments: around them is more room than in them
+    # As in most experiments, the walls are inside the arena, with more free space outside than inside.
     walls = [WALL.format(k, 2.1, 0.1, 0, y, 0) for k, y in enumerate((-1, 1))]
     walls += [WALL.format(k, 0.1, 2.1, x, 0, 0) for k, x in enumerate((-1, 1))]
     path = write_arena(tmp_path, "".join(walls) + ROBOT.format(0.25, 0.5), '"3,3,1"')

@@ -32,7 +32,7 @@ MADE = sorted(STRUCTURES.keys() & IMPORTERS.keys())
 def require_clean(environment: Environment, report: ImportReport) -> None:
     warnings = check_map(environment).warnings
     assert not [each for each in warnings if "same place" in each or "pocket" in each]
-    # a circle may be drawn with another number of sides
+    # A circle may be approximated by a different number of sides.
     assert report.moved <= report.tolerance + GRID + MAX_SAGITTA_M
 
 
@@ -181,7 +181,7 @@ def test_a_thin_wall_with_a_door_is_not_a_gap() -> None:
     closed = close_gaps([*rooms, door], 0.01)
     assert closed.number == 0
     assert closed.area.area == pytest.approx(25 + 4.995 * 5 + 0.005)
-    # no wall of a map is thinner than a millimeter
+    # Walls of maps are at least a millimeter thick.
     assert close_gaps([rooms[0], box(5.0005, 0, 10, 5), door], 0.01).number == 1
 
 
@@ -222,7 +222,7 @@ def test_hairs_are_removed_and_counted(tmp_path: Path) -> None:
 def test_the_deviation_is_measured_along_edges_too() -> None:
     room = MultiPolygon([box(0, 0, 10, 5)])
     assert measure_deviation(room, MultiPolygon([box(0, 0, 10, 5.25)])).distance == pytest.approx(0.25)
-    # every corner of one is near the other, the middle of a long wall is not
+    # Every corner of one is near the other, but the middle of a long wall is not.
     niche = box(0, 0, 10, 5) | box(0.1, 5, 9.9, 8)
     assert measure_deviation(room, MultiPolygon([niche])).distance == pytest.approx(3.0, abs=0.01)
 

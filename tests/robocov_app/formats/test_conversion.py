@@ -52,7 +52,7 @@ def test_inside_keeps_the_part_around_a_position() -> None:
     track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
     whole = build_foreign_map(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21), has_named_boundary=True)
     environment, report = build_environment(whole, Shaping(inside=(21.0, 1.0)), "plan")
-    # the boundary is around all of the file, and not around this part
+    # The boundary of the file surrounds everything, not only this part.
     assert environment.boundary_polygon.equals(CLOSET)
     edge, note = report.notes
     assert edge == "the boundary is the inner edge of the walls around the free space"
@@ -166,11 +166,11 @@ def test_walls_replace_a_boundary_behind_them() -> None:
     environment, report = build_environment(build_foreign_map(ROOM, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(box(0, 0, 10, 8))
     assert report.notes == ("the boundary is the inner edge of the walls around the free space",)
-    # it stays as far as the free space reaches it
+    # A boundary that the free space reaches is kept.
     door = ROOM | box(4, 7, 6, 9)
     environment, report = build_environment(build_foreign_map(door, boundary=outer), Shaping(), "plan")
     assert environment.boundary_polygon.equals(outer)
-    # and where several parts stay, walls are among them
+    # A boundary is also kept if several parts stay, because there are walls between them.
     environment, _ = build_environment(
         build_foreign_map(ROOM, CLOSET, boundary=box(-1, -1, 24, 9)), Shaping(keep="all"), "plan"
     )
@@ -178,7 +178,7 @@ def test_walls_replace_a_boundary_behind_them() -> None:
 
 
 def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
-    # the free space runs along the boundary, and walls of both are straightened a bit differently
+    # The free space extends along the boundary, and the walls of both are straightened differently.
     wavy = [(x / 10, 0.008 * math.sin(x)) for x in range(101)]
     outer = Polygon([*wavy, (10, 8), (0, 8)])
     room = outer - box(3, -1, 4, 2) - box(5, 5, 6, 6)
@@ -332,7 +332,7 @@ def test_boundary_and_obstacles_preserve_the_free_space(
 
 
 def test_the_deviation_of_walls_is_measured() -> None:
-    # a bump of 15 mm goes: a triangle of 30 cm² changes sides
+    # A bump of 15 mm is removed: a triangle of 30 cm² becomes solid.
     bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
     _, report = build_environment(build_foreign_map(bumpy), Shaping(), "plan")
     assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))

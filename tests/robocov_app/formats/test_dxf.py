@@ -150,7 +150,7 @@ def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
     chord = math.dist(a, b)
     if chord == 0.0 or abs(bulge) < 1e-3:
         return
-    # its height over the chord is the bulge times half the chord, to the right where it is positive
+    # The height of the arc over its chord is the bulge times half the chord, to the right if positive.
     x, y = a
     u, v = b
     height = ((points[:, 0] - x) * (v - y) - (points[:, 1] - y) * (u - x)) / chord
@@ -276,7 +276,7 @@ def test_units_are_converted(tmp_path: Path, unit: int) -> None:
     foreign = read_drawing(tmp_path, draw, unit=unit, hall=False)
     assert foreign.free.area == pytest.approx(50.0)
     assert foreign.notes[0] == f"in {UNITS[unit][0]}"
-    if unit not in (9, 21):  # which ezdxf does not convert
+    if unit not in (9, 21):  # ezdxf does not convert these units
         assert ezdxf.units.conversion_factor(ezdxf.units.InsertUnits(unit), ezdxf.units.M) == pytest.approx(
             scale
         )

@@ -177,7 +177,7 @@ def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFacto
     except MapError as error:
         assert "without an area" in str(error)
         return
-    # on a grid: without one GEOS may lose parts
+    # A grid is needed, because without it GEOS may lose parts.
     valid = shapely.make_valid(polygons, method="structure", keep_collapsed=False)
     expected = shapely.union_all(valid, grid_size=1e-7)
     length = max(sum(polygon.length for polygon in polygons), 1.0)

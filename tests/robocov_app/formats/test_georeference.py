@@ -39,14 +39,14 @@ def project_points(
 def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, places: Any) -> None:
     narrow = max(np.cos(np.radians(latitude)), 0.05)
     degrees = np.array([(longitude + 0.02 / narrow * x, latitude + 0.02 * y) for x, y in places])
-    degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # across the antimeridian as well
+    degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # also across the antimeridian
     meters, (note,) = project_points(degrees, may_be_degrees=True)
     assert note.startswith("degrees projected to meters about longitude")
     azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
     step = np.diff(meters, axis=0)
     # PROJ puts points that are about a millimeter from the origin onto it.
     assert np.hypot(*step.T) == pytest.approx(length, rel=1e-6, abs=2e-3)
-    # north is up in the middle; elsewhere meridians lean to the pole
+    # North is up in the middle; elsewhere, meridians are inclined toward the pole.
     long = np.asarray(length) > 1.0
     lean = (np.degrees(np.arctan2(*step.T)) - azimuth + 180.0) % 360.0 - 180.0
     assert (np.abs(lean[long]) < 0.06 / narrow).all()
@@ -59,7 +59,7 @@ def test_wide_coordinates_are_meters() -> None:
     assert project_points([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
     assert project_points([[0, 0], [20, 10]])[1] == []
     assert project_points([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
-    # ten kilometers are more degrees near the pole
+    # Near the pole, ten kilometers are more degrees of longitude.
     assert "degrees projected" in project_points([[10, 85], [10.9, 85.05]], may_be_degrees=True)[1][0]
     assert (
         "degrees projected" in project_points([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]

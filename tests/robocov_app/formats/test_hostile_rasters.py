@@ -95,7 +95,7 @@ CHESS_BOARD = 255 * (np.indices((2500, 2500)).sum(axis=0) % 2)
 GRID = b"type octile\nheight %d\nwidth %d\nmap\n"
 
 HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
-    # name: (file, content, options, what it says)
+    # Name: (file, content, options, part of the message).
     "pixels of a bomb": ("a.png", lambda: encode_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
     "GBs of pixels": ("a.png", lambda: encode_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
     "more than it says": ("a.png", lambda: encode_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),

@@ -18,7 +18,7 @@ from robocov_app.formats import Shaping, detect_format, import_map
 from robocov_app.formats.geometry.cells.corners import sharpen_corners
 from robocov_app.formats.reports import ImportReport
 
-# two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans
+# Two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m; as in real plans, corners are cut by 1 cm.
 PLAN = [
     [0.01, 0], [4, 0], [4, 0.99], [4.01, 1], [4.09, 1], [4.1, 0.99], [4.1, 0], [8.1, 0], [8.1, 3], [4.1, 3],
     [4.1, 1.91], [4.09, 1.9], [4.01, 1.9], [4, 1.91], [4, 3], [0, 3], [0, 0.01],
@@ -79,7 +79,7 @@ def test_a_closed_ring_with_repeated_vertices_is_read(tmp_path: Path) -> None:
 
 
 def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
-    # a bow tie of 8 m² and 2 m²
+    # A bow tie of 8 m² and 2 m².
     verts = [[0, 0], [0, 4], [6, -2], [6, 0]]
     environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert environment.area == pytest.approx(8.0)
@@ -90,7 +90,7 @@ def test_a_self_crossing_ring_is_repaired(tmp_path: Path) -> None:
 
 
 def test_a_ring_around_a_block_gives_an_obstacle(tmp_path: Path) -> None:
-    # the outline runs in to a block, round it, and out again the same way
+    # The outline leads to a block, around it, and back along the same line.
     verts = [[0, 0], [6, 0], [6, 6], [0, 6], [0, 3], [2, 3], [2, 4], [4, 4], [4, 2], [2, 2], [2, 3], [0, 3]]
     environment, report = import_plan(write(tmp_path, build_plan(verts)))
     assert environment.free_area == pytest.approx(36 - 4)
@@ -141,7 +141,7 @@ def test_only_cut_corners_are_completed() -> None:
     cut = Polygon([(0, 0.02), (0.02, 0), (6, 0), (6, 3), (0, 3)])
     assert sharpen_corners(cut, 0.02).symmetric_difference(box(0, 0, 6, 3)).area < 1e-12
     assert sharpen_corners(cut, 0.0).equals(cut)
-    # a bevel of 10 cm is no cut corner, and lines that hardly turn meet nowhere in particular
+    # A bevel of 10 cm is not a cut corner, and nearly parallel lines have no clear intersection.
     bevel = Polygon([(0.1, 0), (6, 0), (6, 3), (0, 3), (0, 0.1)])
     assert sharpen_corners(bevel, 0.02).equals(bevel)
     bent = Polygon([(0, 0), (3, 0), (3.02, 0.001), (6, 0.2), (6, 3), (0, 3)])

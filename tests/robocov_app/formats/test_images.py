@@ -59,7 +59,7 @@ def test_pgm_of_8_and_16_bits_is_read(tmp_path: Path) -> None:
         np.testing.assert_allclose(shade(picture), GRAY / 255, atol=1e-5)
         assert picture.alpha is None
         assert is_picture(data)
-    # the blank after the largest value may be a byte that looks like a line end of the picture
+    # The first byte after the header may look like a line break.
     first = np.full((1, 3), 10, dtype=np.uint8)
     np.testing.assert_array_equal(read(tmp_path, b"P5 3 1 255\n" + first.tobytes()).level, first)
 
@@ -191,7 +191,7 @@ def test_tiff_of_16_bits_is_read(tmp_path: Path, kind: str, white_is_zero: bool)
     entries = b"".join(struct.pack(f"{order}HHII", tag, 4, 1, value) for tag, value in tags)
     head = (b"MM" if order == ">" else b"II") + struct.pack(f"{order}HI", 42, 16)
     data = head + pixels + struct.pack(f"{order}H", len(tags)) + entries + b"\0\0\0\0"
-    if order == ">" and white_is_zero:  # which Pillow does not know
+    if order == ">" and white_is_zero:  # Pillow does not support this combination
         with pytest.raises(
             MapError, match="expected a complete TIFF, got a broken one: cannot identify image file"
         ):

@@ -14,7 +14,7 @@ from shapely import Point, box
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import IMPORTERS, ReadOptions, detect_format, import_map
 
-# with the corners of the adjacent rooms
+# The outline includes the corners of the adjacent rooms.
 WALKWAY = [(0, 8), (30, 8), (30, 12), (20, 12), (10, 12), (0, 12)]
 PLANE = pyproj.Proj(proj="aeqd", lon_0=8.4, lat_0=49.0, ellps="WGS84")
 GROUND = "11111111-0000"
@@ -133,7 +133,7 @@ def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -
 
 def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:
     environment, report, _ = import_map(write_folder(tmp_path / "mill", build_venue()))
-    # the walls stand on the outlines, half of them in each room
+    # Walls are centered on the outlines, half of them in each room.
     walkway = 30 * 4 - 1
     rooms = 10 * 8 + 10 * 7.8 - 4
     assert environment.free_area == pytest.approx(walkway + rooms, abs=8)

@@ -17,8 +17,8 @@ def test_every_format_has_a_name_and_a_title() -> None:
         assert one.name == name
         assert one.title
         assert all(suffix.startswith(".") and suffix.islower() for suffix in one.suffixes)
-        # a YAML is of IR-SIM by its content only: what is missing in others, the reader of ROS says
-        # a file .env is of CoverageControl by its content only
+        # YAML files are recognized as IR-SIM only by their content; others are read as ROS maps.
+        # Files of CoverageControl are recognized only by their content.
         assert one.suffixes or one.name in ("irsim", "coverage-control")
         assert one.options <= known, name
         assert get_importer(name) is one

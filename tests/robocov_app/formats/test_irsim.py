@@ -133,11 +133,11 @@ obstacle:
 def test_a_picture_fills_the_world_for_any_cell_size(tmp_path: Path) -> None:
     (tmp_path / "grid.pgm").write_bytes(build_pgm(draw_pixels("#...\n....\n...#")))
     foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")
-    # cells of 2.5 x 2 m, the top row of the picture is the highest
+    # The cells are 2.5 x 2 m, and the first row of the image is at the top.
     assert foreign.free.equals(SPACE - box(-1, 6, 1.5, 8) - box(6.5, 2, 9, 4))
     assert foreign.cell == 2.5
     foreign = read(tmp_path, "  obstacle_map: {name: image, path: grid.pgm}\n  mdownsample: 2\n")
-    # rows count from the bottom: those left are ...# and #..., of every other column
+    # Rows are counted from the bottom: the rows ...# and #... are left, with every other column.
     assert foreign.free.equals(SPACE - box(-1, 5, 4, 8))
     obstacle = "  obstacle_map: grid.pgm\nobstacle:\n  - {shape: {name: rectangle}, state: [4, 5]}\n"
     assert read(tmp_path, obstacle).free.area == pytest.approx(60 - 10 - 1)
@@ -181,7 +181,7 @@ def test_invalid_values_are_reported_with_their_place(tmp_path: Path, text: str,
 
 
 def test_a_world_is_not_mistaken_for_a_map_of_ros(tmp_path: Path) -> None:
-    # a generated map has a resolution, and comments speak of images
+    # The generated map has a resolution, and a comment mentions an image.
     path = tmp_path / "world.yaml"
     path.write_text(WORLD + "  obstacle_map:\n    name: perlin # or an image: a.png\n    resolution: 0.1\n")
     assert detect_format(path) is IMPORTER

@@ -38,7 +38,7 @@ def test_characters_have_their_meaning(tmp_path: Path) -> None:
         "6 x 5 cells of 1 m: 30.0% free, 70.0% blocked",
     )
     assert read(tmp_path, GRID, trees="free").free.area == 10
-    # the water touches free cells at two corners, where obstacles touch too
+    # The water touches free cells at two corners, at which obstacles touch too.
     assert read(tmp_path, GRID, water="free").free.area == pytest.approx(10, abs=0.002)
     assert read(tmp_path, GRID, trees="free", water="free", cell=0.5).free.area == 11 / 4
     assert read(tmp_path, GRID, trees="obstacle").free.area == 9

@@ -352,7 +352,7 @@ def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
     assert corridor.contains(shapely.Point(5, 8)), "the north room has a door"
     assert not corridor.contains(shapely.Point(5, -3)), "the south room has none"
     assert not free.contains(shapely.Point(17, 2)), "stairs are solid"
-    # the door is as wide as it says
+    # The door has the width of its tag.
     assert corridor.contains(box(4.42, 3.9, 5.58, 4.1))
     assert not free.intersects(box(1, 3.98, 4.38, 4.02)) and not free.intersects(box(5.62, 3.98, 9, 4.02))
     assert "level 0 of 0, 1, 2 (--level)" in foreign.notes

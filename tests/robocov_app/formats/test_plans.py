@@ -87,7 +87,7 @@ def test_thin_strokes_are_dropped_and_walls_keep_their_corners(tmp_path: Path) -
     assert dropped.startswith("strokes thinner than 0.2 m (2 px) in ")
     assert dropped.endswith("(--min-stroke)")
     assert import_picture(tmp_path, picture, min_stroke="0.2")[0] == area
-    # the wall of two pixels is thinner than 3 px
+    # The wall of two pixels is thinner than 3 px.
     assert import_picture(tmp_path, picture, min_stroke="3px")[0] == pytest.approx(7.4 * 3.4, abs=0.1)
 
 
@@ -237,7 +237,7 @@ def test_light_lines_on_a_dark_ground_are_reported(tmp_path: Path) -> None:
     ImageDraw.Draw(blueprint).line((100, 41, 100, 79), fill="white", width=3)
     _, report, _ = import_picture(tmp_path, blueprint)
     assert any("use --invert if they are the walls" in note for note in report.notes)
-    # rooms amid dark rock are no lines
+    # Rooms surrounded by dark rock are not lines.
     rooms = Image.new("L", (200, 120), 0)
     ImageDraw.Draw(rooms).rectangle((20, 20, 59, 59), fill=255)
     _, report, _ = import_picture(tmp_path, rooms)

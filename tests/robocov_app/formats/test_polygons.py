@@ -39,7 +39,7 @@ def test_fills_agree_with_winding_angles(rings: list[list[tuple[int, int]]], rul
     reason = enclosed.invalidity
     assert area.is_valid
     assert reason is None
-    # irrational places are on no edge
+    # Irrational coordinates are not on an edge.
     for x in np.arange(0.123456789, 12.0, 1.7):
         for y in np.arange(0.1415926, 12.0, 1.9):
             around = [count_windings(ring, x, y) for ring in arrays]
@@ -153,7 +153,7 @@ def test_edges_and_parts_are_extracted() -> None:
 
 
 def test_no_part_is_lost_at_almost_coincident_edges() -> None:
-    # without a grid GEOS 3.14 loses the triangle on the right
+    # Without a grid, GEOS 3.14 loses the triangle on the right.
     slim = Polygon([(0, 0), (1, 0), (-40, 764)])
     enclosed = find_enclosed_area([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
     bow = enclosed.area

@@ -130,7 +130,7 @@ def test_a_circle_is_kept_if_its_rounded_polygon_has_more_sides() -> None:
 
 
 def test_filled_gaps_stay_filled() -> None:
-    # below the wall a wedge is cut off, so flat that both are as good within the tolerance
+    # The wedge below the wall is so flat that both results are within the tolerance.
     circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
     environment = build_map([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
     assert len(environment.free.geoms) == 1

@@ -44,7 +44,7 @@ def test_a_cell_is_covered_where_its_center_is(
 
 
 def test_rooms_that_share_a_wall_share_no_cell() -> None:
-    # centers lie on the common edge: each belongs to just one
+    # Centers of cells are on the common edge; each belongs to exactly one room.
     grid = CellGrid(4, 4, 1.0, (0.0, 0.0))
     left = shapely.box(0, 0, 1.5, 4)
     right = shapely.box(1.5, 0, 4, 4)
@@ -68,7 +68,7 @@ def test_the_grid_has_a_cell_to_spare_on_each_side() -> None:
     assert free.sum() * 0.25**2 == 15
     assert not free[[0, -1]].any() and not free[:, [0, -1]].any()
     assert build_grid(build_room(), None).cell == 0.05
-    # a side that is no whole number of cells has one more
+    # A side that is not a whole number of cells has one cell more.
     assert build_grid(build_room(), 0.7).columns == 8 + 2
 
 
@@ -105,9 +105,9 @@ def test_no_obstacle_vanishes_or_splits_and_no_rooms_merge(things: list[Any], ce
     solid = shapely.get_parts(shapely.box(*low, *low + 100).difference(environment.free))
     for part in solid:
         assert len(blocked.query(part, predicate="intersects"))
-    # blocked cells hang together over their corners
+    # Blocked cells are connected across corners.
     assert ndimage.label(~free, np.ones((3, 3)))[1] <= len(solid)
-    # and free ones over their sides only: each of their islands is of one part of the free space
+    # Free cells are connected across sides only: each component belongs to one part of the free space.
     islands, count = ndimage.label(free)
     for k in range(1, count + 1):
         row, column = np.nonzero(islands == k)

@@ -59,7 +59,7 @@ def test_several_polygons_are_free_together(tmp_path: Path) -> None:
 def test_a_self_crossing_hole_beyond_the_outline_is_repaired(tmp_path: Path) -> None:
     bad = [build_square(0, 0, 20, 10), [[15, 2], [25, 4], [25, 2], [15, 4]]]
     foreign = read(tmp_path, "rings", bad)
-    # of the bow tie of two triangles of 5 m² the left one is in the outline
+    # The hole is a bow tie of two triangles of 5 m²; only the left one is inside the outline.
     assert foreign.free.area == pytest.approx(195.0)
     assert foreign.repaired[0].startswith(
         "the outline crossed or touched itself: polygon 1: Self-intersection"

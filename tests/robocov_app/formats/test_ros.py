@@ -255,7 +255,7 @@ def test_the_picture_must_be_next_to_the_file(tmp_path: Path) -> None:
         with pytest.raises(MapError, match=r"expected the image in it .--anywhere allows it."):
             read(path)
         assert read(path, anywhere=True).area > 0
-    # a link to the whole folder is no way out of it
+    # A link to the whole folder does not lead out of it.
     (tmp_path / "linked").symlink_to(maps)
     assert read(write_ros_map(tmp_path / "linked", b"", image="pictures/a.pgm")).area > 0
 

@@ -42,7 +42,7 @@ def test_walls_at_any_angle_are_straight(angle: float, shift: float) -> None:
     stairs = build_cells(room)
     result = simplify_free_space(stairs, CELL, CELL, 0.1)
     assert result.changed == ()
-    # four walls; at a sharp tip of cells a corner may stay cut
+    # Four walls; sharp corners of cells may stay beveled.
     assert count_vertices(result.free) <= 8
     long = [
         line
@@ -128,7 +128,7 @@ def test_a_narrow_alcove_keeps_its_shape() -> None:
 
 
 def test_a_door_as_wide_as_a_robot_stays_open() -> None:
-    # a door of 0.25 m in a wall whose ends are ragged by a cell
+    # A door of 0.25 m in a wall with ends that are ragged by one cell.
     free = np.ones((60, 80), dtype=bool)
     free[:, 38:42] = False
     free[28:33, 38:42] = True
@@ -141,7 +141,7 @@ def test_a_door_as_wide_as_a_robot_stays_open() -> None:
 
 
 def test_reduced_simplification_is_noted() -> None:
-    # between two halls a winding corridor of 0.3 m
+    # A winding corridor of 0.3 m between two halls.
     free = np.zeros((60, 200), dtype=bool)
     free[4:56, :40] = free[4:56, 160:] = True
     for column in range(40, 160):
@@ -154,7 +154,7 @@ def test_reduced_simplification_is_noted() -> None:
     (line,) = [line for line in result.changed if "narrow" in line]
     assert line.endswith("so that a robot of radius 0.115 m still fits through")
     assert count_vertices(result.free) < count_vertices(outline) / 2
-    # a smaller robot leaves more to simplify
+    # For a smaller robot, the simplification is not reduced.
     assert simplify_free_space(outline, 3 * CELL, CELL, 0.05).changed == ()
 
 
@@ -185,14 +185,14 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
     result = simplify_free_space(outline, tolerance, CELL, radius).free
     assert result.is_valid
     assert len(result.geoms) == len(outline.geoms)
-    # every corner of the cells is within the tolerance of a wall
+    # Every corner of the cells is within the tolerance of a wall.
     corners = shapely.points(shapely.get_coordinates(outline))
     assert shapely.distance(result.boundary, corners).max() <= tolerance * (1 + 1e-6) + CELL / 16
-    # and every corner of a wall is near the cells
+    # Every corner of a wall is near the cells.
     corners = shapely.points(shapely.get_coordinates(result))
     assert shapely.distance(outline.boundary, corners).max() <= tolerance * (1 + 1e-6) + CELL / 16
     assert abs(result.area - outline.area) <= 0.02 * outline.area + 1e-9
-    # two places that a robot of just this size goes between are connected afterwards
+    # Positions between which a robot of this size can drive are still connected.
     before = find_center_regions(outline, radius * 1.0001)
     after = shapely.union_all(find_center_regions(result, radius * 0.99))
     parts = shapely.get_parts(after)
@@ -213,7 +213,7 @@ def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> No
     assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.is_neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
-    # without any tolerance the very same outline comes back, necks and all
+    # Without tolerance, the outline stays the same, including necks.
     back = outline.to_polygons(outline.restore_necks(outline.simplify_outline(everything, nothing)))
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
@@ -247,14 +247,14 @@ def test_a_gap_that_has_closed_is_found() -> None:
     assert pairs.tolist() == [[0, 1]]
     assert places[0, 1] == pytest.approx(1.995)
     assert len(find_closed_gaps(sides, shapely.linestrings(sides), room, 0.2, 0.05)[0]) == 0
-    # what faces each other through a wall is no gap
+    # Sides that face each other through a wall have no gap between them.
     solid = MultiPolygon([shapely.box(0, 0, 4, 1.9), shapely.box(0, 2.09, 4, 4)])
     assert len(find_closed_gaps(sides, wide, solid, 0.2, 0.05)[0]) == 0
 
 
 @pytest.mark.slow
 def test_a_comb_of_many_teeth_does_not_exhaust_the_stack() -> None:
-    # teeth of equal height make the usual recursion as deep as there are teeth
+    # With teeth of equal height, the usual recursion is as deep as the number of teeth.
     teeth = 20_000
     x = np.arange(2 * teeth) / 2.0
     y = np.where(np.arange(2 * teeth) % 2 == 0, 5.0, 5.4)
@@ -275,7 +275,7 @@ def test_drawings_are_simplified_too() -> None:
 
 @pytest.mark.parametrize("sides", [(0.05, 0.08), (0.1, 0.03)])
 def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
-    # two obstacles that touch at a corner: the neck between them becomes that corner, wherever it is
+    # Two obstacles touch at a corner, and the neck between them becomes that corner.
     free = np.ones((12, 12), dtype=bool)
     free[4, 4] = free[5, 5] = False
     cells = affinity.scale(trace_outline(free, "grid"), *sides, origin=(0, 0))
@@ -285,7 +285,7 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
         expected = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
         assert outline.is_neck.sum() == 2
         assert outline.points[outline.is_neck] == pytest.approx(np.repeat([expected.coords[0]], 2, axis=0))
-    # walls at an angle are straight
+    # Slanted walls become straight.
     room = affinity.rotate(shapely.box(0, 0, 6, 4), 20, origin=(0, 0))
     stretched = affinity.scale(room, 1 / sides[0], 1 / sides[1], origin=(0, 0))
     stairs = affinity.scale(build_cells(stretched, 1.0), *sides, origin=(0, 0))

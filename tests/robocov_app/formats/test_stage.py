@@ -30,7 +30,7 @@ define room model ( size [20 10 1] boundary 1
 
 
 def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
-    # the white around the dark is not part of it, and its cells are no squares
+    # The white margin is not part of the model, and its cells are not square.
     (tmp_path / "maps").mkdir()
     rooms = ".........\n.#######.\n.#..#..#.\n.#.....#.\n.#######.\n........."
     (tmp_path / "maps" / "rooms.pgm").write_bytes(build_pgm(draw_pixels(rooms)))
@@ -39,7 +39,7 @@ def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
         "define floorplan model ( boundary 1 obstacle_return 0 ranger_return 0.5 )\n"
         'floorplan ( name "rooms" size [14.000 8.000 0.8] pose [1 2 0 0] bitmap "maps/rooms.pgm" )',
     )
-    # cells of 2 x 2 m: the box is 14 x 8 m about [1, 2]
+    # With cells of 2 x 2 m, the box is 14 x 8 m around [1, 2].
     expected = (box(-4, 0, 6, 4)) - box(0, 2, 2, 4)
     assert shapely.equals(foreign.free, expected)
     assert (foreign.cell, foreign.vertices_read, foreign.name) == (2.0, 8, "hall")
@@ -125,16 +125,16 @@ def test_robots_are_starts_and_sensors_are_omitted(tmp_path: Path) -> None:
     assert foreign.free.area == pytest.approx(100)
     assert foreign.dropped == ("1 laser", "1 model that nothing collides with")
     environment, report, _ = import_map(tmp_path / "hall.world")
-    # one of them stands in the triangle
+    # One of the robots is inside the triangle.
     assert environment.starts["robots"] == PointsStart(((2.0, -2.0),))
     assert list(environment.starts)[-1] == "robots"
     assert (
         'start "robots": 1 of 2 positions of robots in the file; robots do not fit at the others'
         in report.notes
     )
-    # names are those of models and of their macros
+    # Names are those of models and of their macros.
     assert read(tmp_path, text, skip=("pioneer",)).robots == ()
-    # as long as a report's line may be
+    # Long names are shortened in the report.
     assert len(read(tmp_path, ROOM + "room ( )" + "x" * 5000 + " ( )").dropped[0]) < 50
 
 
@@ -151,7 +151,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
     ):
         read(folder, far)
     assert read(folder, far, anywhere=True).free.area == pytest.approx(100)
-    # an absolute name of a world that has moved with its includes
+    # An absolute path is replaced if the world was moved together with its includes.
     moved = read(folder, f'include "{tmp_path}/elsewhere/near.inc"\nroom ( )')
     assert "near.inc' next to the file" in moved.notes[0]
 
@@ -222,7 +222,7 @@ def test_included_files_are_limited_together(tmp_path: Path) -> None:
     (tmp_path / "long.inc").write_text("#" * 500_000)
     with pytest.raises(MapError, match="included files: expected at most 5 MB in total, got more"):
         read(tmp_path, 'include "long.inc"\n' * 11 + "model ( )")
-    # one that is included from two places is no mistake
+    # Including a file twice is not an error.
     assert read(tmp_path, 'include "long.inc"\n' * 2 + "model ( )").free.area > 0
 
 

@@ -103,7 +103,7 @@ def test_circles_and_ellipses_are_read(tmp_path: Path) -> None:
     assert same.symmetric_difference(oval).area < oval.length * 1e-3
     rounded = read_solid_area(tmp_path, '<rect x="100" y="100" width="200" height="100" rx="20"/>')
     assert rounded.area == pytest.approx(2 - (4 - math.pi) * 0.04, abs=1e-3)
-    # radii are at most half a side, and one of them stands for both
+    # Radii are at most half a side, and a single radius is used for both axes.
     pill = read_solid_area(tmp_path, '<rect x="100" y="100" width="200" height="100" ry="900"/>')
     assert pill.bounds == pytest.approx((1, 4, 3, 5))
     assert pill.area == pytest.approx(math.pi * 0.5, abs=pill.length * 1e-3)

@@ -60,7 +60,7 @@ def test_a_pale_fill_with_dark_paint_on_it_is_floor(tmp_path: Path) -> None:
     foreign = read_shapes(tmp_path, FLOOR + rooms + table + WALLS)
     assert any(note.startswith("pale fills treated as floor: #fff0d0 (1)") for note in foreign.notes)
     assert foreign.free.area == pytest.approx(ROOM - shapely.Point(0, 0).buffer(0.5).area, abs=0.01)
-    # of its color all are floor, and of others none
+    # All shapes of this color are floor, and none of other colors.
     other = '<rect x="6" y="1" width="1" height="1" fill="#fff0d0"/>'
     same = read_free_space(tmp_path, FLOOR + rooms + table + WALLS + other)
     assert same == pytest.approx(foreign.free.area)
@@ -81,7 +81,7 @@ def test_rooms_on_a_dark_ground_are_free(tmp_path: Path) -> None:
     foreign = read_shapes(tmp_path, ground + rooms + door)
     assert foreign.free.area == pytest.approx(26)
     assert any("#eeeeee (2), #ffffff (1) on a dark ground" in note for note in foreign.notes)
-    # with nothing pale a dark outline is a boundary as any other
+    # Without pale fills, a dark outline is a boundary like any other.
     assert read_free_space(
         tmp_path, ground + '<rect x="1" y="1" width="3" height="3" fill="#777"/>'
     ) == pytest.approx(51)
@@ -99,7 +99,7 @@ def test_nested_outlines_alternate_between_free_and_solid(tmp_path: Path) -> Non
     foreign = read_shapes(tmp_path, boxes, outlines="nested")
     assert foreign.free.area == pytest.approx(60 - 32 + 12)
     assert any("an odd number of outlines are free, 40 m²" in note for note in foreign.notes)
-    # double lines: the walls between them are the smaller area
+    # With double lines, the walls between them are the smaller area.
     double = '<rect width="10" height="6"/>' + "".join(
         f'<rect x="{x}" y="0.2" width="4.7" height="5.6"/>' for x in (0.2, 5.1)
     )
@@ -123,7 +123,7 @@ def test_a_white_page_around_a_plan_is_removed(tmp_path: Path) -> None:
     environment, report, _ = import_map(path)
     assert environment.free_area == pytest.approx(5.8 * 3.8)
     assert any("paper around a plan" in note for note in report.notes)
-    # with a stroke it is an arena with a box in it
+    # With a stroke, it is an arena with a box in it.
     path.write_text(
         build_svg('<rect width="10" height="6" fill="#fff" stroke="#000" stroke-width=".1"/>' + walls, PAGE)
     )
@@ -143,7 +143,7 @@ def test_thin_strokes_and_shapes_are_dropped(tmp_path: Path) -> None:
         "1 shape thinner than 0.05 m (--min-stroke)",
         "1 stroke thinner than 0.05 m (--min-stroke)",
     )
-    # a pixel is a unit of the drawing's page: 1/96 of an inch
+    # A pixel is a unit of the page: 1/96 of an inch.
     assert read_free_space(tmp_path, body, min_stroke=f"{0.05 / 0.0254 * 96:.0f}px") == pytest.approx(ROOM)
 
 

@@ -58,7 +58,7 @@ def test_smooth_curves_mirror_the_previous_handle() -> None:
     smooth = list_points("M0 0C0 3 2 3 3 0S6-3 6 0", 1e-2)
     assert smooth == list_points("M0 0C0 3 2 3 3 0C4-3 6-3 6 0", 1e-2)
     assert list_points("M0 0Q2 4 4 0T8 0", 1e-2) == list_points("M0 0Q2 4 4 0Q6-4 8 0", 1e-2)
-    # after another command there is no handle
+    # After another command, there is no control point to reflect.
     straight = list_points("M0 0L4 0T8 4")[1:]
     assert straight[-1] == [8, 4]
     assert all(x - y == pytest.approx(4.0) for x, y in straight)
@@ -72,11 +72,11 @@ def test_arcs_satisfy_the_equation_of_their_ellipse(
     x1: float, y1: float, x2: float, y2: float, rx: float, ry: float, turn: int, large: bool, clockwise: bool
 ) -> None:
     assume((x1, y1) != (x2, y2))
-    flags = f"{int(large)}{int(clockwise)}"  # compressed, as optimizers write them
+    flags = f"{int(large)}{int(clockwise)}"  # without separators, as optimizers write them
     [(found, _)], _ = parse_path(f"M{x1} {y1}A{rx} {ry} {turn} {flags}{x2} {y2}", 1e-3, 100_000)
     assert found[0].tolist() == [x1, y1]
     assert found[-1].tolist() == [x2, y2]
-    # in the plane where the ellipse is a circle of radius 1
+    # Transform to coordinates in which the ellipse is a unit circle.
     angle = math.radians(turn)
     to_circle = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]) / [
         [rx],

@@ -119,7 +119,7 @@ def test_an_infinite_map_is_as_large_as_its_tiles(tmp_path: Path) -> None:
     )
     layer = f'<layer name="a" width="4" height="3"><data encoding="csv">{chunks}</data></layer>'
     foreign = read(tmp_path, TILES.format(""), layer, head='infinite="1"')
-    # columns -13 to -11, rows -1 to 1
+    # Columns -13 to -11, rows -1 to 1.
     assert are_equal(compute_solid_area(foreign, (3, 3)), box(0, 0, 1, 1) | box(1, 1, 2, 2))
 
 
@@ -137,14 +137,14 @@ def test_tiles_need_not_be_square(tmp_path: Path) -> None:
 
 
 def test_tiles_have_the_shape_of_their_collision_objects(tmp_path: Path) -> None:
-    # the lower left quarter, and as the tile is turned on the map
+    # The lower left quarter of the tile is solid; the tile is placed with several flips.
     corner = '<tile id="3"><objectgroup><object x="0" y="8" width="8" height="8"/></objectgroup></tile>'
     flips = (0, 1 << 31, 1 << 30, 1 << 29)
     rows = ",".join(str(4 + flip) for flip in flips) + ",0" * 8
     foreign = read(tmp_path, TILES.format(corner), build_tiles("a", rows))
     quarters = [box(0, 2, 0.5, 2.5), box(1.5, 2, 2, 2.5), box(2, 2.5, 2.5, 3), box(3.5, 2.5, 4, 3)]
     assert compute_solid_area(foreign).symmetric_difference(shapely.union_all(quarters)).area < 1e-5
-    # one as large as the cell is the cell, and one of a tall picture begins above it
+    # An object as large as the cell fills the cell.
     whole = corner.replace('y="8" width="8" height="8"', 'y="0" width="16" height="16"')
     assert compute_solid_area(read(tmp_path, TILES.format(whole), build_tiles("a", "4" + ",0" * 11))).equals(
         box(0, 2, 1, 3)
@@ -280,7 +280,7 @@ def test_a_large_map_is_read(tmp_path: Path) -> None:
         f"{build_tiles('walls', rows, size=(400, 300))}</map>"
     )
     foreign = IMPORTER.read(path, ReadOptions(cell=0.1))
-    # but for the necks
+    # The areas differ only by the necks.
     assert math.isclose(foreign.free.area, 0.01 * (cells == 0).sum(), rel_tol=1e-3)
 
 

@@ -39,7 +39,7 @@ def export_and_read(environment: Environment, path: Path, **options: Any) -> For
     edge = environment.free.length
     assert report.files == (path,)
     assert report.area == environment.free_area
-    # coordinates have six decimals: where walls cross, places move by a micrometer
+    # Coordinates have six decimals, so crossings of walls move by a micrometer.
     assert report.area_written == pytest.approx(foreign.free.area, abs=1e-6 * edge)
     assert foreign.free.symmetric_difference(environment.free).area <= 1e-6 * edge
     return foreign
@@ -54,7 +54,7 @@ def test_bundled_maps_survive_every_format(
     environment = load_map(name)
     foreign = export_and_read(environment, tmp_path / f"{name}.{kind}", **options)
     again, _ = build_environment(foreign, AS_IT_IS, name)
-    # maps that are imported have tenths of millimeters
+    # Imported maps are rounded to tenths of millimeters.
     assert again.free.symmetric_difference(environment.free).area <= 1e-4 * environment.free.length
     first = (tmp_path / f"{name}.{kind}").read_bytes()
     export_map(environment, tmp_path / f"{name}.{kind}", options=WriteOptions(**options))

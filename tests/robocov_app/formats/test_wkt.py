@@ -68,7 +68,7 @@ def test_empty_points_are_omitted(tmp_path: Path) -> None:
     "layout", ["MULTIPOLYGON({})", "GEOMETRYCOLLECTION({})", "{}"], ids=["multi", "collection", "several"]
 )
 def test_accessible_areas_that_overlap_are_one_free_space(tmp_path: Path, layout: str) -> None:
-    # corridors around a hall, most of each in it: none is an obstacle, and nothing between them is closed
+    # Corridors that overlap a hall are not obstacles, and nothing between them is solid.
     areas = [box(0, 0, 20, 10), box(-2, 4, 12, 6), box(9, -3, 11, 8), box(5, 2, 22, 3), box(3, 8, 4, 9)]
     parts = [area.wkt if "MULTI" not in layout else area.wkt.removeprefix("POLYGON ") for area in areas]
     foreign = read(tmp_path, "wkt", layout.format(",".join(parts)))
@@ -76,7 +76,7 @@ def test_accessible_areas_that_overlap_are_one_free_space(tmp_path: Path, layout
     environment, report, _ = import_map(tmp_path / "plan.wkt")
     assert environment.free_area == pytest.approx(shapely.union_all(areas).area)
     assert (len(environment.obstacles), report.dropped) == (0, ())
-    # also where all others lie in one
+    # This also holds if one area contains all others.
     nested = [areas[0], box(3, 8, 4, 9), box(6, 5, 7, 9)]
     text = ",".join(area.wkt for area in nested)
     assert read(tmp_path, "wkt", text).free.area == pytest.approx(200)
@@ -102,7 +102,7 @@ HOLED = Polygon(box(0, 0, 10, 10).exterior, [box(2, 2, 6, 6).exterior])
     ids=["across", "over", "island", "filled", "two"],
 )
 def test_holes_are_excluded_from_the_union(tmp_path: Path, others: list[Polygon], excluded: Any) -> None:
-    # as JuPedSim takes excluded areas out of the union of all accessible ones
+    # As in JuPedSim, excluded areas are subtracted from the union of all accessible areas.
     areas = [HOLED, *others]
     expected = shapely.union_all([Polygon(area.exterior) for area in areas]) - excluded
     for text in (shapely.GeometryCollection(areas).wkt, "\n".join(area.wkt for area in areas[::-1])):

@@ -32,5 +32,5 @@ def test_a_written_picture_keeps_its_position(tmp_path: Path, name: str) -> None
     back, _, _ = import_map(tmp_path / "a.png", shaping=Shaping(keep="all"))
     assert back.name == given.name
     moved = back.free.symmetric_difference(given.free).area
-    # far less than a row of cells along all walls
+    # The walls move by much less than a row of cells.
     assert moved < 0.2 * 0.05 * given.free.length

@@ -62,7 +62,7 @@ def test_only_tasks_that_end_their_process_fail(tmp_path: Path) -> None:
     name = write_controller(tmp_path, "        os._exit(3)\n")
     study = build_small_study(controllers=("rapf", name), seeds=range(2))
     strict = dask.config.set({"distributed.scheduler.allowed-failures": 0})
-    # two, as now and then Dask does not start one again
+    # Two workers, because Dask sometimes does not restart a worker.
     with strict, open_cluster(processes=True, workers=2) as cluster:
         totals = sweep(study, tmp_path / "out", scheduler=cluster.scheduler_address, quiet=True)
     assert totals == Totals(2, 2, 0, False)

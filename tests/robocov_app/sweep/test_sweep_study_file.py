@@ -111,7 +111,7 @@ KNOWN = (
     "record_hz, robots, sampling, seeds, starts, team"
 )
 WRONG = [
-    # in the file, instead, the complaint
+    # Text in the file, its replacement, and the expected message.
     ("robots = [3, 6]", "robot = [3]", f"unknown key 'robot': did you mean 'robots'? (known: {KNOWN})"),
     (
         "robots = [3, 6]",

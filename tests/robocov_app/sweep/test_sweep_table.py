@@ -161,7 +161,7 @@ def test_without_pyarrow_parquet_is_rejected_before_the_first_run(
         assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
         assert capsys.readouterr().err == f"robocov: error: {message}\n"
     before = read_tables(tmp_path)
-    (tmp_path / "results.parquet").touch()  # of an earlier version, say: it would not be of these rows
+    (tmp_path / "results.parquet").touch()  # an older file, which would not contain these rows
     for asked in (True, False):
         error = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {message}"))
         with error, Table(tmp_path, build_columns(study), parquet=asked):
@@ -207,14 +207,14 @@ def test_a_table_is_only_replaced_by_a_complete_or_longer_one(
 ) -> None:
     study = build_small_study()
     write_table(tmp_path, study, [COMPLETED] * len(study))
-    if not finished:  # as a sweep leaves it that was killed
+    if not finished:  # as if the sweep had been killed
         (tmp_path / "study.json").write_bytes(build_study_json(build_small_study(seeds=range(5))))
     before = [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")]
     with Table(tmp_path, build_columns(study), b"{}") as table:
         for k, task in enumerate(list(generate_tasks(study))[:rows]):
             table.add(build_row(task, FAILED))
             if k == 3 and not finished:
-                break  # it has grown as long, and may be seen
+                break  # the table is as long as the old one, which it now replaces
             assert [(tmp_path / name).read_bytes() for name in ("results.csv", "study.json")] == before
         table.is_complete = complete
     replaced = complete or rows == 4  # no shorter

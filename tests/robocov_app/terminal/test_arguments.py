@@ -107,6 +107,6 @@ def test_an_option_of_several_values_may_be_repeated(words: list[str]) -> None:
 def test_repeated_options_keep_their_own_values() -> None:
     words = ["f", "--set", "k=-1", "--skip", "a", "--place", "-1", ".5", "--set", "l=2", "--skip"]
     assert parse_options(Several, "try", words) == Several("f", ("a",), (-1.0, 0.5), ("k=-1", "l=2"))
-    # what is given once and takes one value is not merged
+    # Options that may be given only once are not merged.
     with pytest.raises(InputError):
         parse_options(Several, "try", ["f", "--place", "1", "--place", "2"])

@@ -73,5 +73,5 @@ def test_figures_and_pages_get_no_controls(folder: Path, capsys: pytest.CaptureF
     assert main(["report", "run", "--out", "page.html"]) == 0
     page = (folder / "page.html").read_text("utf-8")
     assert escape_controls(page) == page
-    # a script would turn JSON's own escapes back into the characters
+    # A script would convert JSON escapes back to the characters.
     assert not re.search(r"(?<!\\)(\\\\)*\\u(202e|001b)", page.replace("back\\u202ewards", ""))

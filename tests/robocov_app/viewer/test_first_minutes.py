@@ -66,7 +66,7 @@ def test_curves_begin_at_time_0_even_if_the_worker_started_late(tmp_path: Path) 
         window = driver.window
         first_values = {pane.number: pane.distance_curve.interpolate(0.0) for pane in session.timeline.panes}
         for pane in session.timeline.panes:
-            pane.curves["distance"].__init__()  # as if the worker had not started yet
+            pane.curves["distance"].__init__()  # simulates that the worker has not started yet
         for _ in range(90):
             session.playback.step()
         window.update(0.0)

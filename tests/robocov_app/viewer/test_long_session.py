@@ -104,7 +104,7 @@ def test_a_session_is_the_same_after_undo_recovery_loading_and_run(
         workspace._draft_time = -1e9
         workspace.save_draft({})
         assert workspace._autosaver.flush()
-        workspace._autosaver._lock.close()  # as when the process is killed
+        workspace._autosaver._lock.close()  # simulates that the process is killed
     (draft,) = find_recoverable_drafts(drafts)
     recovered, _ = recover_draft(draft, (), drafts)
     assert_equal(summarize(recovered.session), last)
