@@ -156,8 +156,8 @@ def test_moving_agrees_with_shapely(sketch, dx, about):
     change = transform.move(sketch, Selection.select_all(sketch), dx, 0.5)
     expected = affinity.translate(collect_shapes(sketch), dx, 0.5)
     assert compute_distance(collect_shapes(change.sketch), expected) <= 1e-4
-    back = transform.move(change.sketch, change.selection, -dx, -0.5).sketch
-    assert back == sketch
+    moved_back = transform.move(change.sketch, change.selection, -dx, -0.5).sketch
+    assert moved_back == sketch
 
 
 @given(valid_sketches(min_size=1), st.sampled_from([90.0, 180.0, -90.0, 30.0, 45.0, 1.0]), positions)
@@ -355,8 +355,8 @@ def test_groups_locks_and_hidden_obstacles_are_saved(sketch):
     assert Sketch.from_environment(unseen.build_environment()) == unseen
     shown = properties.unlock_and_show_all(unseen)
     assert shown.sketch == change.sketch and shown.description == "3 obstacles unlocked and shown"
-    apart = properties.ungroup(held.sketch, Selection.of(0, 1, 2))
-    assert not any(item.group for item in apart.sketch.obstacles)
+    ungrouped = properties.ungroup(held.sketch, Selection.of(0, 1, 2))
+    assert not any(item.group for item in ungrouped.sketch.obstacles)
     for deed, words in [
         (lambda: properties.group(sketch, Selection.of(0)), "two or more"),
         (lambda: properties.ungroup(sketch, Selection.of(0)), "in a group"),
@@ -466,8 +466,8 @@ def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     turned, round_one = after.density.peaks
     assert np.linalg.eigvalsh(turned.covariance) == pytest.approx(np.linalg.eigvalsh(peaks[0].covariance))
     assert turned.covariance != peaks[0].covariance and round_one.sigma == 0.5
-    apart = np.subtract(turned.center, round_one.center)
-    assert np.hypot(*apart) == pytest.approx(np.hypot(1.0, 1.0), abs=1e-3)
+    offset = np.subtract(turned.center, round_one.center)
+    assert np.hypot(*offset) == pytest.approx(np.hypot(1.0, 1.0), abs=1e-3)
     areas = WeightedPolygons((WeightedArea(((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), 2.0),), 1.0)
     upright = transform.level_map(replace(level, density=areas), (0.0, 0.0), (-0.1, 1.0)).sketch
     assert upright.density.areas[0].vertices[0] == pytest.approx((1.0945, 0.8955), abs=2e-4)

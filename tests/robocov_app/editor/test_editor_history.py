@@ -132,9 +132,9 @@ def test_unsaved_changes_are_relative_to_the_saved_state():
     assert history.has_unsaved_changes
     history.redo()
     assert not history.has_unsaved_changes
-    history.saved = None
+    history.saved_sketch = None
     assert history.has_unsaved_changes
-    assert UndoHistory(Sketch(), saved=False).has_unsaved_changes
+    assert UndoHistory(Sketch(), is_saved=False).has_unsaved_changes
     assert not UndoHistory(Sketch()).has_unsaved_changes
 
 
@@ -143,7 +143,7 @@ def test_undoing_restores_the_selection():
     history.selection = Selection.of(0)
     history.apply(properties.delete(history.sketch, Selection.of(0)))
     assert history.selection == Selection()
-    back = history.undo()
-    assert back is not None
-    assert back.description == "circle deleted"
-    assert back.selection == history.selection == Selection.of(0)
+    undone = history.undo()
+    assert undone is not None
+    assert undone.description == "circle deleted"
+    assert undone.selection == history.selection == Selection.of(0)

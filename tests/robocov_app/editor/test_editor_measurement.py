@@ -64,8 +64,8 @@ def test_reach_agrees_with_a_raster(sketch, radius):
     # The opened space hardly overlaps the space that robots never touch.
     assert shapely.intersection(opened, untouched).area < 1e-3 * perimeter
     # The remainder is small: none of its points is farther from the swept space than the radius.
-    crumbs = free - opened - untouched.buffer(2e-3)
-    for part in shapely.get_parts(crumbs):
+    remainder = free - opened - untouched.buffer(2e-3)
+    for part in shapely.get_parts(remainder):
         if part.area > 1e-4:
             points = shapely.points(shapely.get_coordinates(part))
             assert shapely.distance(opened, points).max() <= radius + 2e-3

@@ -46,8 +46,8 @@ def test_returning_from_a_trial_loses_nothing(tmp_path: Path) -> None:
         driver.editor.message = ""
         driver.window.run_frame(0.0)
         arena = np.s_[40:500, :500]
-        apart = np.abs(driver.copy_frame() - picture)[arena].max(axis=2)
-        assert (apart > 40).mean() < 0.05  # only the message differs
+        differences = np.abs(driver.copy_frame() - picture)[arena].max(axis=2)
+        assert (differences > 40).mean() < 0.05  # only the message differs
         driver.press_key("ctrl+z")
         assert len(driver.shapes) == 1
 

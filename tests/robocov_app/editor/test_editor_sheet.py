@@ -86,10 +86,10 @@ def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
             sketch = transform.move(sketch, Selection.of(0, 1, 2, 3), x / 40, y / 40).sketch
         at = build_view(center, theme=theme)
         page = copy_page(kept.draw(at, sketch, lifted), at)
-        anew = copy_page(Sheet().draw(at, sketch, lifted), at)
+        redrawn_page = copy_page(Sheet().draw(at, sketch, lifted), at)
         # At the edge of a patch, the pixels of an antialiased line may differ slightly.
-        apart = np.abs(page.astype(int) - anew.astype(int)).max(axis=2)
-        assert (apart > 40).sum() <= 6, (kind, x, y)
+        differences = np.abs(page.astype(int) - redrawn_page.astype(int)).max(axis=2)
+        assert (differences > 40).sum() <= 6, (kind, x, y)
 
 
 class Watched(Sheet):

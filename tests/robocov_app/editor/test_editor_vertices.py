@@ -57,8 +57,8 @@ def test_a_placed_vertex_has_its_position(data):
     others = [other for other, _ in list_vertices(sketch, owner) if other != vertex]
     if not circle:
         assert all(find_position(after, other) == find_position(sketch, other) for other in others)
-    back = vertices.place_vertices(after, {vertex: before})
-    assert back == sketch
+    moved_back = vertices.place_vertices(after, {vertex: before})
+    assert moved_back == sketch
 
 
 def test_vertices_of_several_objects_move_together(sketch):

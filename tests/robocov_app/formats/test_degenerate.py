@@ -35,7 +35,7 @@ def build_overpass(*nodes: int, **tags: str) -> str:
     return json.dumps({"osm3s": {}, "elements": [*points, way]})
 
 
-NONE = "no closed outline and no line"
+NONE = "expected at least one closed outline or line, got none"
 CASES: list[tuple[str, str, str]] = [
     ("osm", build_osm(1, 1, 1, building="yes"), NONE),
     ("osm", build_osm(1, 2, 1, building="yes"), NONE),

@@ -341,8 +341,11 @@ def draw_many_entities(document: Any, space: Any) -> None:
         (b"", "expected a DXF with sections, got a file that begins with b''"),
         (b"hello", "expected a DXF with sections, got a file that begins with b'hello'"),
         (b"AutoCAD Binary DXF\r\n\x1a\0oops", "expected a readable DXF, got a damaged one"),
-        (b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n", "no closed outline and no line"),
-        (b"0\nSECTION\n", "no closed outline and no line"),
+        (
+            b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n",
+            "expected at least one closed outline or line, got none",
+        ),
+        (b"0\nSECTION\n", "expected at least one closed outline or line, got none"),
         (b"0\nSECTION\n" + b" 10\n0\n" * 600_000, "expected at most 500000"),
         (b"0\nSECTION\n" + b"1\n\n" * 4_000_100, "expected at most 8000000"),
         (draw_recursive_block, "block 'a' is inserted into itself"),

@@ -137,7 +137,7 @@ def test_outlines_can_be_declared() -> None:
     foreign = build_map(rooms)
     assert foreign.free.area == pytest.approx(32.0)
     assert foreign.boundary.area == pytest.approx(200.0)  # type: ignore[union-attr]
-    with pytest.raises(MapError, match="no closed outline, expected one that encloses free space"):
+    with pytest.raises(MapError, match="expected a closed outline around free space, got none"):
         build_map(collect_shapes(lines=[HALL], outlines="free"))
 
 
@@ -156,9 +156,9 @@ def test_adjacent_lines_are_joined_to_whole_corners() -> None:
     assert len(corner.lines) == 2
     solid = shapely.union_all([line.solid for line in corner.lines])
     assert solid.area == pytest.approx(0.1 * (4 + 3 + 1))
-    apart = collect_shapes(lines=[([[0, 0], [4, 0]], "a"), ([[4, 0], [4, 3]], "b")])
-    apart.join_lines()
-    assert len(apart.lines) == 2
+    separate = collect_shapes(lines=[([[0, 0], [4, 0]], "a"), ([[4, 0], [4, 3]], "b")])
+    separate.join_lines()
+    assert len(separate.lines) == 2
 
 
 def test_shapes_are_selected_by_name() -> None:

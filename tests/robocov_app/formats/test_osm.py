@@ -169,7 +169,7 @@ def build_crowded_extract() -> str:
         (HEAD + "<node id='1' lat='nan' lon='1'/></osm>", "3: <node>: lat: expected degrees, got 'nan'"),
         (HEAD + "<node id='1' lat='1'/></osm>", "3: <node>: no lon"),
         (HEAD + "<way id='1'><nd ref='a'/></way></osm>", "3: <nd>: invalid literal for int()"),
-        (HEAD + "</osm>", "no closed outline and no line"),
+        (HEAD + "</osm>", "expected at least one closed outline or line, got none"),
         (HEAD + "<node id='1' lat='0' lon='0'/>" * 500_001, "500000 vertices, got about 500001"),
         (build_crowded_extract(), "expected at most 500000 vertices, got about 2001667"),
         (HEAD.replace("UTF-8", "UTF-99"), "not XML: unknown encoding"),
@@ -196,7 +196,7 @@ def test_a_way_of_one_repeated_node_is_omitted(tmp_path: Path, tags: dict[str, s
     extract.way_through([node] * 4, **tags)
     path = tmp_path / "town.osm"
     path.write_text(extract.text(None))
-    with pytest.raises(MapError, match="no closed outline and no line"):
+    with pytest.raises(MapError, match="expected at least one closed outline or line, got none"):
         IMPORTERS["osm"].read(path, ReadOptions())
 
 
@@ -292,7 +292,7 @@ def test_overpass_relations_contain_their_ways(tmp_path: Path) -> None:
         ),
         ('[{"type": "way", "id": 1, "tags": []}]', "elements[0].tags: expected an object"),
         ('[{"type": "relation", "id": 1, "members": [1]}]', "elements[0].members[0]: expected a member"),
-        ('[{"type": "area", "id": 1}]', "no closed outline and no line"),
+        ('[{"type": "area", "id": 1}]', "expected at least one closed outline or line, got none"),
     ],
 )
 def test_invalid_overpass_json_is_rejected(tmp_path: Path, elements: str, expected: str) -> None:

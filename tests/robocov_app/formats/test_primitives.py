@@ -80,9 +80,9 @@ def test_primitives_preserve_the_free_space(
     if not parts or not shapely.maximum_inscribed_circle(parts[0], tolerance=0.01).length > 0.5:
         return
     environment, report = build_environment(foreign, Shaping(simplify=tolerance), "plan")
-    apart = shapely.symmetric_difference(environment.free, parts[0])
+    difference = shapely.symmetric_difference(environment.free, parts[0])
     # Twice the tolerance: both the drawing and the primitives may have moved.
-    assert apart.area <= 2 * (tolerance + 2e-4) * parts[0].length
+    assert difference.area <= 2 * (tolerance + 2e-4) * parts[0].length
     assert report.obstacles == len(environment.obstacles)
     # A circle at the boundary may cut off a part of the free space. It is a polygon then.
     others = [ROOM.exterior, *blocks, *(one.polygon for one in (*circles, *walls))]

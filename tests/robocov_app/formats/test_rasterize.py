@@ -127,9 +127,9 @@ def test_a_wall_thinner_than_a_cell_keeps_rooms_apart(tmp_path: Path) -> None:
             report = export_map(environment, tmp_path / name, options=WriteOptions(cell=0.1, mode=mode))  # type: ignore[arg-type]
             assert report.warnings == ()
             cell = ReadOptions(cell=0.1) if name == "map.map" else ReadOptions()
-            back, _, _ = import_map(tmp_path / name, options=cell, shaping=Shaping(keep="all"))
-            assert len(back.free.geoms) == 2
-            assert back.free_area == pytest.approx(environment.free_area, rel=0.04)
+            imported, _, _ = import_map(tmp_path / name, options=cell, shaping=Shaping(keep="all"))
+            assert len(imported.free.geoms) == 2
+            assert imported.free_area == pytest.approx(environment.free_area, rel=0.04)
 
 
 def test_closed_gaps_are_reported_with_a_cell_that_keeps_them() -> None:

@@ -295,7 +295,7 @@ def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, n
         ({"resolution": -0.05}, "resolution: expected a number from 0.0001 to 1000 (m)"),
         ({"resolution": 0}, "resolution: expected a number"),
         ({"resolution": 1e-9}, "resolution: expected a number"),
-        ({"resolution": "{a: 1}"}, "resolution: expected one value"),
+        ({"resolution": "{a: 1}"}, "resolution: expected a number"),
         ({"origin": "[1, 2, nan]"}, "origin[2]: expected a number, got 'nan'"),
         (
             {"origin": "[1, 1e30, 0]"},

@@ -214,8 +214,8 @@ def test_ring_vertices_are_consistent(cave: tuple[int, float, int, float]) -> No
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
     # Without tolerance, the outline stays the same, including necks.
-    back = outline.to_polygons(outline.restore_necks(outline.simplify_outline(everything, nothing)))
-    assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
+    restored = outline.to_polygons(outline.restore_necks(outline.simplify_outline(everything, nothing)))
+    assert shapely.equals_exact(restored.normalize(), cells.normalize(), 1e-9)
 
 
 def test_required_vertices_are_kept() -> None:

@@ -198,7 +198,10 @@ def test_obstacles_are_read_on_request(tmp_path: Path) -> None:
         ("GEOMETRYCOLLECTION(" * 40, "nested too deeply, expected at most 32 levels"),
         ("SRID=1;POINT(0 0);SRID=2;POINT(0 0)", ":1:19: expected one SRID for all geometries"),
         ("SRID=99999;POINT(0 0)", ": reference system EPSG:99999 is unknown"),
-        ("POLYGON((0 0, 1 1, 2 2, 0 0))", ": no closed outline and no line (1 outline without an area"),
+        (
+            "POLYGON((0 0, 1 1, 2 2, 0 0))",
+            ": expected at least one closed outline or line, got none (1 outline without",
+        ),
         ("POLYGON((0 0, 1_0 1, 2 2, 0 0))", ":1:15: expected a point"),
         ("POLYGON((٠ 0, 1 1, 2 2, 0 0))", ":1:10: expected a point"),
     ],

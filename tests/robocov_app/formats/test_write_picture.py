@@ -29,8 +29,8 @@ def test_the_picture_is_black_and_white_and_has_its_position(tmp_path: Path) -> 
 def test_a_written_picture_keeps_its_position(tmp_path: Path, name: str) -> None:
     given = load_map(name)
     export_map(given, tmp_path / "a.png")
-    back, _, _ = import_map(tmp_path / "a.png", shaping=Shaping(keep="all"))
-    assert back.name == given.name
-    moved = back.free.symmetric_difference(given.free).area
+    imported, _, _ = import_map(tmp_path / "a.png", shaping=Shaping(keep="all"))
+    assert imported.name == given.name
+    moved = imported.free.symmetric_difference(given.free).area
     # The walls move by much less than a row of cells.
     assert moved < 0.2 * 0.05 * given.free.length

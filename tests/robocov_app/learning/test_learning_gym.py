@@ -168,12 +168,12 @@ def test_environments_that_share_a_simulation_behave_as_single_environments(
     """Observations, rewards, ends and infos are equal bit for bit, also after the end of an episode."""
     options = {**SMALL, "maps": "rooms", "duration": 0.4, **changes}
     together = CoverageVectorEnv(3, autoreset_mode=mode, **options)
-    apart = gymnasium.vector.SyncVectorEnv([partial(CoverageEnv, **options)] * 3, autoreset_mode=mode)
-    assert together.action_space == apart.action_space
-    assert together.observation_space == apart.observation_space
-    assert together.metadata == apart.metadata
+    separate = gymnasium.vector.SyncVectorEnv([partial(CoverageEnv, **options)] * 3, autoreset_mode=mode)
+    assert together.action_space == separate.action_space
+    assert together.observation_space == separate.observation_space
+    assert together.metadata == separate.metadata
     rng = np.random.default_rng(0)
-    environments = (together, apart)
+    environments = (together, separate)
     answers = [environment.reset(seed=5) for environment in environments]
     for step in range(12):
         assert data_equivalence(*answers, exact=True)

@@ -79,9 +79,9 @@ def test_a_sweep_waits_for_workers_and_resumes(monkeypatch: pytest.MonkeyPatch) 
         assert executor.wait_for_next(0.1) is None
         assert executor.waiting_reason == f"no workers are connected to {cluster.scheduler_address}; waiting"
         cluster.scale(1)
-        while (back := executor.wait_for_next(0.1)) is None:
+        while (result := executor.wait_for_next(0.1)) is None:
             pass
-        assert back[1].error is None
+        assert result[1].error is None
         while executor.waiting_reason:  # until it looks again
             pass
 
@@ -98,9 +98,9 @@ def test_imported_modules_reach_workers_without_access_to_the_disk(
         path.unlink()
     with open_cluster(processes=True) as cluster, Cluster(cluster.scheduler_address) as executor:
         executor.submit(task)
-        while (back := executor.wait_for_next(0.1)) is None:
+        while (result := executor.wait_for_next(0.1)) is None:
             pass
-    assert back[1] == local_outcome
+    assert result[1] == local_outcome
     assert local_outcome.error is None
 
 

@@ -30,7 +30,7 @@ class _HatchedArea(NamedTuple):
     strength: float
 
 
-def draw_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
+def render_hatching(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Hatch the areas that are too narrow for robots, and the areas that are cut off from the rest.
 
     Parameters

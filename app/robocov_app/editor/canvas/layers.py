@@ -9,7 +9,7 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov_app.editor.canvas import overlay
-from robocov_app.editor.canvas.hatching import draw_hatching
+from robocov_app.editor.canvas.hatching import render_hatching
 from robocov_app.editor.canvas.scene import EditorScene
 from robocov_app.editor.canvas.sheet import Sheet
 from robocov_app.editor.canvas.start_labels import draw_start_label
@@ -111,7 +111,7 @@ class Passages:
             return
         view = scene.view
         look = (view.camera, view.theme.name, view.scale, view.size)
-        hatching = self._hatching.get(measurement, look, lambda: draw_hatching(view, measurement))
+        hatching = self._hatching.get(measurement, look, lambda: render_hatching(view, measurement))
         if hatching is not None:
             surface, position = hatching
             scene.surface.blit(surface, position, special_flags=_PREMULTIPLIED)

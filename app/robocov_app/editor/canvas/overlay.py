@@ -314,35 +314,35 @@ def draw_ghost(canvas: Canvas, geometry: shapely.Geometry) -> None:
         canvas.draw_outline(corners, accent, canvas.scale_width(EDGE_LINE_PX))
 
 
-def draw_preview(canvas: Canvas, state: EditorToolOverlay, cursor: Point | None) -> None:
+def draw_preview(canvas: Canvas, tool_overlay: EditorToolOverlay, cursor: Point | None) -> None:
     """Draw the preview of a tool.
 
     Parameters
     ----------
     canvas : Canvas
         The canvas.
-    state : EditorToolOverlay
-        What the tool previews.
+    tool_overlay : EditorToolOverlay
+        Overlay of the active tool.
     cursor : Point or None
         Position of the cursor, px. The label of the tool is drawn next to it, if there is one.
     """
     background = canvas.theme.background
     accent = canvas.theme.accent
-    for shape in state.shapes:
+    for shape in tool_overlay.shapes:
         draw_ghost(canvas, shape.polygon)
-    if state.start is not None:
-        draw_start(canvas, state.start, is_selected=True)
-    _draw_preview_line(canvas, state)
-    for index, ring in enumerate(state.outlines):
-        width = SELECTED_LINE_PX if index == state.chosen else THIN_LINE_PX
+    if tool_overlay.start is not None:
+        draw_start(canvas, tool_overlay.start, is_selected=True)
+    _draw_preview_line(canvas, tool_overlay)
+    for index, ring in enumerate(tool_overlay.outlines):
+        width = SELECTED_LINE_PX if index == tool_overlay.chosen else THIN_LINE_PX
         canvas.draw_outline(to_pixels(canvas, ring), accent, canvas.scale_width(width))
-    for index, (x, y) in enumerate(to_pixels(canvas, state.markers).tolist()):
-        _draw_square(canvas, (x, y), background, is_large=index == state.chosen, is_rounded=True)
-    if state.box is not None:
-        _draw_selection_box(canvas, state.box, selects_partial=state.box_selects_partial)
-    if state.label and cursor is not None:
+    for index, (x, y) in enumerate(to_pixels(canvas, tool_overlay.markers).tolist()):
+        _draw_square(canvas, (x, y), background, is_large=index == tool_overlay.chosen, is_rounded=True)
+    if tool_overlay.box is not None:
+        _draw_selection_box(canvas, tool_overlay.box, selects_partial=tool_overlay.box_selects_partial)
+    if tool_overlay.label and cursor is not None:
         position = _place_cursor_label(canvas, cursor)
-        draw_tag(canvas.surface, state.label, position, canvas.theme, canvas.scale)
+        draw_tag(canvas.surface, tool_overlay.label, position, canvas.theme, canvas.scale)
 
 
 def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
@@ -350,18 +350,18 @@ def _place_cursor_label(canvas: Canvas, cursor: Point) -> Point:
     return cursor[0] + dx * canvas.scale, cursor[1] + dy * canvas.scale
 
 
-def _draw_preview_line(canvas: Canvas, state: EditorToolOverlay) -> None:
+def _draw_preview_line(canvas: Canvas, tool_overlay: EditorToolOverlay) -> None:
     """Draw the line that is being drawn, with its vertices, closing edge and lengths."""
     accent = canvas.theme.accent
-    line = to_pixels(canvas, state.line)
+    line = to_pixels(canvas, tool_overlay.line)
     if len(line) > 1:
         canvas.draw_outline(line, accent, canvas.scale_width(EDGE_LINE_PX), is_closed=False)
-        if state.is_closed:
+        if tool_overlay.is_closed:
             canvas.draw_dashed_line(line[-1].tolist(), line[0].tolist(), accent, canvas.scale_width(1.0))
     for x, y in line.tolist():
         _draw_square(canvas, (x, y), canvas.theme.background, is_rounded=True)
-    if state.shows_lengths:
-        _draw_lengths(canvas, state.line)
+    if tool_overlay.shows_lengths:
+        _draw_lengths(canvas, tool_overlay.line)
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:

@@ -48,7 +48,7 @@ class Document:
         Version of the file from which the map was read.
     resumed : Path, optional
         Folder of a draft from which the map was recovered; it continues to be used.
-    saved : bool
+    is_saved : bool
         Whether the file contains this map.
     stem : str
         Suggested file name, without suffix, for a map without a file.
@@ -77,10 +77,10 @@ class Document:
         version: FileVersion | None = None,
         *,
         resumed: Path | None = None,
-        saved: bool = True,
+        is_saved: bool = True,
         stem: str = "",
     ) -> None:
-        self.history = UndoHistory(sketch, saved=saved)
+        self.history = UndoHistory(sketch, is_saved=is_saved)
         self.path = path
         self.version = version
         self.stem = stem
@@ -89,7 +89,7 @@ class Document:
         self._checked_at = 0.0
         self._overwrites_changed_file = False
         self._drafted: Sketch | None = None
-        if saved:
+        if is_saved:
             self._drafted = sketch
         self.update_draft()
 
@@ -110,7 +110,7 @@ class Document:
     def recover(cls, draft: MapDraft, drafts: Path | None) -> Self:
         """Open the map of a draft, and continue to use the draft."""
         sketch = draft.read_sketch()
-        return cls(sketch, drafts, draft.path, draft.version, resumed=draft.folder, saved=False)
+        return cls(sketch, drafts, draft.path, draft.version, resumed=draft.folder, is_saved=False)
 
     @property
     def title(self) -> str:
@@ -238,7 +238,7 @@ class Document:
         self.file_state = check_file(self.version)
         if self.file_state in ("same", previous):
             return "same"
-        self.history.saved = None
+        self.history.saved_sketch = None
         return self.file_state
 
     def reload(self) -> None:

@@ -33,7 +33,7 @@ class UndoHistory:
     Parameters
     ----------
     sketch : Sketch
-    saved : bool
+    is_saved : bool
         Whether the file contains this sketch.
 
     Attributes
@@ -42,19 +42,19 @@ class UndoHistory:
         Current state.
     selection : Selection
         Current selection, which the window may set.
-    saved : Sketch or None
+    saved_sketch : Sketch or None
         The state that the file contains; None if it is none of the states.
     starts_new_step : bool
         Whether the next change becomes a new step even if it belongs to the same drag, for example because
         the mouse button was released.
     """
 
-    def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
+    def __init__(self, sketch: Sketch, *, is_saved: bool = True) -> None:
         self.sketch = sketch
         self.selection = Selection()
-        self.saved: Sketch | None = None
-        if saved:
-            self.saved = sketch
+        self.saved_sketch: Sketch | None = None
+        if is_saved:
+            self.saved_sketch = sketch
         self.starts_new_step = False
         self._undoable: list[_Step] = []
         self._redoable: list[_Step] = []
@@ -178,10 +178,10 @@ class UndoHistory:
 
     def mark_saved(self) -> None:
         """Record that the file contains the current state."""
-        self.saved = self.sketch
+        self.saved_sketch = self.sketch
         self.starts_new_step = True
 
     @property
     def has_unsaved_changes(self) -> bool:
         """Whether the current state differs from the file; false again after undo to the saved state."""
-        return self.saved is not self.sketch and self.saved != self.sketch
+        return self.saved_sketch is not self.sketch and self.saved_sketch != self.sketch

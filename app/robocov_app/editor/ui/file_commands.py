@@ -197,7 +197,7 @@ class FileCommands:
         def accept(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
             self._close_document_to_open()
-            document = Document(sketch, self.drafts, saved=False, stem=path.stem)
+            document = Document(sketch, self.drafts, is_saved=False, stem=path.stem)
             self._open_when_closed(document, f"imported: {path.name}, not saved yet")
 
         self.editor.dialogs.ask(ImportDialog(path, importer, self._create_import_worker(), accept))

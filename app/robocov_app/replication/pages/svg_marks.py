@@ -135,10 +135,10 @@ def draw_strips(strips: Sequence[DotStrip], highest: float) -> Markup:
         width = _STRIP_WIDTH_PX - _STRIP_LEFT_PX - _STRIP_RIGHT_PX
         return round(_STRIP_LEFT_PX + min(max(fraction, 0.0), 1.0) * width, 1)
 
-    parts = _draw_ticks(highest, to_x, len(strips))
+    parts = _format_ticks(highest, to_x, len(strips))
     ranges = []
     for number, strip in enumerate(strips):
-        parts += _draw_strip(strip, _STRIP_HEIGHT_PX * number, to_x)
+        parts += _format_strip(strip, _STRIP_HEIGHT_PX * number, to_x)
         lowest_text = format_amount(min(strip.medians_by_map.values()), "%")
         highest_text = format_amount(max(strip.medians_by_map.values()), "%")
         ranges.append(f"{escape(strip.label)}: {lowest_text} to {highest_text}")
@@ -148,7 +148,7 @@ def draw_strips(strips: Sequence[DotStrip], highest: float) -> Markup:
     return _build_svg("strips", _STRIP_WIDTH_PX, height, description, parts)
 
 
-def _draw_ticks(highest: float, to_x: Callable[[float], float], strips: int) -> list[str]:
+def _format_ticks(highest: float, to_x: Callable[[float], float], strips: int) -> list[str]:
     """Return the SVG elements of grid lines and labels for a number of strips, without overlaps."""
     height = _STRIP_HEIGHT_PX * strips
     parts = []
@@ -163,7 +163,7 @@ def _draw_ticks(highest: float, to_x: Callable[[float], float], strips: int) -> 
     return parts
 
 
-def _draw_strip(strip: DotStrip, top: float, to_x: Callable[[float], float]) -> list[str]:
+def _format_strip(strip: DotStrip, top: float, to_x: Callable[[float], float]) -> list[str]:
     """Return the SVG elements of a strip: its name, a dot for each map, and a line at the median."""
     kind = "ours" if strip.is_ours else "other"
     middle = top + _STRIP_LABEL_PX + (_STRIP_HEIGHT_PX - _STRIP_LABEL_PX) / 2

@@ -167,8 +167,8 @@ def _build_region(
         elif boundary is not None:
             region = boundary.area
     if region.is_empty:
-        reason = "no closed outline, expected one that encloses free space"
-        raise MapError(f"{drawing.source_name}: {reason}")
+        message = "expected a closed outline around free space, got none"
+        raise MapError(f"{drawing.source_name}: {message}")
     require_size(region.geoms[0].bounds, drawing.source_name)
     return region
 
