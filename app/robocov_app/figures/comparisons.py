@@ -16,7 +16,7 @@ from robocov_app.figures.files import plain_style
 from robocov_app.figures.map_grid import (
     PAGE_SCALE,
     PAGE_WIDTH_PX,
-    SPACE_WITHOUT_HEADING,
+    SPACE_WITHOUT_HEADING_PX,
     MapGrid,
     compute_column_width,
     write_heading,
@@ -38,15 +38,15 @@ _MAX_PAGE_HEIGHT_PX = 1800
 _INITIAL_PAGE_HEIGHT_PX = 1000
 """Height of the page on which texts are measured before its height is chosen."""
 # Space above the panels at scale 1, px.
-_ONE_LINE_CAPTION = 30
-_TWO_LINE_CAPTION = 54
-_CAPTION_GAP = 16
+_ONE_LINE_CAPTION_PX = 30
+_TWO_LINE_CAPTION_PX = 54
+_CAPTION_GAP_PX = 16
 # Rows of text above a panel at scale 1, px.
-_NAME_ROW = 38
-_FACTS_ROW = 16
-_HEADING_RISE = 20
+_NAME_ROW_PX = 38
+_FACTS_ROW_PX = 16
+_HEADING_RISE_PX = 20
 """Distance of the heading above the captions."""
-_SPACE_WITH_HEADING = 50
+_SPACE_WITH_HEADING_PX = 50
 
 
 @dataclass(frozen=True)
@@ -202,15 +202,15 @@ def _add_panel_axes(page: FigurePage, panel: PagePanel, extent: Extent) -> Axes:
 
 def _choose_grid(page: FigurePage, captions: _Captions, aspect: float) -> MapGrid:
     """Choose the grid of maps with a given aspect ratio; captions are on one line if they all fit."""
-    top = SPACE_WITHOUT_HEADING * page.scale
+    top = SPACE_WITHOUT_HEADING_PX * page.scale
     if captions.shared:
-        top = _SPACE_WITH_HEADING * page.scale
+        top = _SPACE_WITH_HEADING_PX * page.scale
     columns = _choose_columns(page, captions, aspect, top)
     caption_width = captions.max_width
-    caption_height = _TWO_LINE_CAPTION * page.scale
+    caption_height = _TWO_LINE_CAPTION_PX * page.scale
     if captions.max_joined_width <= compute_column_width(page, columns):
         caption_width = captions.max_joined_width
-        caption_height = _ONE_LINE_CAPTION * page.scale
+        caption_height = _ONE_LINE_CAPTION_PX * page.scale
     return MapGrid(
         count=len(captions.names),
         columns=columns,
@@ -230,7 +230,7 @@ def _write_captions(
             _write_one_line(page, captions, number, panel, grid.caption_width)
         else:
             _write_two_lines(page, captions, number, panel)
-    write_heading(page, captions.shared, panels[0].box, grid.caption_height + _HEADING_RISE * page.scale)
+    write_heading(page, captions.shared, panels[0].box, grid.caption_height + _HEADING_RISE_PX * page.scale)
 
 
 def _build_captions(page: FigurePage, contents: _Contents) -> _Captions:
@@ -259,14 +259,16 @@ def _build_captions(page: FigurePage, contents: _Contents) -> _Captions:
         facts=different_facts,
         name_widths=[page.measure_text(name, points=TITLE_SIZE_PT, bold=True) for name in names],
         facts_widths=[page.measure_text(text) for text in different_facts],
-        gap=_CAPTION_GAP * page.scale,
+        gap=_CAPTION_GAP_PX * page.scale,
     )
 
 
 def _choose_columns(page: FigurePage, captions: _Captions, aspect: float, top: float) -> int:
     """Return the number of columns for which panels are as large as possible and captions still fit."""
     space = (page.size[0], page.size[1] - 2 * top)
-    best = choose_column_count(len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION * page.scale)
+    best = choose_column_count(
+        len(captions.names), aspect, space, row_margin=_TWO_LINE_CAPTION_PX * page.scale
+    )
     max_columns = int((page.size[0] - page.margin) / (captions.max_width + page.margin))
     return max(min(best, max_columns), 1)
 
@@ -276,7 +278,7 @@ def _write_one_line(
 ) -> None:
     """Write the name of a run above its panel on the left, and its facts on the right."""
     left, top, panel_width, _ = panel.box
-    row = top - _FACTS_ROW * page.scale
+    row = top - _FACTS_ROW_PX * page.scale
     right = left + max(panel_width, min(panel.caption_width, width))
     page.write(captions.names[number], left, row, points=TITLE_SIZE_PT, bold=True)
     page.write(captions.facts[number], right, row, color=page.theme.faint, align="right")
@@ -285,8 +287,8 @@ def _write_one_line(
 def _write_two_lines(page: FigurePage, captions: _Captions, number: int, panel: PagePanel) -> None:
     """Write the name of a run above its panel, and its facts below the name."""
     left, top, _, _ = panel.box
-    name_row = top - _NAME_ROW * page.scale
-    facts_row = top - _FACTS_ROW * page.scale
+    name_row = top - _NAME_ROW_PX * page.scale
+    facts_row = top - _FACTS_ROW_PX * page.scale
     max_width = panel.caption_width
     page.write(captions.names[number], left, name_row, points=TITLE_SIZE_PT, bold=True, max_width=max_width)
     page.write(captions.facts[number], left, facts_row, color=page.theme.faint, max_width=max_width)

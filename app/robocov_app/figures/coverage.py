@@ -18,8 +18,8 @@ from robocov.typing import FloatArray, IntArray
 from robocov_app.figures import map_drawing, robot_drawing
 from robocov_app.figures.cost_curves import plot_cost
 from robocov_app.figures.coverage_layout import (
-    BAR_INDENT,
-    BAR_WIDTH,
+    BAR_INDENT_PX,
+    BAR_WIDTH_PX,
     CAPTION_TITLE_SIZE_PT,
     CURVE_MARGINS,
     CoverageArrangement,
@@ -66,18 +66,18 @@ _MIN_ASPECT_SIDE_BY_SIDE = 2.4
 """Minimum width / height of a box in which mean distances and mean times are next to each other."""
 _HATCH_PX = 9
 """Distance between the lines that hatch areas that no robot can reach."""
-_BORDER_WIDTH = 1.4
+_BORDER_WIDTH_PX = 1.4
 _BAR_LABEL = "distance to the nearest robot"
 # Heights at scale 1, px.
-_TITLE_ROW = 26
-_CAPTION_TITLE_ROW = 35
-_CAPTION_FACTS_ROW = 14
+_TITLE_ROW_PX = 26
+_CAPTION_TITLE_ROW_PX = 35
+_CAPTION_FACTS_ROW_PX = 14
 """Distances of the rows of a caption above its map."""
-_BAR_HEIGHT = 10
-_BAR_RISE = 9
+_BAR_HEIGHT_PX = 10
+_BAR_RISE_PX = 9
 """Distance of the top of the color scale above the middle of its row; the ticks are below."""
-_BAR_LABEL_GAP = 12
-_BAR_LABEL_RISE = 4
+_BAR_LABEL_GAP_PX = 12
+_BAR_LABEL_RISE_PX = 4
 """Distance of the label above the middle of the row, at the height of the color scale."""
 
 
@@ -202,7 +202,7 @@ def plot_coverage(
     title_end: float = page.size[0]
     if not arrangement.is_below:
         title_end = bar_left
-    page.write_title(title, _TITLE_ROW, title_end - 2 * page.margin)
+    page.write_title(title, _TITLE_ROW_PX, title_end - 2 * page.margin)
     if curves:
         distance_label = DISTANCE
         if any(describe_density(snapshot.environment) for snapshot in snapshots):
@@ -323,8 +323,8 @@ def _draw_maps(
         max_width = panel.caption_width
         axes = page.add_map_axes(box, extent.low_x, extent.low_y, extent.high_x, extent.high_y)
         _draw_snapshot(axes, snapshot, limit, page.theme, box=box, scale=scale)
-        title_row = box.top - _CAPTION_TITLE_ROW * scale
-        facts_row = box.top - _CAPTION_FACTS_ROW * scale
+        title_row = box.top - _CAPTION_TITLE_ROW_PX * scale
+        facts_row = box.top - _CAPTION_FACTS_ROW_PX * scale
         page.write(
             snapshot.title, box.left, title_row, points=CAPTION_TITLE_SIZE_PT, bold=True, max_width=max_width
         )
@@ -345,7 +345,7 @@ def _draw_snapshot(
         limit,
         theme,
         image_pixels_per_meter=IMAGE_PIXELS_PER_PAGE_PIXEL * box.width / (high_x - low_x),
-        border_width=_BORDER_WIDTH * scale,
+        border_width=_BORDER_WIDTH_PX * scale,
     )
     image = axes.imshow(
         pixels,
@@ -433,9 +433,9 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: CoverageArrangement) 
     middle = arrangement.bar_row
     theme = page.theme
     scale = page.scale
-    right = arrangement.maps.right - BAR_INDENT * scale
-    width = BAR_WIDTH * scale
-    box = PageBox(right - width, middle - _BAR_RISE * scale, width, _BAR_HEIGHT * scale)
+    right = arrangement.maps.right - BAR_INDENT_PX * scale
+    width = BAR_WIDTH_PX * scale
+    box = PageBox(right - width, middle - _BAR_RISE_PX * scale, width, _BAR_HEIGHT_PX * scale)
     axes = page.add_axes(box)
     axes.imshow(theme.build_heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for spine in axes.spines.values():
@@ -448,9 +448,9 @@ def _draw_bar(page: FigurePage, limit: float, arrangement: CoverageArrangement) 
     axes.tick_params(
         colors=to_plot_color(theme.faint), labelcolor=to_plot_color(theme.ink), length=2.5, pad=1.5
     )
-    left = right - width - _BAR_LABEL_GAP * scale
+    left = right - width - _BAR_LABEL_GAP_PX * scale
     label_width = page.measure_text(_BAR_LABEL)
     if left - label_width <= arrangement.bar_min_left:
         return left
-    page.write(_BAR_LABEL, left, middle - _BAR_LABEL_RISE * scale, align="right")
+    page.write(_BAR_LABEL, left, middle - _BAR_LABEL_RISE_PX * scale, align="right")
     return left - label_width

@@ -18,9 +18,9 @@ MAX_ASPECT_BESIDE = 1.9
 """Maximum width / height of a map to the right of the curves; a wider map is below them."""
 CAPTION_TITLE_SIZE_PT = TEXT_SIZE_PT + 1.5
 """Text size of the title above a map."""
-BAR_WIDTH = 190
+BAR_WIDTH_PX = 190
 """Width of the color scale at scale 1, px."""
-BAR_INDENT = 14
+BAR_INDENT_PX = 14
 """Space between the color scale and the right edge of the maps at scale 1, px."""
 CURVE_MARGINS = CurveMargins(left=34, top=34, bottom=50, right=38)
 _DEFAULT_SCALE = 1.3
@@ -32,20 +32,20 @@ _GRID_ASPECT = 1.6
 """Approximate width / height of a grid of maps."""
 _MIN_WIDTH_PX = 840.0
 _MIN_HEIGHT_PX = 320.0
-_MIN_HEIGHT_BESIDE = 480
+_MIN_HEIGHT_BESIDE_PX = 480
 """Minimum height of a page with a map next to the curves, px at scale 1."""
 _MAX_CURVES_FRACTION = 0.4
 """Maximum height of curves above maps, as a fraction of the height of both."""
 # Lengths at scale 1, px.
-_HEAD = 46
-_CURVES_HEIGHT = 290
-_CAPTION_HEIGHT = 50
-_PANEL_GAP = 16
-_BAR_ROW = 26
-_BAR_ROW_BELOW_CURVES = 24
-_TITLE_GAP = 24
+_HEAD_PX = 46
+_CURVES_HEIGHT_PX = 290
+_CAPTION_HEIGHT_PX = 50
+_PANEL_GAP_PX = 16
+_BAR_ROW_PX = 26
+_BAR_ROW_BELOW_CURVES_PX = 24
+_TITLE_GAP_PX = 24
 """Minimum space between the title and the label of the color scale in the same row."""
-_LAST_TICK_SPACE = 14
+_LAST_TICK_SPACE_PX = 14
 """Space to the right of a time axis for half of its last tick label."""
 
 
@@ -160,7 +160,7 @@ def _choose_width(page: FigurePage, contents: CoverageContents) -> int:
     if contents.end_curves or count > _MAX_MAPS_IN_ROW:
         return DEFAULT_WIDTH_PX
     slot_width = max(MAX_MAP_HEIGHT_PX * contents.aspect, _measure_captions(page, contents))
-    maps_width = count * slot_width + (count - 1) * _PANEL_GAP * page.scale
+    maps_width = count * slot_width + (count - 1) * _PANEL_GAP_PX * page.scale
     return int(np.clip(maps_width + 2 * page.margin, _MIN_WIDTH_PX, DEFAULT_WIDTH_PX))
 
 
@@ -183,8 +183,8 @@ def _compute_curves_width(page: FigurePage, contents: CoverageContents, *, has_f
     width, height = page.size
     max_map_height: float = MAX_MAP_HEIGHT_PX
     if has_fixed_size:
-        max_map_height = height - (_HEAD + _CAPTION_HEIGHT) * page.scale
-    bar_width = (BAR_WIDTH + 2 * BAR_INDENT) * page.scale
+        max_map_height = height - (_HEAD_PX + _CAPTION_HEIGHT_PX) * page.scale
+    bar_width = (BAR_WIDTH_PX + 2 * BAR_INDENT_PX) * page.scale
     needed = max(max_map_height * contents.aspect, _measure_captions(page, contents), bar_width)
     return width - min(needed + 2 * page.margin, _MAX_MAPS_FRACTION * width)
 
@@ -192,7 +192,7 @@ def _compute_curves_width(page: FigurePage, contents: CoverageContents, *, has_f
 def _find_curves_end(page: FigurePage, curves: Sequence[TimeCurve], curves_width: float) -> float:
     """Return the left edge of the space to the right of the time axis of curves next to a map, px."""
     right = compute_right_margin(page, curves, CURVE_MARGINS, curves_width - page.margin)
-    return curves_width - right + _LAST_TICK_SPACE * page.scale
+    return curves_width - right + _LAST_TICK_SPACE_PX * page.scale
 
 
 def _arrange_page(
@@ -210,20 +210,20 @@ def _arrange_page(
         page = FigurePage((page.size[0], height), page.theme, _DEFAULT_SCALE)
     width, height = page.size
     scale = page.scale
-    head = _HEAD * scale
+    head = _HEAD_PX * scale
     maps_left = curves_width + page.margin
     maps_top = head
     curves = PageBox(page.margin, head, curves_width - page.margin, height - head)
-    bar_row = _BAR_ROW * scale
+    bar_row = _BAR_ROW_PX * scale
     bar_min_left = page.margin + page.measure_text(contents.title, points=TITLE_SIZE_PT, bold=True)
-    bar_min_left += _TITLE_GAP * scale
+    bar_min_left += _TITLE_GAP_PX * scale
     if contents.is_below:
-        curves_height = _CURVES_HEIGHT * scale
+        curves_height = _CURVES_HEIGHT_PX * scale
         if size is not None:
             curves_height = min(curves_height, _MAX_CURVES_FRACTION * (height - head - footer_height))
         curves = PageBox(page.margin, head, width - 2 * page.margin, curves_height)
         maps_top = curves.bottom + head
-        bar_row = curves.bottom + _BAR_ROW_BELOW_CURVES * scale
+        bar_row = curves.bottom + _BAR_ROW_BELOW_CURVES_PX * scale
         bar_min_left = page.margin
     maps_width = width - page.margin - maps_left
     maps = PageBox(maps_left, maps_top, maps_width, height - footer_height - maps_top)
@@ -248,17 +248,17 @@ def _choose_height(
     columns = count
     if count > _MAX_MAPS_IN_ROW:
         columns = min(count, max(1, round(np.sqrt(count * _GRID_ASPECT / contents.aspect))))
-    slot_width = (maps_width - (columns - 1) * _PANEL_GAP * scale) / columns
+    slot_width = (maps_width - (columns - 1) * _PANEL_GAP_PX * scale) / columns
     map_height = min(slot_width / contents.aspect, MAX_MAP_HEIGHT_PX)
-    slot_height = map_height + (_CAPTION_HEIGHT + _PANEL_GAP) * scale
+    slot_height = map_height + (_CAPTION_HEIGHT_PX + _PANEL_GAP_PX) * scale
     rows = math.ceil(count / columns)
-    maps_height = rows * slot_height - _PANEL_GAP * scale
-    head_height = _HEAD * scale
+    maps_height = rows * slot_height - _PANEL_GAP_PX * scale
+    head_height = _HEAD_PX * scale
     if contents.is_below:
-        head_height = (2 * _HEAD + _CURVES_HEIGHT) * scale
+        head_height = (2 * _HEAD_PX + _CURVES_HEIGHT_PX) * scale
     min_height = _MIN_HEIGHT_PX
     if count == 1 and contents.aspect < MAX_ASPECT_BESIDE:
-        min_height = _MIN_HEIGHT_BESIDE * scale
+        min_height = _MIN_HEIGHT_BESIDE_PX * scale
     return int(np.clip(head_height + maps_height + footer_height, min_height, MAX_HEIGHT_PX))
 
 
@@ -277,8 +277,8 @@ def _arrange_panels(page: FigurePage, area: PageBox, contents: CoverageContents)
     """
     left, top, width, height = area
     count = contents.map_count
-    caption_height = _CAPTION_HEIGHT * page.scale
-    gap = _PANEL_GAP * page.scale
+    caption_height = _CAPTION_HEIGHT_PX * page.scale
+    gap = _PANEL_GAP_PX * page.scale
     panel_width = 0.0
     columns = 1
     for candidate in range(1, count + 1):

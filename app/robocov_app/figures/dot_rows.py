@@ -39,10 +39,10 @@ _MARK_MARGIN_PT = 3.0
 _MAX_NAME_FRACTION = 0.42
 """Maximum width of names, as a fraction of the page width."""
 # Margins of a page at scale 1, px.
-_LEFT_MARGIN = 32
-_RIGHT_MARGIN = 16
-_TOP_MARGIN = 8
-_BOTTOM_MARGIN = 46
+_LEFT_MARGIN_PX = 32
+_RIGHT_MARGIN_PX = 16
+_TOP_MARGIN_PX = 8
+_BOTTOM_MARGIN_PX = 46
 # Sizes of points.
 _SINGLE_POINT_PT = 6.0
 _POINT_PT = 3.6
@@ -121,12 +121,12 @@ def create_row_axes(
     page = FigurePage((width, 200), theme, scale)
     max_name_width = _MAX_NAME_FRACTION * width
     short_names = [shorten_text(name, page.measure_text, max_name_width, min_chars=1) for name in names]
-    left = max(page.measure_text(name) for name in short_names) + _LEFT_MARGIN * scale
-    top = _TOP_MARGIN * scale
-    bottom = _BOTTOM_MARGIN * scale
+    left = max(page.measure_text(name) for name in short_names) + _LEFT_MARGIN_PX * scale
+    top = _TOP_MARGIN_PX * scale
+    bottom = _BOTTOM_MARGIN_PX * scale
     page_height = round(top + _ROW_HEIGHT_PX * scale * height + bottom)
     page = FigurePage((width, page_height), theme, scale)
-    axes_width = width - left - _RIGHT_MARGIN * scale
+    axes_width = width - left - _RIGHT_MARGIN_PX * scale
     axes = page.add_axes(PageBox(left, top, axes_width, page_height - top - bottom))
     axes.set_ylim(height, 0.0)
     return axes, short_names

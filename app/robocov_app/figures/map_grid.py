@@ -8,13 +8,13 @@ from matplotlib.artist import Artist
 
 from robocov_app.figures.page import HEADING_SIZE_PT, FigurePage, PageBox, PagePanel
 
-SPACE_WITHOUT_HEADING = 8
+SPACE_WITHOUT_HEADING_PX = 8
 """Space above the captions of a page without a heading, at scale 1, px."""
 PAGE_WIDTH_PX = 1600
 PAGE_SCALE = 1.5
 """Width of a page, and its scale of texts and lines, if its size is not given."""
 _MIN_PAGE_HEIGHT_PX = 320
-_PANEL_GAP = 14
+_PANEL_GAP_PX = 14
 """Space below each panel at scale 1, px."""
 
 
@@ -46,7 +46,7 @@ class MapGrid:
         """Return the height at which the maps fill the width of a page, as far as limits permit, px."""
         rows = math.ceil(self.count / self.columns)
         map_width = compute_column_width(page, self.columns)
-        row_height = self.caption_height + map_width / self.aspect + _PANEL_GAP * page.scale
+        row_height = self.caption_height + map_width / self.aspect + _PANEL_GAP_PX * page.scale
         height = self.top + rows * row_height + page.measure_footer(handles)
         return int(min(max(height, _MIN_PAGE_HEIGHT_PX), max_height))
 

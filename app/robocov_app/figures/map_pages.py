@@ -33,9 +33,9 @@ _MAX_PAGE_WIDTH_PX = 1400
 _MIN_PAGE_HEIGHT_PX = 300
 _MAX_PAGE_HEIGHT_PX = 1300
 # Space above the map and the rows of text in it at scale 1, px.
-_SPACE_ABOVE = 58
-_NAME_ROW = 38
-_FACTS_ROW = 16
+_SPACE_ABOVE_PX = 58
+_NAME_ROW_PX = 38
+_FACTS_ROW_PX = 16
 
 
 @plain_style()
@@ -143,7 +143,7 @@ def _create_map_page(
         page = FigurePage(_choose_map_page_size(aspect, theme, handles), theme, _MAP_SCALE)
     else:
         page = FigurePage(size, theme)
-    above = _SPACE_ABOVE * page.scale
+    above = _SPACE_ABOVE_PX * page.scale
     box = _place_map(page, aspect, above, page.measure_footer(handles))
     # Below a map that is narrower than the page, the footer may need more space.
     box = _place_map(page, aspect, above, page.measure_footer(handles, bar_left=box.left))
@@ -188,7 +188,7 @@ def _choose_map_page_size(aspect: float, theme: Theme, handles: Sequence[Artist]
     """Return the width and height of a page that suits a map with an aspect, px."""
     # A page of the maximum width and any height serves to measure the footer.
     page = FigurePage((_MAX_PAGE_WIDTH_PX, 1000), theme, _MAP_SCALE)
-    surroundings = _SPACE_ABOVE * page.scale + page.measure_footer(handles)
+    surroundings = _SPACE_ABOVE_PX * page.scale + page.measure_footer(handles)
     widest = (_MAX_PAGE_HEIGHT_PX - surroundings) * aspect + 2 * page.margin
     width = float(np.clip(widest, _MIN_PAGE_WIDTH_PX, _MAX_PAGE_WIDTH_PX))
     highest = (width - 2 * page.margin) / aspect + surroundings
@@ -204,7 +204,7 @@ def _write_above_map(page: FigurePage, title: str, facts: str, box: PageBox) -> 
     if text_width > box.width:
         left = max(box.left + (box.width - text_width) / 2, page.margin)
     max_width = page.content_width
-    title_row = box.top - _NAME_ROW * page.scale
-    facts_row = box.top - _FACTS_ROW * page.scale
+    title_row = box.top - _NAME_ROW_PX * page.scale
+    facts_row = box.top - _FACTS_ROW_PX * page.scale
     page.write(title, left, title_row, points=TITLE_SIZE_PT, bold=True, max_width=max_width)
     page.write(facts, left, facts_row, color=page.theme.faint, max_width=max_width)

@@ -12,7 +12,7 @@ from robocov_app.figures.files import plain_style
 from robocov_app.figures.map_grid import (
     PAGE_SCALE,
     PAGE_WIDTH_PX,
-    SPACE_WITHOUT_HEADING,
+    SPACE_WITHOUT_HEADING_PX,
     MapGrid,
     write_heading,
 )
@@ -27,10 +27,10 @@ _MAX_PAGE_HEIGHT_PX = 1600
 _MAPS_AREA_PX = (1600, 1200)
 """Width and height of the area that the maps of a sheet should about fill."""
 # Rows of text at scale 1, px.
-_CAPTION_HEIGHT = 26
-_NAME_ROW = 12
-_HEADING_RISE = 18
-_SPACE_WITH_HEADING = 46
+_CAPTION_HEIGHT_PX = 26
+_NAME_ROW_PX = 12
+_HEADING_RISE_PX = 18
+_SPACE_WITH_HEADING_PX = 46
 
 
 @plain_style()
@@ -62,7 +62,7 @@ def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -
     for environment, panel in zip(drawn, panels, strict=True):
         _draw_panel(page, panel, environment, map_size)
     first_box = panels[0].box
-    write_heading(page, heading, first_box, grid.caption_height + _HEADING_RISE * page.scale)
+    write_heading(page, heading, first_box, grid.caption_height + _HEADING_RISE_PX * page.scale)
     map_width, _ = map_size
     page.draw_footer(handles, [panel.box for panel in panels], first_box.width / map_width)
     return page.figure
@@ -85,8 +85,8 @@ def _choose_grid(count: int, map_size: tuple[float, float], *, has_heading: bool
     """Choose the grid for a number of maps of a size, m, on a page of default width."""
     map_width, map_height = map_size
     aspect = map_width / map_height
-    caption_height = _CAPTION_HEIGHT * PAGE_SCALE
-    top = _SPACE_WITH_HEADING if has_heading else SPACE_WITHOUT_HEADING
+    caption_height = _CAPTION_HEIGHT_PX * PAGE_SCALE
+    top = _SPACE_WITH_HEADING_PX if has_heading else SPACE_WITHOUT_HEADING_PX
     return MapGrid(
         count=count,
         columns=choose_column_count(count, aspect, _MAPS_AREA_PX, row_margin=caption_height),
@@ -105,5 +105,5 @@ def _draw_panel(
     map_width, map_height = map_size
     axes = page.add_map_axes(panel.box, low_x, low_y, low_x + map_width, low_y + map_height)
     map_drawing.draw_map(axes, environment, page.theme)
-    name_row = panel.box.top - _NAME_ROW * page.scale
+    name_row = panel.box.top - _NAME_ROW_PX * page.scale
     page.write(environment.name, panel.box.left, name_row, bold=True, max_width=panel.caption_width)

@@ -21,7 +21,7 @@ from robocov_app.figures.page import FigurePage, PageBox, ValueAxis
 from robocov_app.look.theme import Theme, get_theme
 
 _PAGE_SIZE_PX = (1200, 800)
-_TITLE_HEIGHT = 40
+_TITLE_HEIGHT_PX = 40
 """Space above the panels at scale 1, px, for the title."""
 _MARGINS = CurveMargins(left=44, top=36, bottom=48, right=36, max_right_fraction=0.5)
 
@@ -121,7 +121,7 @@ def _build_curves(runs: Sequence[MeasuredRun], panel: MetricPanel) -> list[TimeC
 def _create_axes(page: FigurePage, number: int, curves: Sequence[TimeCurve], label_width: float) -> Axes:
     """Create the axes of a panel in a grid of 2 x 2, with space for the labels of its curves."""
     page_width, page_height = page.size
-    top = _TITLE_HEIGHT * page.scale
+    top = _TITLE_HEIGHT_PX * page.scale
     width = page_width / 2
     height = (page_height - top) / 2
     row, column = divmod(number, 2)

@@ -39,25 +39,25 @@ _FULL_SCALE_SIZE_PX = (960, 640)
 _MIN_SCALE = 0.8
 _MAX_SCALE = 6.0
 # Lengths at scale 1, px.
-_MARGIN = 18.0
-_MAX_SCALE_BAR = 120
+_MARGIN_PX = 18.0
+_MAX_SCALE_BAR_PX = 120
 _MAX_SCALE_BAR_FRACTION = 1 / 7
 """Maximum length of the scale bar, as a fraction of the page width."""
-_SCALE_BAR_LABEL = 80
+_SCALE_BAR_LABEL_PX = 80
 _MIN_SCALE_BAR_FRACTION = 0.5
 """If the legend needs the space, the maximum length of the scale bar is reduced by up to this factor."""
-_PANEL_GAP = 14
-_LEGEND_GAP = 24
+_PANEL_GAP_PX = 14
+_LEGEND_GAP_PX = 24
 # Heights of the footer, and distances below the maps in it.
-_ONE_LINE_FOOTER = 46
-_ONE_LINE_MIDDLE = 24
-_UPPER_LINE_MIDDLE = 20
-_LEGEND_TOP = 38
-_SPACE_ABOVE_LEGEND = 36
-_SPACE_BELOW_LEGEND = 14
-_HALF_TICK = 4
+_ONE_LINE_FOOTER_PX = 46
+_ONE_LINE_MIDDLE_PX = 24
+_UPPER_LINE_MIDDLE_PX = 20
+_LEGEND_TOP_PX = 38
+_SPACE_ABOVE_LEGEND_PX = 36
+_SPACE_BELOW_LEGEND_PX = 14
+_HALF_TICK_PX = 4
 """Half the height of the ticks at the ends of the scale bar."""
-_SCALE_BAR_LABEL_GAP = 8
+_SCALE_BAR_LABEL_GAP_PX = 8
 _MIN_SCALE_BAR_PX = 20.0
 """Minimum length of the longest scale bar, regardless of the scale."""
 
@@ -259,9 +259,9 @@ class FigurePage:
         self.size = size
         self.theme = theme
         self.scale = scale
-        self.margin = _MARGIN * scale
+        self.margin = _MARGIN_PX * scale
         self.content_width = width - 2 * self.margin
-        max_bar_length = min(_MAX_SCALE_BAR * scale, _MAX_SCALE_BAR_FRACTION * width)
+        max_bar_length = min(_MAX_SCALE_BAR_PX * scale, _MAX_SCALE_BAR_FRACTION * width)
         self._max_bar_length = max(max_bar_length, _MIN_SCALE_BAR_PX)
         dpi = 100.0 * scale
         # matplotlib truncates the number of pixels, so rounding errors could turn 900 into 899.
@@ -394,7 +394,7 @@ class FigurePage:
         list of PagePanel
         """
         page_width, page_height = self.size
-        gap = _PANEL_GAP * self.scale
+        gap = _PANEL_GAP_PX * self.scale
         rows = math.ceil(count / columns)
         max_width = (page_width - self.margin) / columns - self.margin
         # There is no gap below the last row.
@@ -432,12 +432,12 @@ class FigurePage:
             bar_left = start
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), bar_left):
-            return _ONE_LINE_FOOTER * self.scale
+            return _ONE_LINE_FOOTER_PX * self.scale
         return self._compute_two_line_height(legend)
 
     def _compute_two_line_height(self, legend: _LegendExtent) -> float:
         """Return the height of a footer with the legend below the scale bar, px."""
-        return _SPACE_ABOVE_LEGEND * self.scale + legend.height + _SPACE_BELOW_LEGEND * self.scale
+        return _SPACE_ABOVE_LEGEND_PX * self.scale + legend.height + _SPACE_BELOW_LEGEND_PX * self.scale
 
     def draw_footer(
         self, handles: Sequence[Artist], boxes: Sequence[PageBox], zoom: float, start: float = 0
@@ -462,25 +462,25 @@ class FigurePage:
         bottom = max(box.bottom for box in boxes)
         legend = self._measure_legend(handles, start)
         if self._fits_next_to_bar(legend, len(handles), left):
-            y = bottom + _ONE_LINE_MIDDLE * self.scale
+            y = bottom + _ONE_LINE_MIDDLE_PX * self.scale
             # The bar is shorter if the legend needs the space.
-            bar_space = end - left - legend.width - _SCALE_BAR_LABEL * self.scale
+            bar_space = end - left - legend.width - _SCALE_BAR_LABEL_PX * self.scale
             bar_end = self._draw_scale_bar(left, y, zoom, min(self._max_bar_length, bar_space))
-            min_legend_right = bar_end + _LEGEND_GAP * self.scale + legend.width
+            min_legend_right = bar_end + _LEGEND_GAP_PX * self.scale + legend.width
             legend_right = min(max(right, min_legend_right), end)
             self._draw_legend(handles, legend.columns, "center right", (legend_right, y))
         else:
-            y = bottom + _UPPER_LINE_MIDDLE * self.scale
+            y = bottom + _UPPER_LINE_MIDDLE_PX * self.scale
             self._draw_scale_bar(left, y, zoom, min(self._max_bar_length, right - left))
             # The legend is below the middle of the maps, as far as the edges of the footer permit.
             half_width = legend.width / 2
             middle = min(max((left + right) / 2, start + half_width), end - half_width)
-            row = bottom + _LEGEND_TOP * self.scale
+            row = bottom + _LEGEND_TOP_PX * self.scale
             self._draw_legend(handles, legend.columns, "upper center", (middle, row))
 
     def _fits_next_to_bar(self, legend: _LegendExtent, entries: int, bar_left: float) -> bool:
         """Return whether a legend of some entries is a single line that fits to the right of a scale bar."""
-        label_width = _SCALE_BAR_LABEL * self.scale
+        label_width = _SCALE_BAR_LABEL_PX * self.scale
         bar_length = _MIN_SCALE_BAR_FRACTION * self._max_bar_length
         space = self.size[0] - self.margin - bar_left - bar_length - label_width
         return legend.columns == entries and legend.width <= space
@@ -489,12 +489,12 @@ class FigurePage:
         """Draw a scale bar of a round length up to a maximum, px; return the right end of its label, px."""
         length = round_down(max_length / zoom)
         right = left + length * zoom
-        half_tick = _HALF_TICK * self.scale
+        half_tick = _HALF_TICK_PX * self.scale
         self._draw_line((left, y), (right, y))
         for x in (left, right):
             self._draw_line((x, y - half_tick), (x, y + half_tick))
         label = format_scale_length(length)
-        label_left = right + _SCALE_BAR_LABEL_GAP * self.scale
+        label_left = right + _SCALE_BAR_LABEL_GAP_PX * self.scale
         self.write(label, label_left, y, points=SMALL_SIZE_PT, bold=True)
         return label_left + self.measure_text(label, points=SMALL_SIZE_PT, bold=True)
 

@@ -53,9 +53,9 @@ _TEXT_GAP_PX = 14
 """Space between the axes and the texts of a row."""
 _GOAL_BAR_ROWS = 0.36
 """Half the length of the bar at a goal, as a fraction of the height of a row."""
-_RATIO_LINE_WIDTH = 1.6
+_RATIO_LINE_WIDTH_PT = 1.6
 _RATIO_LINE_OPACITY = 0.5
-_DOT_SIZE = 6.5
+_DOT_SIZE_PT = 6.5
 _LOW_MARGIN = 0.75
 _HIGH_MARGIN = 1.35
 """Factors from the smallest and the largest drawn value to the limits of the axes."""
@@ -129,8 +129,8 @@ def _draw_row(axes: Axes, row: Row, y: float, theme: Theme) -> None:
     color = to_plot_color(theme.accent)
     if row.meets_goals is False:
         color = to_plot_color(theme.error)
-    axes.plot([1.0, ratio], [y, y], color=color, linewidth=_RATIO_LINE_WIDTH, alpha=_RATIO_LINE_OPACITY)
-    axes.plot(ratio, y, "o", color=color, markersize=_DOT_SIZE)
+    axes.plot([1.0, ratio], [y, y], color=color, linewidth=_RATIO_LINE_WIDTH_PT, alpha=_RATIO_LINE_OPACITY)
+    axes.plot(ratio, y, "o", color=color, markersize=_DOT_SIZE_PT)
     if row.max_ratio is not None:
         bar = [y - _GOAL_BAR_ROWS, y + _GOAL_BAR_ROWS]
         axes.plot([row.max_ratio] * 2, bar, color=to_plot_color(theme.ink), linewidth=2)

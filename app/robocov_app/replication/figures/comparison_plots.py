@@ -28,9 +28,9 @@ Plots: TypeAlias = Mapping[str, Draw]
 
 _GAP_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Ticks of an axis of gaps, %."""
-_GRID_ROW_HEIGHT = 24
+_GRID_ROW_HEIGHT_PX = 24
 """Height of a row of a gain grid, px at scale 1."""
-_GRID_NAME_RISE = 36
+_GRID_NAME_RISE_PX = 36
 """Distance of the name of a gain grid above it, px at scale 1."""
 _MIN_TICKS = 3
 _TICK_STEPS = (0.01, 0.02, 0.05, 0.1)
@@ -166,7 +166,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     above = 52 * PAGE_SCALE
     below = 44 * PAGE_SCALE
     width = WIDE_PX / columns - left - right
-    height = len(rho_0) * _GRID_ROW_HEIGHT * PAGE_SCALE
+    height = len(rho_0) * _GRID_ROW_HEIGHT_PX * PAGE_SCALE
     page = FigurePage((WIDE_PX, round(rows * (height + above + below))), theme, PAGE_SCALE)
     for number, (name, grid) in enumerate(panels):
         row, column = divmod(number, columns)
@@ -181,7 +181,7 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
             values=_compute_mean_gaps(grid, k_rep, rho_0),
         )
         draw_gain_grid(axes, gap_grid, theme)
-        page.write(name, x - left / 2, y - _GRID_NAME_RISE * PAGE_SCALE, points=TITLE_SIZE_PT, bold=True)
+        page.write(name, x - left / 2, y - _GRID_NAME_RISE_PX * PAGE_SCALE, points=TITLE_SIZE_PT, bold=True)
     return page.figure
 
 

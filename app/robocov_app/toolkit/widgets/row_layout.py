@@ -2,8 +2,8 @@
 
 from pygame import Rect
 
-_ROW_HEIGHT = 26.0
-_GAP = 6.0
+_ROW_HEIGHT_PX = 26.0
+_GAP_PX = 6.0
 
 
 class RowLayout:
@@ -39,8 +39,8 @@ class RowLayout:
         self.clip = self.box
         self._cells: list[tuple[float, float]] = []
         self._next_cell = 0
-        self._row_height = _ROW_HEIGHT
-        self._space_below = _GAP
+        self._row_height = _ROW_HEIGHT_PX
+        self._space_below = _GAP_PX
 
     def px(self, length: float) -> int:
         """Return a length in whole pixels of the window."""
@@ -54,7 +54,7 @@ class RowLayout:
         self.width -= left + right
 
     def row(
-        self, *widths: float, height: float = _ROW_HEIGHT, gap: float = _GAP, below: float = _GAP
+        self, *widths: float, height: float = _ROW_HEIGHT_PX, gap: float = _GAP_PX, below: float = _GAP_PX
     ) -> None:
         """Start rows of cells with these widths.
 
