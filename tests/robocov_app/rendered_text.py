@@ -56,7 +56,7 @@ def render_legend_symbols(layer, scene, theme, scale=2.0):
 
 
 def check_legend_symbol(image, theme, color, scale=2.0):
-    """Check that a symbol contains a color, is centered, and fits into its place in the legend."""
+    """Check that a symbol contains a color, is centered, and fits into its cell of the legend."""
     rows, columns = np.nonzero((image != np.array(theme.background)).any(axis=2))
     width, height = SYMBOL_SIZE_PX
     center_x, _ = SYMBOL_CENTER_PX

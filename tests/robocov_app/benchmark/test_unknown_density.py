@@ -67,7 +67,7 @@ OTHERS = """
         robots = np.roll(np.arange(len(seen.positions)), 1)
         values = seen.measure_density(robots, seen.positions[robots])
 """
-"""Robots use what others measure, which nobody has sent them."""
+"""Robots use measurements of others without having received them."""
 
 
 @pytest.fixture(autouse=True)

@@ -22,7 +22,7 @@ SMALL = ("--size", "480x320", "--fps", "10", "--video-speed", "1")
 
 @pytest.fixture(autouse=True)
 def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Close windows at once that open by mistake."""
+    """Close windows immediately that open by mistake."""
     monkeypatch.setattr(ViewerWindow, "run", ViewerWindow.close)
 
 

@@ -1,4 +1,4 @@
-"""The density in the editor: kept through load, edit and save; hot spots drawn, moved and weighed."""
+"""The density in the editor: loading, editing and saving it; drawing, moving and weighting hot spots."""
 
 import json
 

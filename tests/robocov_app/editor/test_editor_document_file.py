@@ -1,4 +1,4 @@
-"""The document that is open: saved, changed behind its back, kept aside."""
+"""The open document: saving it, changes of its file by other programs, and drafts."""
 
 from pathlib import Path
 

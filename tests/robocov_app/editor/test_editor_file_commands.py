@@ -1,4 +1,4 @@
-"""FileCommands opened, saved and left, with all the questions; and how the editor is opened."""
+"""Commands for files of the editor: opening, saving and closing, with their questions; and the launch."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""Fixes: what mends a problem leaves none of it, and makes no other."""
+"""Fixes: a fix removes its problem and causes no other."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The import dialog: its options, what they change, a click into the map, and how it ends."""
+"""The import dialog: its options and their effects, clicks on the map, accepting and canceling."""
 
 import time
 from collections.abc import Iterator

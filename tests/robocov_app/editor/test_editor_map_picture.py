@@ -1,4 +1,4 @@
-"""The map of the editor in the size of a phone."""
+"""Images of the editor's map in the size of a phone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Obstacles that move, in the editor: their paths drawn, changed, kept, and shown moving."""
+"""Moving obstacles in the editor: drawing, editing and saving their paths, and showing their motion."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Trying a map in the demo, in the same window, and back with nothing lost."""
+"""Trying a map in the demo in the same window, and returning without losing anything."""
 
 from pathlib import Path
 

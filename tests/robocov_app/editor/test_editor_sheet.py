@@ -92,8 +92,8 @@ def test_patches_and_scrolling_equal_a_full_redraw(steps, dark: bool) -> None:
         assert (differences > 40).sum() <= 6, (kind, x, y)
 
 
-class Watched(Sheet):
-    """Tells what it has painted since it was asked last: all of it, or how many patches."""
+class RecordedSheet(Sheet):
+    """Records which boxes it paints."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -103,7 +103,8 @@ class Watched(Sheet):
         self.boxes.append(what[-1])
         super()._redraw_box(page, build_view, *what)
 
-    def painted(self, at: View, sketch: Sketch) -> str | int:
+    def count_painted_boxes(self, at: View, sketch: Sketch) -> str | int:
+        """Draw the sketch, and return the number of painted boxes; "all" for the whole sheet."""
         self.boxes.clear()
         self.draw(at, sketch)
         return "all" if self.boxes == [at.clip] else len(self.boxes)
@@ -111,15 +112,15 @@ class Watched(Sheet):
 
 def test_only_changes_are_redrawn() -> None:
     sketch = build_sheet(*SHAPES)
-    page = Watched()
-    assert page.painted(build_view(), sketch) == "all"
-    assert page.painted(build_view(), sketch) == 0
+    page = RecordedSheet()
+    assert page.count_painted_boxes(build_view(), sketch) == "all"
+    assert page.count_painted_boxes(build_view(), sketch) == 0
     moved = transform.move(sketch, Selection.of(1), 0.1, 0.0).sketch
-    assert page.painted(build_view(), moved) == 1
-    assert page.painted(build_view((5.0 + 3 / 28.0, 5.0)), moved) == 1
+    assert page.count_painted_boxes(build_view(), moved) == 1
+    assert page.count_painted_boxes(build_view((5.0 + 3 / 28.0, 5.0)), moved) == 1
     assert page.boxes[0].width == 3, "it was scrolled"
-    assert page.painted(build_view(zoom=40.0), moved) == "all"
-    assert page.painted(build_view(zoom=40.0, theme=DARK), moved) == "all"
+    assert page.count_painted_boxes(build_view(zoom=40.0), moved) == "all"
+    assert page.count_painted_boxes(build_view(zoom=40.0, theme=DARK), moved) == "all"
 
 
 def test_lifted_obstacles_are_not_on_the_page() -> None:

@@ -1,4 +1,4 @@
-"""Snap targets: at once on small maps, a little later on large ones."""
+"""Snap targets: computed immediately for small maps, and in the background for large ones."""
 
 import time
 

@@ -54,7 +54,7 @@ def run_editor(display: str, folder: Path, *words: object) -> Iterator[X11Driver
 
 
 class Sheet:
-    """Where places of the map are in the window."""
+    """Converts positions on the map to pixels of the window."""
 
     def __init__(self, bounds: tuple[float, float, float, float]) -> None:
         left, top, width, height = build_layout(SIZE, 1.0, plot=False).arena

@@ -20,7 +20,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.jobs.messages import Channel
 
 PATIENCE = 60.0
-"""Seconds after which nothing will come any more."""
+"""Seconds after which no more answers are expected."""
 
 SKETCH, _ = Sketch("Hall", boundary=HALL).with_obstacles(
     [CircleObstacle((3.0, 3.0), 1.0), WallObstacle(((6.0, -1.0), (6.0, 7.7)), 0.2)]

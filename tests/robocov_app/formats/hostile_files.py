@@ -1,4 +1,4 @@
-"""Reads hostile files in a process of its own, and says how long each took and how much memory all of them.
+"""Reads hostile files in a process of its own, and measures the time for each and the memory for all.
 
     python hostile_files.py FILE ...
 

@@ -1,4 +1,4 @@
-"""What every import keeps: tidy rings, no pockets, walls near where they were, one rule for boundaries."""
+"""Properties of every import: clean rings, no pockets, accurate walls, one rule for boundaries."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Curves against themselves, drawn much finer."""
+"""Flattened curves, compared with much finer ones."""
 
 import math
 
@@ -22,7 +22,7 @@ _POINT = st.tuples(_NUMBER, _NUMBER)
 
 
 def measure_max_distance(exact: np.ndarray, points: np.ndarray) -> float:
-    """Return the largest distance of points of a curve from the line that stands for it."""
+    """Return the largest distance between points of a curve and the line that approximates it."""
     line = shapely.LineString(points) if len(np.unique(points, axis=0)) > 1 else shapely.Point(points[0])
     return float(shapely.distance(line, shapely.points(exact)).max())
 

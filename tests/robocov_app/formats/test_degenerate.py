@@ -1,4 +1,4 @@
-"""Shapes without an area or a length: left out and named, in every format, and never a traceback."""
+"""Shapes without an area or a length: every format leaves them out and reports them, without a traceback."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""From the globe to meters, against geodesics."""
+"""Projection of longitudes and latitudes to meters, compared with geodesics."""
 
 import sys
 from typing import Any

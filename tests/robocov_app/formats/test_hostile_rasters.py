@@ -75,7 +75,7 @@ def paint(kind: str, side: int, keep: int | None = None, **options: object) -> b
 
 
 def write_header(data: bytes, old: int, new: int) -> bytes:
-    """Return a picture that says that it has another size."""
+    """Return an image whose header contains another size."""
     form = ">H" if data.startswith(b"\xff") else "<H"
     return data.replace(struct.pack(form, old), struct.pack(form, new))
 

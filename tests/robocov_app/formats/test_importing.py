@@ -1,4 +1,4 @@
-"""How a format is known, what its options are, and that every format keeps to the common way."""
+"""Recognition of formats, their options, and properties that all formats share."""
 
 import os
 from dataclasses import fields

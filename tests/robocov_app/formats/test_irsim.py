@@ -1,4 +1,4 @@
-"""Worlds of IR-SIM: shapes at their states, groups, pictures of cells that are no squares."""
+"""Worlds of IR-SIM: shapes at their states, groups, images with cells that are not square."""
 
 import math
 from pathlib import Path

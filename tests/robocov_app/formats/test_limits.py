@@ -1,4 +1,4 @@
-"""Files that are none, and files that are too large, are rejected before they are read."""
+"""Paths that are not regular files, and files that are too large, are rejected before they are read."""
 
 import os
 from pathlib import Path

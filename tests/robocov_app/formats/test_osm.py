@@ -19,7 +19,7 @@ HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n<osm version="0.6" generator="te
 
 
 class Extract:
-    """An extract about a place, given in meters east and north of it."""
+    """An extract around a point, with positions in meters east and north of it."""
 
     def __init__(self) -> None:
         self.nodes: list[str] = []

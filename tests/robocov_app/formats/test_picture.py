@@ -1,4 +1,4 @@
-"""Pictures of plans: dark and light, transparent, and the place that they say of themselves."""
+"""Images of plans: dark, light and transparent pixels, and the position that the file contains."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Plans on paper: the page around them, thin strokes, colors, and what transparency stands for."""
+"""Scanned plans: the page around them, thin strokes, colors, and the meaning of transparency."""
 
 import tracemalloc
 from pathlib import Path

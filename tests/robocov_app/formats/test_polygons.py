@@ -1,4 +1,4 @@
-"""What rings enclose, against winding numbers counted from angles."""
+"""Areas that rings enclose, compared with winding numbers that are computed from angles."""
 
 import math
 
@@ -24,7 +24,7 @@ _RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, 
 
 
 def count_windings(ring: np.ndarray, x: float, y: float) -> float:
-    """Return how often the ring goes around a place: the angle that it is seen to turn by."""
+    """Return the winding number of a ring around a point, from the angles between its vertices."""
     angle = np.arctan2(ring[:, 1] - y, ring[:, 0] - x)
     turn = (np.diff(angle, append=angle[:1]) + math.pi) % math.tau - math.pi
     return float(np.rint(turn.sum() / math.tau))

@@ -1,4 +1,4 @@
-"""The picture of an import: two arenas at one scale, what differs is marked, all words can be read."""
+"""The image of an import: two maps at the same scale, marked differences, and readable texts."""
 
 from pathlib import Path
 from typing import Any

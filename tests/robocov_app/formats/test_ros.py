@@ -126,7 +126,7 @@ def test_a_cut_map_keeps_the_island_with_most_free_space(tmp_path: Path) -> None
 
 
 def compute_occupancy(level: int, mode: str, negate: bool, low: float, high: float, alpha: int) -> int:
-    """Return what map_server makes of a gray pixel, -1 to 100, word for word as it is documented."""
+    """Return the occupancy of a gray pixel, -1 to 100, by the documented rules of map_server."""
     if mode == "raw":
         return level if level <= 100 else -1
     x = (3 * level + alpha) / 4 if mode == "trinary" and alpha >= 0 else level

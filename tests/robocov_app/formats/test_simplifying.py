@@ -1,4 +1,4 @@
-"""Fewer vertices, and what must stay true: walls near where they were, obstacles as large, gaps open."""
+"""Simplification: fewer vertices, but accurate walls, obstacles of the same size, and open gaps."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Worlds of Stage: macros, includes, poses, blocks and bitmaps, each as the manual has it."""
+"""Worlds of Stage: macros, includes, poses, blocks and bitmaps, as the manual describes them."""
 
 from pathlib import Path
 

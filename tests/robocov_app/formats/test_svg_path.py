@@ -1,4 +1,4 @@
-"""Path data and transforms, against the equations that the standard gives for them."""
+"""Path data and transforms, compared with the equations of the standard."""
 
 import math
 

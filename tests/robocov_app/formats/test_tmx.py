@@ -55,12 +55,12 @@ def read(
 
 
 def compute_solid_area(foreign: ForeignMap, size: tuple[float, float] = (4, 3)) -> shapely.Geometry:
-    """Return the area of a map of some size, m, that is not free."""
+    """Return the area of a map that is not free; `size` in m."""
     return box(0, 0, *size) - foreign.free
 
 
 def are_equal(one: shapely.Geometry, other: shapely.Geometry) -> bool:
-    """Return whether two areas are the same, but for the necks between cells that touch at a corner."""
+    """Return whether two areas differ only by necks between cells that touch at a corner."""
     return bool(one.symmetric_difference(other).area < 0.01)
 
 

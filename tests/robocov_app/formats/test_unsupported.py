@@ -1,4 +1,4 @@
-"""Files of kinds that are not read: each is named, and so is the way out."""
+"""Files of unsupported formats: messages name the format and what to do."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""The outline of cells against the union of their squares, and against scipy's labels."""
+"""Outlines of cells, compared with the union of their squares and with the labels of scipy."""
 
 from unittest import mock
 

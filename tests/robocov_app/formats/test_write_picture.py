@@ -1,4 +1,4 @@
-"""Pictures that are written know their scale and their place."""
+"""Exported images contain their scale and position."""
 
 import json
 from pathlib import Path

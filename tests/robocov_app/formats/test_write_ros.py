@@ -1,4 +1,4 @@
-"""ROS maps that are written: pixels, YAML, and that they come back as they were."""
+"""Exported ROS maps: pixels, YAML, and the same map after an import."""
 
 from pathlib import Path
 

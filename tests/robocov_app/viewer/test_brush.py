@@ -27,7 +27,7 @@ from robocov_app.viewer.tools.tool import ViewerToolOverlay
 
 
 class Clock:
-    """Time that passes when a test says so."""
+    """Time that a test advances."""
 
     def __init__(self) -> None:
         self.now = 0.0

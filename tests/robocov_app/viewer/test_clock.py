@@ -47,7 +47,7 @@ class StepCounter:
 
 @pytest.fixture
 def measure_time(monkeypatch):
-    """Let time only pass while steps are taken."""
+    """Advance the time only while steps are computed."""
 
     def use_counter(counter: StepCounter) -> StepCounter:
         monkeypatch.setattr(module, "perf_counter", lambda: counter.elapsed)

@@ -103,7 +103,7 @@ def test_a_curve_of_a_fast_run_begins_at_time_0_with_the_first_answer(
 
 
 def run_fast(driver: Driver, duration: float) -> None:
-    """Run at once for a duration, s, as a fast run does between two answers about its cost."""
+    """Run for a duration, s, without a cost in between, like a fast run between two costs."""
     for _ in range(round(duration / driver.session.timeline.history.dt)):
         driver.session.playback.step()
 

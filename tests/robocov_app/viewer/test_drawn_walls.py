@@ -1,4 +1,4 @@
-"""Walls drawn in the window: they leave no crack, and the message says what they cut off."""
+"""Walls drawn in the window: they leave no cracks, and the message describes what they cut off."""
 
 from pathlib import Path
 

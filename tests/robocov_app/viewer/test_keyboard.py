@@ -11,7 +11,7 @@ MAX_STOPS = 200
 
 
 def list_visited(driver: Driver, key: str = "tab") -> list[tuple[int, str]]:
-    """Press Tab until it comes back to where it began; return the groups and the controls that it visited."""
+    """Press Tab until the first control has the focus again; return the visited groups and controls."""
     visited: list[tuple[int, str]] = []
     for _ in range(MAX_STOPS):
         driver.press_key(key)

@@ -1,4 +1,4 @@
-"""Ways to states that take long to recompute: nothing waits for them, and nothing is lost on the way."""
+"""Seeks to states that take long to recompute: the window does not wait, and nothing is lost."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robocov_app.viewer.session.session import Session
 
 @pytest.fixture
 def slow_computer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A frame computes one step on the way to another state, and shows the progress at once."""
+    """Compute only one step per frame during a seek, and show the progress immediately."""
     monkeypatch.setattr(playback, "SEEK_SLICE_S", 0.0)
     monkeypatch.setattr(seek, "MIN_NOTICED_SEEK_S", 0.0)
 

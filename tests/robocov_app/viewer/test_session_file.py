@@ -1,4 +1,4 @@
-"""Session files: small, validated, with errors that name the place, and safe to open."""
+"""Session files: small, validated, with errors that name the location, and safe to open."""
 
 from __future__ import annotations
 

@@ -239,7 +239,7 @@ def test_a_link_needs_a_server(driver: Driver) -> None:
 
 
 class FakeRemote:
-    """A remote that notes what it is asked for."""
+    """A remote that records its requests."""
 
     fps = 30
     share_link = ShareLink("http://127.0.0.1:8765/?token=watch", "127.0.0.1")

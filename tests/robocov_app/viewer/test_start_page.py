@@ -206,7 +206,7 @@ def test_every_card_has_its_previews_and_can_be_built() -> None:
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[ViewerWindow]:
-    """Let windows close at once, and return those that were opened."""
+    """Close windows immediately, and return those that were opened."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "settings"))
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     windows: list[ViewerWindow] = []

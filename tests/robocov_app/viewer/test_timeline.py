@@ -1,4 +1,4 @@
-"""The timeline: one way to any state of a session, which builds that state before it replaces the present."""
+"""The timeline: any state of a session is built before it replaces the present."""
 
 from __future__ import annotations
 

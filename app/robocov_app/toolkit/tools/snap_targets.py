@@ -130,7 +130,7 @@ def list_outline_edges(polygons: Sequence[shapely.Geometry]) -> Edges:
 
 
 def _compute_distances(points: FloatArray, point: Point) -> FloatArray:
-    """Return the distance of each of some points from a point, m."""
+    """Return the distances of points from a point, m."""
     return np.asarray(np.linalg.norm(points - np.asarray(point), axis=1))
 
 
