@@ -209,9 +209,9 @@ def test_a_bevel_has_the_given_length_and_an_arc_touches_both_edges(degrees, len
     center = np.array([length, radius])
     rounded = vertices.round_corners(sketch, select_vertices(Vertex(key, 0, 1)), radius)
     points = np.array(rounded.sketch.get_item(key).shape.points)
-    np.testing.assert_allclose(np.hypot(*(points[1:-1] - center).T), radius, atol=2e-4)
+    np.testing.assert_allclose(np.linalg.norm(points[1:-1] - center, axis=1), radius, atol=2e-4)
     middles = (points[1:-2] + points[2:-1]) / 2
-    assert (radius - np.hypot(*(middles - center).T)).max() <= 1.2e-3
+    assert (radius - np.linalg.norm(middles - center, axis=1)).max() <= 1.2e-3
 
 
 def test_corners_of_rings_are_cut_all_at_once(sketch):

@@ -172,7 +172,7 @@ def test_a_policy_uses_only_the_knowledge_of_the_robot(seed: int, n: int, commun
         )
         return controller.decide(seen, controller.begin(REGION, team)).forces[i].tobytes()
 
-    is_known = np.hypot(*(positions - positions[i]).T) <= communication_range
+    is_known = np.linalg.norm(positions - positions[i], axis=1) <= communication_range
     moved = positions.copy()
     for k in np.flatnonzero(~is_known):
         position = rng.uniform((0, 0), (8, 6))

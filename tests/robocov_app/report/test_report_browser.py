@@ -163,7 +163,7 @@ def test_the_slider_seeks_in_all_panes(opened, seconds) -> None:
         for x, y in record.positions[step]:
             column = (width - zoom * 16) / 2 + x * zoom
             row = (height - zoom * 10) / 2 + (10 - y) * zoom
-            others = np.hypot(*(record.positions[step] - (x, y)).T)
+            others = np.linalg.norm(record.positions[step] - (x, y), axis=1)
             if np.sort(others)[1] * zoom > 24:  # left of the number, if no other robot is close
                 assert opened.read_pixel(pane, column - 7, row) == LIGHT.final
 

@@ -65,7 +65,7 @@ def test_the_nearest_free_position_is_found(point, others, radius):
     if len(others):
         discs = shapely.buffer(shapely.points(others), 2 * radius)
         free_centers = free_centers.difference(shapely.union_all(discs))
-        assert np.hypot(*(others - position).T).min() >= 2 * radius
+        assert np.linalg.norm(others - position, axis=1).min() >= 2 * radius
     assert shapely.distance(HALL.free.boundary, shapely.Point(position)) >= radius - 1e-9
     assert HALL.free.contains(shapely.Point(position))
     nearest = shapely.distance(free_centers, shapely.Point(point))

@@ -233,5 +233,5 @@ def test_failed_robots_are_sensed_like_obstacles():
     pane = build_pane(failed={8: (1.3, 1.5)})
     seen = pane.simulation.observe_and_decide().seen
     assert len(seen.positions) == seen.neighbors.robot_count == 3
-    distances = np.hypot(*(seen.obstacle_points - (1.3, 1.5)).T)
+    distances = np.linalg.norm(seen.obstacle_points - (1.3, 1.5), axis=1)
     assert distances == pytest.approx(0.1, abs=2e-3)

@@ -19,7 +19,7 @@ from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_mov
 from robocov_app.toolkit.tools.tool import CursorShape
 
 MANY_POINTS = 1000  # if more vertices are dragged, an image of the obstacles is moved instead
-MAX_SNAPPING_POINTS = 60  # approximate number of dragged vertices that are tried for snapping
+_TARGET_SNAPPING_POINTS = 60  # of the dragged vertices, up to twice as many are tried for snapping
 NO_MOVE_M = 1e-9  # shorter distances count as zero
 MIN_SIZE_M = 1e-3  # minimum size of the selection after scaling
 _FACTOR_TOLERANCE = 1e-9
@@ -102,7 +102,7 @@ class MoveDrag(Drag):
         points: list[Point] = []
         for owner in selection.owners:
             points += [position for _, position in list_vertices(context.sketch, owner)]
-        self._points = points[:: max(1, len(points) // MAX_SNAPPING_POINTS)]
+        self._points = points[:: max(1, len(points) // _TARGET_SNAPPING_POINTS)]
         self._drags_image = len(points) > MANY_POINTS
         self._offset = (0.0, 0.0)
         self._copies = False

@@ -15,8 +15,8 @@ from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 from robocov_app.viewer.session.past.trails import MAX_TRAIL_RATE_HZ
 from robocov_app.viewer.session.timeline import Timeline
 
-MAX_RECENT_POSITIONS = 30
-"""Approximate maximum number of positions that `get_recent_positions` returns."""
+_TARGET_RECENT_POSITIONS = 30
+"""Approximate number of positions that `get_recent_positions` returns: up to twice as many."""
 MAX_TRAIL_GAP_S = 1.5 / MAX_TRAIL_RATE_HZ
 """If the last row of a trail is older than this, the displayed positions are appended to it."""
 
@@ -117,7 +117,7 @@ class DisplayedState:
         history = self._timeline.history
         last = self._timeline.displayed_index
         first = history.find_index(self.time - SETTLED_WINDOW_S)
-        stride = max(1, (last - first) // MAX_RECENT_POSITIONS)
+        stride = max(1, (last - first) // _TARGET_RECENT_POSITIONS)
         positions = []
         for index in range(first, last + 1, stride):
             state = history[index].states.get(pane.number)
