@@ -79,7 +79,7 @@ def test_each_force_is_described_with_its_cause():
         "repelled with 0.30 N by the obstacle, 42 cm south",
         "slowed with 0.40 N by viscosity",
         "resultant of these forces 0.30 N north",
-        "32 cm from the obstacle south of it",
+        "its rim is 32 cm from the obstacle south of it",
         "2 robots in communication range, the nearest is robot 7, 80 cm west",
     ]
     assert get_line(report, "attraction").vector == (0.31, 0.0)

@@ -257,7 +257,7 @@ def _list_sensed(situation: RobotSituation) -> list[str]:
     if situation.senses_obstacle:
         if obstacle is None or obstacle in situation.touched:
             return []
-        return [f"{format_length(obstacle.gap)} from {obstacle.side_text}"]
+        return [f"its rim is {format_length(obstacle.gap)} from {obstacle.side_text}"]
     if 0.0 < situation.sensing_range < _MAX_LISTED_RANGE_M:
         return [f"senses nothing within {format_length(situation.sensing_range)}"]
     return ["senses nothing"]
