@@ -87,6 +87,7 @@ def test_the_context_menu_has_rows_for_fingers_and_scrolls(phone: EditorDriver) 
     commands = [command for command in menu.rows if command is not None]
     assert len(rows) == len(commands) > 15
     assert rows[0].height == 48 * 2
+    assert ui.widgets["option:lock"].text == "Lock"
     assert rows[-1].height < 48 * 2, "the last row is partly out of sight"
     for _ in range(10):
         phone.turn_wheel(*box.center, -1)

@@ -78,7 +78,7 @@ class Menu(Dialog):
 
     def _show_command(self, ui: Ui, number: int, command: Command) -> None:
         is_clicked = ui.option(
-            command.title,
+            self._get_title(command),
             self._get_key_text(command),
             key=command.name,
             highlighted=number == self.highlighted,
@@ -86,6 +86,10 @@ class Menu(Dialog):
         )
         if is_clicked:
             self._choose(command)
+
+    def _get_title(self, command: Command) -> str:
+        """Return the title of a command in its row; on a phone without the explanation after a colon."""
+        return command.title.partition(":")[0] if self._is_for_fingers else command.title
 
     def _get_key_text(self, command: Command) -> str:
         """Return the key of a command at the right end of its row; empty on a phone."""
@@ -128,7 +132,7 @@ class Menu(Dialog):
         title_size = round(TEXT_PX * scale)
         key_size = round(SMALL_TEXT_PX * scale)
         widths = [
-            measure_text(command.title, title_size) + measure_text(self._get_key_text(command), key_size)
+            measure_text(self._get_title(command), title_size) + measure_text(self._get_key_text(command), key_size)
             for command in self.rows
             if command is not None
         ]
