@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 FAILED = 1
 """Exit status of a sweep with failed runs."""
 
-_AXIS_LABELS = {"starts": "starts, summed over maps"}
+_AXIS_LABELS = {
+    "robots": "numbers of robots",
+    "teams": "team settings",
+    "starts": "starts, summed over maps",
+}
 """Labels of the parameters of a study whose names would be misunderstood in an estimate."""
 
 
@@ -34,8 +38,9 @@ class Arguments(JsonOption):
     The folder contains results.csv, with one row per run, and a folder for each run. For the same map and
     seed, all controllers start from the same positions.
 
-    After any interruption, the same command resumes the sweep. Runs with damaged files, of other versions, or
-    of changed code of your controllers are executed again. The exit status is 1 if runs have failed.
+    After any interruption, the same command resumes the sweep. A run is executed again if its files are
+    damaged, or if the version of robocov or the code of your controller has changed since. The exit status is
+    1 if runs have failed.
 
     A study file contains, for example:
 
@@ -47,7 +52,7 @@ class Arguments(JsonOption):
 
     The keys robots, starts, duration and those of [team] correspond to the options of robocov run.
 
-    Example: robocov sweep study.toml --out study --dry-run
+    Example: robocov sweep study.toml --out study
     """
 
     study: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="STUDY.toml")]
@@ -65,7 +70,8 @@ class Arguments(JsonOption):
     keep_versions: bool = False
     """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
     dry_run: bool = False
-    """Count the runs, execute one of them, estimate time and disk space of all, and write nothing."""
+    """Count the runs, time one run of each controller, estimate the time and disk space of all runs, and
+    write nothing."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:
@@ -89,7 +95,7 @@ def command(options: Arguments) -> int:
 
 
 def _estimate(options: Arguments, study: Study, out: Path) -> None:
-    """Execute one run of the study, and print an estimate for all runs."""
+    """Time one run of each controller, and print an estimate for all runs."""
     from robocov_app.sweep.estimate import estimate_sweep
 
     workers = _count_workers(options)
@@ -119,16 +125,24 @@ def _describe_estimate(estimate: SweepEstimate, workers: int) -> list[str]:
     """Return the estimate of a sweep as lines of text."""
     from robocov_app.sweep.progress import format_duration
 
-    lines = [f"{_AXIS_LABELS.get(name, name):<20} {count:>7}" for name, count in estimate.axes.items()]
-    runs = f"{'runs':<20} {estimate.runs:>7}"
+    counts = {_AXIS_LABELS.get(name, name): count for name, count in estimate.axes.items()}
+    counts["runs"] = estimate.runs
+    width = max(len(label) for label in counts)
+    lines = [f"{label:<{width}} {count:>7}" for label, count in counts.items()]
     finished = estimate.runs - estimate.left
     if finished:
-        runs += f"   ({finished} of them already done)"
-    lines.append(runs)
+        lines[-1] += f"   ({finished} of them already done)"
     lines += estimate.notes
-    if estimate.error is not None:
-        lines.append(f"the trial run, {estimate.run}, failed: {estimate.error}")
-    lines.append(f"a run takes {estimate.seconds_per_run:.2f} s and {estimate.bytes_per_run / 1e3:.0f} kB")
+    for controller, trial in estimate.controllers.items():
+        if trial.error is not None:
+            lines.append(f"the trial run of {controller}, {trial.run}, failed: {trial.error}")
+    width = max(len(controller) for controller in ("controller", *estimate.controllers))
+    lines.append(f"{'controller':<{width}}  runs left  s per run  kB per run")
+    for controller, trial in estimate.controllers.items():
+        lines.append(
+            f"{controller:<{width}} {trial.left:>10} {trial.seconds_per_run:>10.2f} "
+            f"{trial.bytes_per_run / 1e3:>11.0f}"
+        )
     lines.append(
         f"all remaining runs: about {format_duration(estimate.seconds)} on "
         f"{format_count(workers, 'worker')}; {estimate.total_bytes / 1e6:.0f} MB in all"

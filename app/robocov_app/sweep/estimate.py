@@ -1,16 +1,53 @@
-"""Estimate of the computing time and disk space that a sweep needs, from one of its runs."""
+"""Estimate of the computing time and disk space that a sweep needs, from a trial run of each controller."""
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
+from time import perf_counter
 
 from robocov_app.sweep.ledger import Ledger
 from robocov_app.sweep.study.study import Study
-from robocov_app.sweep.tasks import generate_tasks
+from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform, prepare_cost
+
+_FIRST_TRIAL_S = 2.0
+"""Simulation time of the first trial of a controller, which shows how much of a run can be measured."""
+_MAX_TRIAL_SECONDS = 4.0
+"""Maximum computing time for the measurement of a controller."""
+_MAX_TOTAL_SECONDS = 30.0
+"""Maximum computing time for the measurements of all controllers."""
+
+
+@dataclass(frozen=True)
+class ControllerEstimate:
+    """Estimate of the runs of one controller.
+
+    Attributes
+    ----------
+    runs : int
+        Number of its runs.
+    left : int
+        Number of its runs that remain to be executed.
+    run : str
+        Name of the trial run.
+    error : str or None
+        Reason why the trial run failed; None if it did not.
+    seconds_per_run : float, s
+        Computing time of a run. If a run takes longer than the time for a trial, only its start is measured.
+    bytes_per_run : int
+        Size of the files of a run.
+    """
+
+    runs: int
+    left: int
+    run: str
+    error: str | None
+    seconds_per_run: float
+    bytes_per_run: int
 
 
 @dataclass(frozen=True)
@@ -25,14 +62,8 @@ class SweepEstimate:
         Number of runs that remain to be executed.
     axes : dict of str to int
         Number of values of each parameter.
-    run : str
-        Name of the trial run.
-    error : str or None
-        Reason why the trial run failed; None if it did not.
-    seconds_per_run : float, s
-        Computing time of the trial run.
-    bytes_per_run : int
-        Size of the files of the trial run.
+    controllers : dict of str to ControllerEstimate
+        Estimate for each controller.
     seconds : float, s
         Estimated time for all remaining runs.
     total_bytes : int
@@ -44,10 +75,7 @@ class SweepEstimate:
     runs: int
     left: int
     axes: dict[str, int]
-    run: str
-    error: str | None
-    seconds_per_run: float
-    bytes_per_run: int
+    controllers: dict[str, ControllerEstimate]
     seconds: float
     total_bytes: int
     notes: list[str]
@@ -56,7 +84,7 @@ class SweepEstimate:
 def estimate_sweep(
     study: Study, folder: Path, *, workers: int, retry_failed: bool = False, keep_versions: bool = False
 ) -> SweepEstimate:
-    """Estimate a sweep from its first remaining run, without writing anything.
+    """Estimate a sweep from one of the remaining runs of each controller, without writing anything.
 
     Parameters
     ----------
@@ -76,27 +104,70 @@ def estimate_sweep(
     survey = Ledger(folder).survey(
         generate_tasks(study), retry_failed=retry_failed, keep_versions=keep_versions
     )
-    left = sum(survey.must_execute)
-    # If no run remains, the very first one is measured.
-    task = next(compress(generate_tasks(study), survey.must_execute), None) or next(generate_tasks(study))
-    # Not timed: the coverage cost is prepared only once for all runs on a map.
-    prepare_cost(task)
-    started = time.perf_counter()
-    outcome = perform(task)
-    seconds = time.perf_counter() - started
-    size = sum(len(content) for content in outcome.files.values())
+    counts = Counter(task.controller for task in generate_tasks(study))
+    left_counts = Counter(task.controller for task in compress(generate_tasks(study), survey.must_execute))
+    trials = _select_middle_tasks(generate_tasks(study), counts)
+    trials |= _select_middle_tasks(compress(generate_tasks(study), survey.must_execute), left_counts)
+    max_seconds = min(_MAX_TRIAL_SECONDS, _MAX_TOTAL_SECONDS / len(trials))
+    controllers = {
+        controller: _estimate_controller(task, counts[controller], left_counts[controller], max_seconds)
+        for controller, task in trials.items()
+    }
+    left = left_counts.total()
     parallel_runs = max(1, min(workers, left))
+    seconds = sum(estimate.left * estimate.seconds_per_run for estimate in controllers.values())
+    total_bytes = sum(estimate.runs * estimate.bytes_per_run for estimate in controllers.values())
     return SweepEstimate(
         runs=len(study),
         left=left,
         axes=count_axes(study),
+        controllers=controllers,
+        seconds=seconds / parallel_runs,
+        total_bytes=total_bytes,
+        notes=survey.describe(keep_versions=keep_versions),
+    )
+
+
+def _select_middle_tasks(tasks: Iterable[Task], counts: Counter[str]) -> dict[str, Task]:
+    """Return the middle task of each controller, whose number of robots is neither the first nor the last.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+    counts : Counter
+        Number of tasks of each controller.
+    """
+    middle_tasks = {}
+    seen_counts: Counter[str] = Counter()
+    for task in tasks:
+        if seen_counts[task.controller] == counts[task.controller] // 2:
+            middle_tasks[task.controller] = task
+        seen_counts[task.controller] += 1
+    return middle_tasks
+
+
+def _estimate_controller(task: Task, runs: int, left: int, max_seconds: float) -> ControllerEstimate:
+    """Estimate the runs of a controller from one of its tasks."""
+    # Not timed: the coverage cost is prepared only once for all runs on a map.
+    prepare_cost(task)
+    # Not used for the estimate: the first steps of a controller may compile kernels.
+    first_duration = min(task.duration, _FIRST_TRIAL_S)
+    started = perf_counter()
+    perform(replace(task, duration=first_duration))
+    first_seconds = perf_counter() - started
+    duration = min(task.duration, max(first_duration, first_duration * max_seconds / first_seconds))
+    started = perf_counter()
+    outcome = perform(replace(task, duration=duration))
+    seconds = perf_counter() - started
+    size = sum(len(content) for content in outcome.files.values())
+    scale = task.duration / duration
+    return ControllerEstimate(
+        runs=runs,
+        left=left,
         run=task.name,
         error=outcome.error,
-        seconds_per_run=seconds,
-        bytes_per_run=size,
-        seconds=seconds * left / parallel_runs,
-        total_bytes=size * len(study),
-        notes=survey.describe(keep_versions=keep_versions),
+        seconds_per_run=seconds * scale,
+        bytes_per_run=round(size * scale),
     )
 
 
@@ -107,5 +178,5 @@ def count_axes(study: Study) -> dict[str, int]:
     counts["seeds"] = len(study.seeds)
     counts["controllers"] = len(study.controllers)
     for controller in study.controllers:
-        counts[f"gains of {controller}"] = len(study.get_gains(controller).choices)
+        counts[f"sets of gains of {controller}"] = len(study.get_gains(controller).choices)
     return counts

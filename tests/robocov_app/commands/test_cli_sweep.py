@@ -104,11 +104,14 @@ def test_a_dry_run_writes_nothing(study: Path, capsys: pytest.CaptureFixture[str
     out = str(study.parent / "out")
     summary = read_json(capsys, "sweep", str(study), "--out", out, "--dry-run", "--workers", "3")
     assert (summary["runs"], summary["left"], summary["workers"]) == (8, 8, 3)
-    assert summary["seconds"] == pytest.approx(summary["seconds_per_run"] * 8 / 3)
+    seconds = sum(trial["left"] * trial["seconds_per_run"] for trial in summary["controllers"].values())
+    assert summary["seconds"] == pytest.approx(seconds / 3)
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
     output = capsys.readouterr().out
-    assert "gains of rpf               2\n" in output
-    assert "runs                       8\n" in output
+    assert "numbers of robots                   1\n" in output
+    assert "sets of gains of rpf                2\n" in output
+    assert "runs                                8\n" in output
+    assert "\ncontroller    runs left  s per run  kB per run\n" in output
     assert "all remaining runs: about" in output
     assert sorted(study.parent.rglob("*")) == before
 
@@ -122,7 +125,7 @@ def test_a_dry_run_counts_finished_runs(study: Path, capsys: pytest.CaptureFixtu
     read_json(capsys, "sweep", str(study), "--out", out, "--workers", "1")
     study.write_text(STUDY.replace("seeds = 2", "seeds = 3"))
     assert main(["sweep", str(study), "--out", out, "--dry-run"]) == 0
-    assert "runs                      12   (8 of them already done)\n" in capsys.readouterr().out
+    assert "runs                               12   (8 of them already done)\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

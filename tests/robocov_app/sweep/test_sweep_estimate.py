@@ -9,8 +9,8 @@ from robocov_app.sweep import estimate as estimate_module
 from robocov_app.sweep.estimate import count_axes, estimate_sweep
 from robocov_app.sweep.ledger import open_ledger
 from robocov_app.sweep.study.study import StudyMap
-from robocov_app.sweep.tasks import generate_tasks
-from robocov_app.sweep.worker import perform
+from robocov_app.sweep.tasks import Task, generate_tasks
+from robocov_app.sweep.worker import Outcome, perform
 
 
 def test_the_values_of_each_axis_are_counted() -> None:
@@ -25,26 +25,53 @@ def test_the_values_of_each_axis_are_counted() -> None:
         "starts": 3,
         "seeds": 2,
         "controllers": 2,
-        "gains of rapf": 2,
-        "gains of rpf": 1,
+        "sets of gains of rapf": 2,
+        "sets of gains of rpf": 1,
     }
     assert len(study) == 2 * 2 * 3 * 2 * (2 + 1)
 
 
-def test_time_and_space_are_those_of_one_run_times_the_number_of_runs(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def set_clock(monkeypatch: pytest.MonkeyPatch, *trial_seconds: float) -> None:
+    """Let trials take the given times: two trials of each controller."""
+    clock_times = [
+        time for k, seconds in enumerate(trial_seconds) for time in (100.0 * k, 100.0 * k + seconds)
+    ]
+    monkeypatch.setattr(estimate_module, "perf_counter", iter(clock_times).__next__)
+
+
+def test_each_controller_is_timed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     study = build_small_study(seeds=range(5))
-    clock_times = iter([10.0, 12.5])
-    monkeypatch.setattr(estimate_module.time, "perf_counter", lambda: next(clock_times))
+    set_clock(monkeypatch, 1.0, 2.5, 1.0, 6.0)
     estimate = estimate_sweep(study, tmp_path / "none", workers=4)
-    first = next(generate_tasks(study))
-    size = sum(len(content) for content in perform(first).files.values())
-    assert (estimate.runs, estimate.left, estimate.run, estimate.error) == (10, 10, first.name, None)
-    assert estimate.seconds_per_run == 2.5
-    assert estimate.seconds == 2.5 * 10 / 4
-    assert (estimate.bytes_per_run, estimate.total_bytes) == (size, 10 * size)
+    assert (estimate.runs, estimate.left) == (10, 10)
+    tasks = list(generate_tasks(study))
+    sizes = []
+    for controller, seconds, task in (("rapf", 2.5, tasks[4]), ("rpf", 6.0, tasks[5])):
+        trial = estimate.controllers[controller]
+        assert (trial.runs, trial.left, trial.run, trial.error) == (5, 5, task.name, None)
+        assert trial.seconds_per_run == seconds
+        sizes.append(sum(len(content) for content in perform(task).files.values()))
+        assert trial.bytes_per_run == sizes[-1]
+    assert estimate.seconds == (5 * 2.5 + 5 * 6.0) / 4
+    assert estimate.total_bytes == 5 * sum(sizes)
     assert not (tmp_path / "none").exists()
+
+
+def test_only_the_start_of_a_slow_run_is_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    study = build_small_study(controllers=("rapf",), seeds=range(3), duration=40.0)
+    durations = []
+
+    def record_duration(task: Task) -> Outcome:
+        durations.append(task.duration)
+        return perform(task)
+
+    monkeypatch.setattr(estimate_module, "perform", record_duration)
+    # The first 2 s of simulation time take 1 s, so 8 s take the 4 s that a trial may take.
+    set_clock(monkeypatch, 1.0, 3.0)
+    estimate = estimate_sweep(study, tmp_path, workers=1)
+    assert durations == [2.0, 8.0]
+    assert estimate.controllers["rapf"].seconds_per_run == 5 * 3.0
+    assert estimate.seconds == 3 * 5 * 3.0
 
 
 def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
@@ -55,10 +82,13 @@ def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
             ledger.store(task, perform(task))
     before = sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*"))
     estimate = estimate_sweep(study, tmp_path, workers=1)
-    assert (estimate.left, estimate.run) == (4, tasks[2].name)
+    assert estimate.left == 4
+    assert {trial.run for trial in estimate.controllers.values()} == {tasks[4].name, tasks[5].name}
+    assert [trial.left for trial in estimate.controllers.values()] == [2, 2]
     assert sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*")) == before
 
 
 def test_the_error_of_a_failed_run_is_reported(tmp_path: Path) -> None:
     estimate = estimate_sweep(build_small_study(robots=(500,)), tmp_path, workers=1)
-    assert estimate.error is not None and "space for about" in estimate.error
+    for trial in estimate.controllers.values():
+        assert trial.error is not None and "space for about" in trial.error
