@@ -1,5 +1,6 @@
 """The page that compares results of the benchmark: tables and Pareto plots for each track."""
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -29,7 +30,6 @@ from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve
 from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
 from robocov_app.report.document import load_template
-from robocov_app.report.plots.plot import PagePlot
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.tables.table import PageTable
 from robocov_app.report.theme_css import build_theme_rules
@@ -85,6 +85,8 @@ MAX_PLOTTED_ENTRIES = 40
 """Maximum number of entries in a plot, apart from the bundled ones; those with the highest scores."""
 _MAX_PLOT_LABEL_CHARS = 28
 """Maximum length of a label in a plot."""
+_MAX_EQUAL_POINTS = 4
+"""Maximum number of controllers with the same value of a quantity that are all drawn."""
 
 
 class ParetoPoint(NamedTuple):
@@ -98,6 +100,15 @@ class ParetoPoint(NamedTuple):
     """Median gap, %."""
     is_rival: bool
     """Whether the controller competes, which means that it does not know the whole map."""
+
+
+class ParetoPlot(NamedTuple):
+    """A plot of the gap against a quantity."""
+
+    title: str
+    svg: str
+    note: str
+    """Sentence about controllers that are not drawn; empty if there are none."""
 
 
 class _Entries(NamedTuple):
@@ -214,7 +225,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
     """Build the table of scores and gaps on some tracks.
 
     Entries that have all runs of all these tracks come first, ranked by mean score. The other entries have no
-    rank.
+    rank and follow in alphabetical order. A note lists the entries without any runs.
     """
     by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
@@ -227,6 +238,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
             scores[label] = float(np.mean([rating.score for rating in label_ratings.values()]))
     ranked = sorted(scores, key=lambda label: -scores[label])
     not_ranked = [label for label in labels if label not in scores and by_label[label]]
+    not_ranked.sort(key=str.casefold)
     rows = []
     for rank, label in enumerate(ranked, start=1):
         cells = _build_overview_cells(by_label[label], tracks)
@@ -236,7 +248,11 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
     head = ("Controller", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
-    return PageTable("Scores, and median gaps on each track, %", head, rows)
+    notes: tuple[str, ...] = ()
+    missing = sorted((label for label in labels if not by_label[label]), key=str.casefold)
+    if missing:
+        notes = (f"Without runs on these tracks: {', '.join(missing)}.",)
+    return PageTable("Scores, and median gaps on each track, %", head, rows, notes=notes)
 
 
 def _build_overview_cells(
@@ -322,7 +338,7 @@ def _select_ratings_to_plot(track_ratings: Sequence[Rating], entries: _Entries) 
     return [rating for rating in track_ratings if rating.label not in omitted]
 
 
-def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[PagePlot]:
+def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[ParetoPlot]:
     """Build the plots of a track: the gap against each quantity in which controllers differ."""
     plots = []
     for key, quantity in QUANTITIES.items():
@@ -343,10 +359,50 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
             continue
         texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f}%" for point in points]
         description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
-        figure = draw_pareto_figure(points, quantity.axis_label)
+        drawn, omitted = thin_out_equal_values(points)
+        figure = draw_pareto_figure(drawn, quantity.axis_label)
         svg = inline_svg(figure, f"{name}-{key}", description)
-        plots.append(PagePlot(f"Gap and {quantity.title}", svg))
+        note = ""
+        if omitted:
+            labels = ", ".join(point.label for point in omitted)
+            note = (
+                f"Not drawn, because they share the value {omitted[0].x:.4g} with a controller that has a "
+                f"smaller gap: {labels}."
+            )
+        plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
     return plots
+
+
+def thin_out_equal_values(
+    points: Sequence[ParetoPoint],
+) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
+    """Split points into those to draw and those to omit.
+
+    If many controllers have the same value of the quantity, as those that send only their positions, their
+    marks would hide each other. Then only the smallest gap of the competing controllers and the smallest gap
+    of those that know the whole map are drawn.
+
+    Parameters
+    ----------
+    points : sequence of ParetoPoint
+        At least one.
+
+    Returns
+    -------
+    drawn, omitted : list of ParetoPoint
+    """
+    counts = Counter(f"{point.x:.3g}" for point in points)
+    common_value, count = counts.most_common(1)[0]
+    if count <= _MAX_EQUAL_POINTS:
+        return list(points), []
+    equal = sorted(
+        (point for point in points if f"{point.x:.3g}" == common_value), key=lambda point: point.gap
+    )
+    best = [
+        next((point for point in equal if point.is_rival == is_rival), None) for is_rival in (True, False)
+    ]
+    omitted = [point for point in equal if point not in best]
+    return [point for point in points if point not in omitted], omitted
 
 
 def _select_points(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:

@@ -41,7 +41,7 @@ HEAD = (
     "∫J / J_ref, s",
     "Path, m",
     "Work, J",
-    "Contacts",
+    "Runs with contacts",
     "Settled",
     "Settled, s",
     "B/s",
@@ -56,7 +56,7 @@ _SUMMARY_COLUMNS = (
     "Worst",
     "Within 5%, s",
     "Path, m",
-    "Contacts",
+    "Runs with contacts",
     "Settled",
     "B/s",
     "µs/s",
@@ -72,11 +72,12 @@ NOTES = (
     "be too small: it is the median gap to bound, J / J_bound − 1, where J_bound is a proven lower bound. It "
     "is given if all bounds are known. They are certified for J as it is computed, a sum over 128 x 128 "
     "sites, not for the integral that it approximates.",
-    "Within 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J over "
-    "the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so are "
-    "the other columns, with these exceptions. Contacts: the runs in which a robot touched a wall or "
-    "another robot. Settled: the fraction of runs at whose end no robot moves 5 cm or more within 4 s, "
-    "and the Kaplan-Meier median of the time at which this begins; runs that do not settle are censored.",
+    "Within 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J "
+    "over the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so "
+    "are the other columns, with these exceptions. Runs with contacts: those in which a robot touched a "
+    "wall or another robot. Settled: the fraction of runs at whose end no robot moves 5 cm or more within "
+    "4 s, and the Kaplan-Meier median of the time at which this begins; runs that do not settle are "
+    "censored.",
     "B/s: bytes that a robot sends per second, received or not: 20 for each position (number, position), "
     "and the sizes of the messages of its controller, in which robots share maps and reports about other "
     "robots. The controller itself declares these sizes. µs/s: processor time of the controller per robot "
@@ -317,7 +318,7 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
     fraction_at_rest, rest_time = rating.compute_rest()
     rest_text = f"{fraction_at_rest:.0%}" if rating.rows else NO_VALUE
     contacts = sum(row["contacts"] > 0 for row in rating.rows)
-    interval = NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}"
+    interval = NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f}–{100.0 * gap.high:.1f}"
     return {
         "Controller": rating.label,
         "Knows": information,
@@ -331,7 +332,7 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
         "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
         "Work, J": format_number(rating.compute_median("work_J"), ".0f"),
-        "Contacts": f"{contacts} of {len(rating.rows)} runs",
+        "Runs with contacts": f"{contacts} of {len(rating.rows)}",
         "Settled": rest_text,
         "Settled, s": format_number(rest_time, ".0f"),
         "B/s": format_number(rating.compute_rate("sent_bytes"), ".0f"),

@@ -37,6 +37,7 @@ from robocov_app.benchmark.page import (
     build_page,
     draw_pareto_figure,
     find_pareto_front,
+    thin_out_equal_values,
 )
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.results import (
@@ -286,6 +287,33 @@ def test_an_incomplete_entry_is_listed_separately() -> None:
     # RAPF is shown next to it, over the same runs.
     rapf_row = next(row for row in other_rows if row[0] == "RAPF")
     assert rapf_row[1:] == few_row[1:]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_unranked_entries_are_in_alphabetical_order_and_entries_without_runs_are_named() -> None:
+    results = load_results_of("rapf", "lloyd")
+    few_results = [
+        {**results[0], "rows": results[0]["rows"][:3], "entry": {**results[0]["entry"], "label": label}}
+        for label in ("b", "C", "a")
+    ]
+    page = build_page([*results, *few_results], "Test")
+    overview = page.partition('id="overview-core"')[2].partition("</section>")[0]
+    rows = re.findall(r'<th scope="row"[^>]*>(?:<svg.*?</svg>)?(.*?)</th>', overview)
+    assert rows[-3:] == ["a", "b", "C"]
+    plans = page.partition('id="overview-plans"')[2].partition("</section>")[0]
+    assert "Without runs on these tracks: a, b, C." in plans
+
+
+def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    equal = [
+        ParetoPoint(style, f"{gap}", 1200.0, gap, is_rival=gap > 2.0) for gap in (5.0, 4.0, 3.0, 2.0, 1.0)
+    ]
+    other = ParetoPoint(style, "other", 1210.0, 9.0, is_rival=True)
+    drawn, omitted = thin_out_equal_values([*equal, other])
+    assert [point.label for point in drawn] == ["3.0", "1.0", "other"]
+    assert [point.label for point in omitted] == ["2.0", "4.0", "5.0"]
+    assert thin_out_equal_values([*equal[1:], other]) == ([*equal[1:], other], [])
 
 
 @pytest.mark.usefixtures("without_plots")
