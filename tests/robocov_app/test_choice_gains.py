@@ -138,7 +138,7 @@ def test_a_report_compares_the_choices(swept_folder: Path) -> None:
     result = load_result(swept_folder)
     assert find_varying_gains(result) == {"target": ["rapf"]}
     plots = build_parameter_plots(result, "k")
-    assert [plot.title for plot in plots] == ["target"]
+    assert [plot.title for plot in plots] == ["target of RAPF"]
     assert "medians at centroid:" in plots[0].svg
     assert "median:" in plots[0].svg
 

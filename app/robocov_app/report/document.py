@@ -110,7 +110,8 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
     selection = select_runs(result, MAX_SHOWN_RUNS, replay.MAX_PANES)
     runs = _build_replay_runs(result, selection.runs)
     thumbnails = [
-        _build_thumbnail(replay_run, run) for replay_run, run in zip(runs, selection.runs, strict=True)
+        _build_thumbnail(replay_run, run, selection.roles.get(run, ""))
+        for replay_run, run in zip(runs, selection.runs, strict=True)
     ]
     return {
         "key": key,
@@ -188,14 +189,15 @@ def _has_failures(run: ReplayRun) -> bool:
     return any(failure is not None for _, failure in list_lifetimes(run.record))
 
 
-def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun) -> dict[str, Any]:
-    """Build the template variables of a run's small picture."""
+def _build_thumbnail(replay_run: ReplayRun, run: ReportedRun, role: str) -> dict[str, Any]:
+    """Build the template variables of a run's small picture; its caption starts with the role of the run."""
     final_distance = ""
     if not math.isnan(run.final_distance):
         final_distance = f"{run.final_distance:.3f} m"
+    subtitle = replay_run.title.removeprefix(replay_run.label).removeprefix(" · ")
     return {
         "run": replay_run,
-        "subtitle": replay_run.title.removeprefix(replay_run.label).removeprefix(" · "),
+        "subtitle": " · ".join(text for text in (role, subtitle) if text),
         "picture": draw_run(replay_run.record, replay_run.history, is_hidden=True),
         "final": final_distance,
     }

@@ -130,7 +130,7 @@ def _format_team_parameter(key: str, value: Any) -> str:
     if not values:
         return ""
     if all(item is None for item in values):
-        return f"{label} without limit"
+        return f"unlimited {label}"
     if not all(isinstance(item, int | float) for item in values):
         return ""
     low = min(values)

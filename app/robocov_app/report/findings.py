@@ -75,6 +75,13 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
     subject = "Final mean distance to the nearest robot"
     if format_densities(result):
         subject += ", weighted by φ"
+    if len(texts) == 2 and lowest > 0:
+        best, other = sorted(runs, key=lambda run: run.final_distance)
+        excess = other.final_distance / lowest - 1
+        return (
+            f"{subject}: {lowest:.3f} m with {labels[best]}, {other.final_distance:.3f} m with "
+            f"{labels[other]}, which is {excess:.0%} more."
+        )
     return f"{subject}: {', '.join(texts)}."
 
 
@@ -117,16 +124,17 @@ def _list_reasons(reasons: Sequence[str]) -> str:
     different_reasons = list(dict.fromkeys(reasons))
     text = "; ".join(different_reasons[:_MAX_LISTED_REASONS])
     if len(different_reasons) > _MAX_LISTED_REASONS:
-        text += f"; and {len(different_reasons) - _MAX_LISTED_REASONS} more"
+        text += f"; and {format_count(len(different_reasons) - _MAX_LISTED_REASONS, 'more reason')}"
     return f"{text}."
 
 
 def list_problems(result: ReportedResult) -> list[str]:
     """Describe in how many runs there were contacts, stuck robots, and teams that had not settled."""
     runs = result.completed_runs
+    max_stuck = max((run.metrics.get("stuck_robots") or 0 for run in runs), default=0)
     stuck_problem = "a robot was stuck at the end"
-    if len(runs) == 1 and (runs[0].metrics.get("stuck_robots") or 0) > 1:
-        stuck_problem = f"{runs[0].metrics['stuck_robots']} robots were stuck at the end"
+    if max_stuck > 1:
+        stuck_problem = f"{'' if len(runs) == 1 else 'up to '}{max_stuck} robots were stuck at the end"
     counts = {
         "a robot touched a wall or another robot": sum(
             (run.metrics.get("contacts") or 0) > 0 for run in runs

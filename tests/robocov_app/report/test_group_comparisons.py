@@ -192,7 +192,7 @@ def test_the_note_lists_the_chosen_gains_and_failed_runs_count_as_the_worst() ->
     assert [group.label for group in groups] == ["RAPF (tuned)", "RPF"]
     assert {dict(run.gains)["k"] for run in groups[0].runs} == {2.0}
     assert "on the other maps" in note
-    assert "Chosen: RAPF k 2 in 3 of 3." in note
+    assert "Chosen: RAPF k 2 on 3 of 3 maps." in note
 
 
 def test_a_tuned_controller_has_the_style_of_its_gains_if_they_are_the_same_for_all_maps() -> None:

@@ -36,7 +36,8 @@ RUNS = [
         (
             build_result([build_run(final=3.0), build_run("rpf", final=2.0)], kind="comparison"),
             "RAPF, RPF on rooms",
-            "Final mean distance to the nearest robot: RPF 2.000 m, RAPF 3.000 m (+50%).",
+            "Final mean distance to the nearest robot: 2.000 m with RPF, 3.000 m with RAPF, "
+            "which is 50% more.",
         ),
         (build_result([build_run(final=None)], kind="run"), "RAPF on rooms", "No run has a result."),
         (
@@ -72,7 +73,7 @@ def test_missing_failed_and_damaged_runs_are_listed() -> None:
     result = build_result([*RUNS, *failed_runs], expected_count=20)
     result = replace(result, damaged_runs=(DamagedRun("run-7", "no zip file"),))
     assert list_missing_runs(result) == [
-        "5 of 10 runs failed (RPF 5 of 5): no; a; b; and 1 more.",
+        "5 of 10 runs failed (RPF 5 of 5): no; a; b; and 1 more reason.",
         "1 run cannot be read and is left out: run-7 (no zip file).",
         "Not finished: 9 of 20 runs are missing.",
     ]
@@ -91,6 +92,10 @@ def test_problems_of_a_single_run_are_not_counted() -> None:
     assert list_problems(build_result([stuck_run])) == ["A robot was stuck at the end."]
     two_stuck = build_run(settled_at_s=1.0, stuck_robots=2)
     assert list_problems(build_result([two_stuck])) == ["2 robots were stuck at the end."]
+    one_stuck = build_run("rpf", settled_at_s=1.0, stuck_robots=1)
+    assert list_problems(build_result([two_stuck, one_stuck])) == [
+        "In 2 of 2 runs up to 2 robots were stuck at the end."
+    ]
     assert list_problems(build_result([build_run(settled_at_s=1.0)])) == []
     assert list_problems(build_result([build_run(error="no")])) == []
 
@@ -104,7 +109,7 @@ def test_facts_are_complete_and_short() -> None:
     assert facts["Seeds"] == "0 to 29"
     assert facts["Robots"] == "4, 6"
     assert facts["Duration"] == "6 s"
-    assert facts["Team"] == "max speed 1 m/s, communication range without limit, mass 1 to 2 kg"
+    assert facts["Team"] == "max speed 1 m/s, unlimited communication range, mass 1 to 2 kg"
     assert facts["Versions"] == "python 3.11.7, robocov 0.1.0"
     assert facts["Control period"] == "100 ms"
 

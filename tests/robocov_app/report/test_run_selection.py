@@ -60,13 +60,19 @@ def test_a_selection_is_small_and_contains_the_extremes_of_each_map(runs: list[R
     if len(runs) <= MAX_SHOWN_RUNS:
         assert selection.runs == tuple(runs)
         assert selection.note == "All runs."
+        assert selection.roles == {}
         return
+    assert set(selection.roles) == set(selection.runs)
     for controller in CONTROLLERS:
         for map_number in MAP_NUMBERS:
             group = [run for run in runs if (run.controller, run.map) == (controller, f"m{map_number}")]
             if group:
                 selected = [run for run in selection.runs if run in group]
                 assert find_range(selected) == find_range(group)
+                best = min(group, key=lambda run: run.final_distance)
+                worst = max(group, key=lambda run: run.final_distance)
+                assert selection.roles[best] == "best"
+                assert best is worst or selection.roles[worst] == "worst"
 
 
 def test_panes_show_runs_from_the_same_start() -> None:
@@ -75,7 +81,7 @@ def test_panes_show_runs_from_the_same_start() -> None:
     pane_runs = list_pane_runs(selection)
     assert [run.controller for run in pane_runs] == list(CONTROLLERS)
     assert len({run.case for run in pane_runs}) == 1
-    assert selection.note.startswith(f"{len(selection.runs)} of 120 runs: on each map")
+    assert selection.note.startswith(f"{len(selection.runs)} of 120 runs: for each map, the best")
     for controller in CONTROLLERS:
         selected = [run for run in selection.runs if run.controller == controller]
         group = [run for run in result.runs if run.controller == controller]
@@ -99,7 +105,7 @@ def test_with_very_many_maps_the_extremes_of_all_maps_are_selected() -> None:
         selected = [run for run in selection.runs if run.controller == controller]
         group = [run for run in result.runs if run.controller == controller]
         assert find_range(selected) == find_range(group)
-    assert selection.note.startswith(f"{len(selection.runs)} of 360 runs: over all maps")
+    assert selection.note.startswith(f"{len(selection.runs)} of 360 runs: over all maps, the best")
 
 
 def test_a_few_sets_of_gains_of_one_controller_are_side_by_side() -> None:

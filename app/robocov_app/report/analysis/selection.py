@@ -1,6 +1,6 @@
 """Selection of the runs that a page shows as pictures and in the replay."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +14,8 @@ from robocov_app.report.results.result import ReportedResult, ReportedRun
 MAX_SHOWN_RUNS = 50
 """Maximum number of runs of a result that a page shows."""
 _CRITERIA = (
-    "the best and the worst run of each controller by its final mean distance, with any gains, and the most "
-    "typical case (start and seed) of all controllers, with the gains of the comparison in pairs"
+    "the best and the worst run of each controller by final mean distance, with any of its gains, and the "
+    "runs of a typical start and seed, with the gains that are compared in pairs"
 )
 
 
@@ -30,11 +30,14 @@ class RunSelection(NamedTuple):
         Description of how they were selected.
     panes : tuple of int
         Indices in `runs` of those that are shown side by side at first.
+    roles : mapping of ReportedRun to str
+        Why runs were selected: "best", "worst" or "typical"; empty if all runs are shown.
     """
 
     runs: tuple[ReportedRun, ...]
     note: str
     panes: tuple[int, ...]
+    roles: Mapping[ReportedRun, str]
 
 
 def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_panes: int = 4) -> RunSelection:
@@ -57,43 +60,48 @@ def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_pane
     """
     runs = result.completed_runs
     note = "All runs."
+    roles: Mapping[ReportedRun, str] = {}
     if len(runs) > max_runs:
-        runs, note = _select_extremes(result, max_runs)
+        runs, note, roles = _select_extremes(result, max_runs)
     groups = list_variants(result)
     if len(groups) > max_panes:
         groups = choose_compared_groups(result).groups
     middle_runs = _find_middle_case(groups, runs, compute_medians(result)) or runs[:1]
     panes = tuple(runs.index(run) for run in middle_runs[:max_panes])
-    return RunSelection(runs, note, panes)
+    return RunSelection(runs, note, panes, roles)
 
 
-def _select_extremes(result: ReportedResult, max_runs: int) -> tuple[tuple[ReportedRun, ...], str]:
-    """Return the best, worst and middle runs, and a note on how they were selected."""
+def _select_extremes(
+    result: ReportedResult, max_runs: int
+) -> tuple[tuple[ReportedRun, ...], str, dict[ReportedRun, str]]:
+    """Return the best, worst and middle runs, a note on how they were selected, and the role of each."""
     all_runs = result.completed_runs
-    selected: set[ReportedRun] = set()
+    roles: dict[ReportedRun, str] = {}
     for map_runs in group_by(all_runs, lambda run: run.map).values():
-        selected |= _find_extremes(result, map_runs)
-    criteria = f"on each map {_CRITERIA}."
-    if len(selected) > max_runs:
-        selected = _find_extremes(result, all_runs)
-        criteria = f"over all maps {_CRITERIA}; distances are divided by the median of the same map and team."
-    if not selected:
+        roles |= _find_extremes(result, map_runs)
+    criteria = f"for each map, {_CRITERIA}."
+    if len(roles) > max_runs:
+        roles = _find_extremes(result, all_runs)
+        criteria = (
+            f"over all maps, {_CRITERIA}. Distances are divided by the median of the same map and team."
+        )
+    if not roles:
         note = f"The first {max_runs} of {len(all_runs)} runs: none has a final cost."
-        return all_runs[:max_runs], note
-    runs = tuple(run for run in all_runs if run in selected)[:max_runs]
-    return runs, f"{len(runs)} of {len(all_runs)} runs: {criteria}"
+        return all_runs[:max_runs], note, {}
+    runs = tuple(run for run in all_runs if run in roles)[:max_runs]
+    return runs, f"{len(runs)} of {len(all_runs)} runs: {criteria}", roles
 
 
-def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> set[ReportedRun]:
-    """Return the best and the worst run of each controller, and the runs of the middle case."""
+def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> dict[ReportedRun, str]:
+    """Return the best and worst runs of each controller and those of the middle case, with their roles."""
     scales = compute_medians(result)
     groups = choose_compared_groups(result).groups
-    extremes = set(_find_middle_case(groups, runs, scales))
+    extremes = dict.fromkeys(_find_middle_case(groups, runs, scales), "typical")
     known_runs = [run for run in runs if np.isfinite(scale_distance(run, scales))]
     for controller_runs in group_by(known_runs, lambda run: run.controller).values():
         distances = [scale_distance(run, scales) for run in controller_runs]
-        extremes.add(controller_runs[int(np.argmin(distances))])
-        extremes.add(controller_runs[int(np.argmax(distances))])
+        extremes[controller_runs[int(np.argmax(distances))]] = "worst"
+        extremes[controller_runs[int(np.argmin(distances))]] = "best"
     return extremes
 
 

@@ -161,7 +161,9 @@ def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]
     first_label = variants[0].runs[0].label
     group = RunGroup(first_label + TUNED_SUFFIX, variants[0].controller, None, tuple(runs))
     counts = Counter(labels).most_common(_MAX_LISTED_GAINS)
-    choice = ", ".join(f"{label} in {count} of {len(tuning.folds)}" for label, count in counts)
+    # If there are several maps, each is a fold; otherwise each start and seed is one.
+    unit = "maps" if tuning.get_fold is _get_map else "starts"
+    choice = ", ".join(f"{label} on {count} of {len(tuning.folds)} {unit}" for label, count in counts)
     return group, choice
 
 

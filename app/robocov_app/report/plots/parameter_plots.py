@@ -103,12 +103,17 @@ def build_parameter_plots(result: ReportedResult, key: str) -> list[PagePlot]:
     plots: list[PagePlot | None] = []
     for number, (name, controllers) in enumerate(varying_gains.items()):
         gain_groups = [group for group in groups if group.controller in controllers]
-        plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}"))
+        title = name
+        if len(gain_groups) == 1:
+            title = f"{name} of {gain_groups[0].label}"
+        plots.append(_build_plot(gains[name], gain_groups, styles, axis, key=f"{key}-{number}", title=title))
     # A setting includes the team, which varies here, so distances are divided by the median of the map.
     map_axis = _choose_axis(result, "final distance / median of map", attrgetter("map"))
     for number, parameter in enumerate(_list_team_parameters(result)):
         if len({parameter.get_value(run) for run in result.completed_runs}) > 1:
-            plots.append(_build_plot(parameter, groups, styles, map_axis, key=f"{key}-team-{number}"))
+            title = parameter.name.replace("_", " ")
+            team_key = f"{key}-team-{number}"
+            plots.append(_build_plot(parameter, groups, styles, map_axis, key=team_key, title=title))
     grid_plots: list[PagePlot] = []
     for group in groups:
         group_gains = [gains[name] for name, names in varying_gains.items() if group.controller in names]
@@ -170,6 +175,7 @@ def _build_plot(
     axis: _DistanceAxis,
     *,
     key: str,
+    title: str,
 ) -> PagePlot | None:
     """Build the plot of distances against a parameter; return None if no distance is known."""
     all_results = []
@@ -182,7 +188,7 @@ def _build_plot(
     figure = plot_gains(all_results, parameter.title, PANEL_SIZE_PX, axis.label, parameter.choices)
     texts = "; ".join(_describe_results(results, parameter) for results in all_results)
     description = f"{axis.label} against {parameter.title}. {texts}."
-    return PagePlot(parameter.title, inline_svg(figure, key, description))
+    return PagePlot(title, inline_svg(figure, key, description))
 
 
 def _collect_results(
