@@ -38,9 +38,12 @@ _COLUMNS = {
 class Arguments(FigureOptions):
     """Compute metrics of saved runs: sensed and visible area, energy, path length, connectivity, clearance.
 
-    Writes metrics.csv into the folder of each run, with one row per sample. Areas: within the sensing range
-    and in line of sight, within it through walls, and in line of sight at any distance. Energy: the integrals
-    of |F v| and of |F|² of the controller's forces. --plot draws all metrics against time.
+    Writes metrics.csv into the folder of each run, with one row per sample, and prints the values at the end.
+    The sensed area is within the sensing range of a robot and in its line of sight, the visible area in line
+    of sight at any distance. Work and effort are the integrals of |F v| and of |F|² of the controller's
+    forces. The components are groups of robots that can communicate with each other.
+
+    --plot draws four of the metrics against time: sensed area, visible area, work and path length.
 
     Example: robocov metrics museum --plot museum-metrics.png
     """
