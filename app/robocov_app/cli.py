@@ -14,7 +14,6 @@ import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -83,8 +82,12 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"robocov {__version__}")
         return OK
     if name not in COMMANDS:
-        similar = get_close_matches(name, COMMANDS, n=1)
-        hint = f"did you mean {similar[0]!r}?" if similar else f"known are {', '.join(COMMANDS)}"
+        from robocov.errors import find_similar_names
+
+        similar_names = find_similar_names(name, COMMANDS)
+        hint = f"known are {', '.join(COMMANDS)}"
+        if similar_names:
+            hint = f"did you mean {' or '.join(map(repr, similar_names))}?"
         return _print_error(f"unknown command {name!r}: {hint}")
     # Calls from other code, such as tests, stay in this process.
     return _run_subcommand(name, rest, may_supervise=arguments is None)

@@ -32,6 +32,7 @@ _MAX_QUOTED_CHARACTERS = 60
 _MAX_LISTED_NAMES = 3
 _MIN_SIMILARITY = 0.5
 """Minimum similarity, as measured by `difflib`, of a known name that is suggested."""
+_MAX_SUGGESTIONS = 3
 
 
 class RobocovError(Exception):
@@ -49,7 +50,7 @@ class RobocovError(Exception):
     ...     rc.Rapf(k_rep=-1.0)
     ... except rc.RobocovError as error:
     ...     print(error)
-    rapf.k_rep: expected a number from 0 to 1e+06 N m³, got -1.0
+    rapf.k_rep: expected a number from 0 to 1000000 N m³, got -1.0
     """
 
 
@@ -67,7 +68,7 @@ class InputError(RobocovError):
     >>> import robocov as rc
     >>> rc.read_results("no-such-folder")
     Traceback (most recent call last):
-    robocov.errors.InputError: no-such-folder: not the folder of a sweep (there is no results.csv)
+    robocov.errors.InputError: no-such-folder: expected the folder of a sweep, got a path that does not exist
     """
 
 
@@ -194,7 +195,7 @@ class MapError(InputError):
         message = first.format_message(source_name)
         total_count = len(issues) + unlisted
         if total_count > 1:
-            message += f" (and {total_count - 1} more)"
+            message += f" (and {format_count(total_count - 1, 'more issue')})"
         error = cls(message)
         error.issues = tuple(issues[: cls.MAX_LISTED])
         error.unlisted = total_count - len(error.issues)
@@ -235,7 +236,7 @@ class ParameterError(InputError):
     >>> import robocov as rc
     >>> rc.Team.homogeneous(3, max_speed=-1.0)
     Traceback (most recent call last):
-    robocov.errors.ParameterError: team.max_speed: expected a number from 1e-06 to 1000, got -1.0 m/s
+    robocov.errors.ParameterError: team.max_speed: expected a number from 0.000001 to 1000, got -1.0 m/s
     """
 
 
@@ -428,7 +429,7 @@ def require_number(
     kind = Integral if whole else Real
     if not is_number(value, kind) or not minimum <= value <= maximum:
         description = "a whole number" if whole else "a number"
-        expected = f"{description} from {minimum:g} to {maximum:g} {unit}".rstrip()
+        expected = f"{description} from {format_bound(minimum)} to {format_bound(maximum)} {unit}".rstrip()
         raise ParameterError(_describe_mismatch(name, value, expected))
     return float(value)
 
@@ -548,7 +549,7 @@ def format_count(count: int, noun: str) -> str:
 
 
 def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for an unknown name, which suggests the most similar known name.
+    """Return the message for an unknown name, which suggests the most similar known names.
 
     Parameters
     ----------
@@ -570,10 +571,91 @@ def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """
     names = sorted(known)
     message = f"unknown {kind} {quote(name)}"
-    for similar_name in get_close_matches(name.lower(), names, n=1, cutoff=_MIN_SIMILARITY):
-        message += f": did you mean {quote(similar_name)}?"
+    similar_names = find_similar_names(name.lower(), names)
+    if similar_names:
+        message += f": did you mean {' or '.join(map(quote, similar_names))}?"
     listing = ", ".join(_shorten(to_one_line(known_name)) for known_name in names)
     return f"{message} (known: {listing})"
+
+
+def find_similar_names(name: str, known: Iterable[str], min_similarity: float = _MIN_SIMILARITY) -> list[str]:
+    """Find the known names that need the fewest edits to become a misspelled name.
+
+    Parameters
+    ----------
+    name : str
+        The misspelled name.
+    known : iterable of str
+        The known names.
+    min_similarity : float
+        Minimum similarity, as measured by `difflib`, of a name that is returned.
+
+    Returns
+    -------
+    list of str
+        One name, several that are equally near, or none.
+
+    Examples
+    --------
+    >>> find_similar_names("rpaf", ["lloyd", "rapf", "rpf"])
+    ['rapf', 'rpf']
+    """
+    # `difflib` decides which names are similar at all. Its order ignores that transposing two letters is one
+    # mistake, so the number of edits decides among them.
+    names = list(known)
+    similar_names = get_close_matches(name, names, n=max(len(names), 1), cutoff=min_similarity)
+    edit_counts = {similar_name: _count_edits(name, similar_name) for similar_name in similar_names}
+    fewest_edits = min(edit_counts.values(), default=0)
+    nearest_names = [similar_name for similar_name in names if edit_counts.get(similar_name) == fewest_edits]
+    return nearest_names[:_MAX_SUGGESTIONS]
+
+
+def _count_edits(first: str, second: str) -> int:
+    """Return the number of edits between two words (the optimal string alignment distance).
+
+    An edit inserts, deletes or replaces one letter, or transposes two adjacent ones. Of long words, only the
+    start is compared.
+    """
+    first = first[:_MAX_QUOTED_CHARACTERS]
+    second = second[:_MAX_QUOTED_CHARACTERS]
+    # counts[i][j] is the number of edits between the first i letters of `first` and the first j of `second`.
+    counts = [[0] * (len(second) + 1) for _ in range(len(first) + 1)]
+    for i in range(len(first) + 1):
+        for j in range(len(second) + 1):
+            if i == 0 or j == 0:
+                counts[i][j] = i + j
+                continue
+            is_different = first[i - 1] != second[j - 1]
+            counts[i][j] = min(
+                counts[i - 1][j] + 1,
+                counts[i][j - 1] + 1,
+                counts[i - 1][j - 1] + is_different,
+            )
+            if i > 1 and j > 1 and first[i - 2 : i] == second[j - 1] + second[j - 2]:
+                counts[i][j] = min(counts[i][j], counts[i - 2][j - 2] + 1)
+    return counts[-1][-1]
+
+
+def format_bound(bound: float) -> str:
+    """Format a bound of a range without an exponent, if it has at most ten digits.
+
+    Parameters
+    ----------
+    bound : float
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_bound(1e6), format_bound(0.5), format_bound(1e-6)
+    ('1000000', '0.5', '0.000001')
+    """
+    text = f"{bound:g}"
+    if "e" not in text or not 1e-9 <= abs(bound) <= 1e9:
+        return text
+    return f"{bound:.9f}".rstrip("0").rstrip(".")
 
 
 def _shorten(text: str) -> str:

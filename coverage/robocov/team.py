@@ -28,6 +28,7 @@ from robocov.defaults import (
 from robocov.errors import (
     ParameterError,
     describe_unknown_name,
+    format_bound,
     format_count,
     is_number,
     quote,
@@ -81,7 +82,7 @@ class TeamParameter(NamedTuple):
         -------
         str
         """
-        text = f"a number from {self.minimum:g} to {self.maximum:g}"
+        text = f"a number from {format_bound(self.minimum)} to {format_bound(self.maximum)}"
         return f"{text} or {infinity}" if self.may_be_infinite else text
 
 

@@ -24,11 +24,34 @@ def test_the_class_hierarchy_of_errors() -> None:
     [
         ("rappf", "unknown controller 'rappf': did you mean 'rapf'? (known: lloyd, rapf, rpf)"),
         ("RAPF", "unknown controller 'RAPF': did you mean 'rapf'? (known: lloyd, rapf, rpf)"),
+        ("rpaf", "unknown controller 'rpaf': did you mean 'rapf' or 'rpf'? (known: lloyd, rapf, rpf)"),
         ("zzzz", "unknown controller 'zzzz' (known: lloyd, rapf, rpf)"),
     ],
 )
 def test_unknown_names_get_a_suggestion(name: str, message: str) -> None:
     assert errors.describe_unknown_name("controller", name, ["rapf", "rpf", "lloyd"]) == message
+
+
+@pytest.mark.parametrize(
+    ("name", "similar_names"),
+    [
+        ("rafp", ["rapf"]),
+        ("llyod", ["lloyd"]),
+        ("loyd", ["lloyd"]),
+        ("x", []),
+        ("", []),
+    ],
+)
+def test_transposed_letters_are_one_edit(name: str, similar_names: list[str]) -> None:
+    assert errors.find_similar_names(name, ["rapf", "rpf", "lloyd"]) == similar_names
+
+
+@pytest.mark.parametrize(
+    ("bound", "text"),
+    [(1e6, "1000000"), (2e7, "20000000"), (1e-6, "0.000001"), (0.25, "0.25"), (1e12, "1e+12")],
+)
+def test_bounds_have_no_exponents(bound: float, text: str) -> None:
+    assert errors.format_bound(bound) == text
 
 
 def test_long_values_are_cut_in_messages() -> None:
@@ -48,7 +71,7 @@ def test_the_first_issue_is_reported_and_the_others_are_counted() -> None:
     assert str(MapError.from_issues("m.json", issues[:1])) == "m.json: boundary[0]: expected a point, got 3"
     error = MapError.from_issues("m.json", issues, 4)
     assert isinstance(error, MapError)
-    assert str(error) == "m.json: boundary[0]: expected a point, got 3 (and 6 more)"
+    assert str(error) == "m.json: boundary[0]: expected a point, got 3 (and 6 more issues)"
     assert error.issues == tuple(issues)
     assert (error.line, error.column) == (None, None)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, get_args
 
 from robocov.controllers.base import Information
 from robocov.controllers.registry import update_gain_names
-from robocov.errors import InputError, quote
+from robocov.errors import InputError, format_bound, quote
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
 from robocov_app.runs.cost import AREA_TOLERANCE_M2
@@ -331,7 +331,9 @@ def _check_row(row: Any, location: str) -> None:
         if row[name] is not None and row[name] < 0.0:
             raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
         if row[name] is not None and row[name] > _MAX_METRIC:
-            raise InputError(f"{location}: {name}: expected at most {_MAX_METRIC:g}, got {row[name]}")
+            raise InputError(
+                f"{location}: {name}: expected at most {format_bound(_MAX_METRIC)}, got {row[name]}"
+            )
     if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
         raise InputError(
             f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "

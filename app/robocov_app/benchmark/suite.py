@@ -8,14 +8,13 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from robocov.defaults import DEFAULT_DURATION_S
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, describe_unknown_name, quote
+from robocov.errors import InputError, ParameterError, describe_unknown_name, find_similar_names, quote
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
 from robocov_app.benchmark.large_plans import LARGE_PLANS, build_large_plan
@@ -218,8 +217,8 @@ def build_map(name: str) -> Environment:
         If the suite has no such map.
     """
     if name not in FAMILY_OF:
-        similar_names = get_close_matches(name.lower(), FAMILY_OF, n=1)
-        hint = f"did you mean {quote(similar_names[0])}? " if similar_names else ""
+        similar_names = find_similar_names(name.lower(), FAMILY_OF)
+        hint = f"did you mean {' or '.join(map(quote, similar_names))}? " if similar_names else ""
         raise ParameterError(
             f"--maps: unknown map of the benchmark {quote(name)}: {hint}`robocov benchmark suite` lists them"
         )

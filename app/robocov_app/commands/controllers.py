@@ -18,6 +18,7 @@ from robocov.controllers import (
 )
 from robocov.controllers.gains import Gain, Option, format_value
 from robocov.defaults import DEFAULT_CONTROLLER
+from robocov.errors import format_bound
 from robocov.text import escape_controls
 from robocov_app.commands.options import JsonOption
 from robocov_app.terminal.output import create_console, print_answer
@@ -99,7 +100,7 @@ def _format_range(gain: Gain | Option) -> str:
     """Format the values that a gain may have."""
     if isinstance(gain, Option):
         return " | ".join(gain.choices)
-    text = f"{gain.low:g} to {gain.high:g}"
+    text = f"{format_bound(gain.low)} to {format_bound(gain.high)}"
     if gain.optional:
         text += ", or null"
     return text

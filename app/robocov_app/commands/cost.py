@@ -53,7 +53,7 @@ class Arguments(FigureOptions):
     lattice: int = 128
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
-    """File for arrays per site: points (m,2), distances (m,), owner (m,); with --speeds also times (m,)."""
+    """File for the points, distances and owners of the sites; with --speeds also their times."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -23,6 +23,7 @@ from robocov.defaults import (
     DEFAULT_VISCOSITY_N_S_M,
 )
 from robocov.errors import ParameterError, require_number
+from robocov.files.result_folder import describe_path
 from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.arguments import parse_size, parse_window_size
 
@@ -131,8 +132,8 @@ class WindowOptions(WebOptions):
         super().__post_init__()
         parse_window_size(self.size)
         if not self.serve and not self.folder.is_dir():
-            problem = "not a folder" if self.folder.exists() else "folder not found"
-            raise ParameterError(f"--folder: {self.folder}: {problem}; choose an existing one")
+            actual = describe_path(self.folder)
+            raise ParameterError(f"--folder: {self.folder}: expected an existing folder, got {actual}")
         if self.scale is not None:
             require_number("--scale", self.scale, 0.5, 4.0)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, summarize_names
+from robocov.errors import InputError, ParameterError
 from robocov.files.result_names import REPLAY_FILE, SESSION_FILE
 from robocov_app.commands.options import JsonOption, VideoOptions, WebOptions
 from robocov_app.terminal.arguments import parse_window_size
@@ -124,7 +124,7 @@ def _build_session(options: Arguments, saved_runs: Sequence[SavedRun]) -> Sessio
     for controller in options.controller:
         load_controller_class(controller)
         if controller.rpartition(":")[2] not in class_names:
-            expected = f"expected the controller of a run ({summarize_names(names)})"
+            expected = f"expected the controller of a run ({', '.join(dict.fromkeys(names))})"
             raise ParameterError(f"--controller: {expected}, got {controller}")
     try:
         return build_replay_session(saved_runs, options.controller)

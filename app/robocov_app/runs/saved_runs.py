@@ -13,7 +13,7 @@ from pydantic import Field
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import InputError
 from robocov.files.documents import Document, expect, read_document
-from robocov.files.result_folder import complete_commit
+from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import COMPARISON_FILE, COST_FILE, RUN_FILE
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
@@ -90,10 +90,7 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
     comparison_path = folder / COMPARISON_FILE
     if comparison_path.is_file():
         return _load_comparison(comparison_path)
-    if not (folder / RUN_FILE).is_file():
-        raise InputError(
-            f"{folder}: not the folder of a run or a comparison (there is no run.json and no comparison.json)"
-        )
+    require_result(folder, "the folder of a run or comparison", (RUN_FILE, COMPARISON_FILE))
     return [_load_run(folder)]
 
 

@@ -8,12 +8,11 @@ import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, quote, require_number
+from robocov.errors import InputError, ParameterError, find_similar_names, quote, require_number
 from robocov_app.terminal.help_text import HelpBuffer, insert_description
 
 T = TypeVar("T")
@@ -165,10 +164,10 @@ def _explain_unexpected_argument(word: str, options: list[str]) -> str:
         for option in options:
             if option in ("--controller", "--controllers"):
                 return f"{text}: did you mean {option} {word}?"
-    similar = get_close_matches(f"--{word}", options, n=1, cutoff=_MIN_SIMILARITY)
-    if not similar:
+    similar_options = find_similar_names(f"--{word}", options, _MIN_SIMILARITY)
+    if not similar_options:
         return text
-    return f"{text}: did you mean {similar[0]}?"
+    return f"{text}: did you mean {' or '.join(similar_options)}?"
 
 
 def _list_option_names(kind: Any) -> list[str]:

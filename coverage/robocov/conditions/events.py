@@ -9,7 +9,7 @@ from contextlib import suppress
 from numbers import Integral
 from typing import Any, NamedTuple, TypeVar
 
-from robocov.errors import ParameterError, is_number, quote
+from robocov.errors import ParameterError, format_bound, is_number, quote
 
 MAX_TIME_S = 1e6
 """Latest time of an event."""
@@ -193,7 +193,9 @@ def _build_event(path: str, kind: type[Event], value: Any) -> Event:
     if not is_number(robot, Integral) or robot < 1:
         raise ParameterError(f"{path}: expected the number of a robot, from 1, got {quote(robot)}")
     if not is_number(time) or not 0.0 <= time <= MAX_TIME_S:
-        raise ParameterError(f"{path}: expected a time from 0 to {MAX_TIME_S:g} s, got {quote(time)}")
+        raise ParameterError(
+            f"{path}: expected a time from 0 to {format_bound(MAX_TIME_S)} s, got {quote(time)}"
+        )
     checked_position = [
         None if position is None else _check_position(path, position) for position in optional_position
     ]

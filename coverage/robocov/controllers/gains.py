@@ -6,7 +6,7 @@ from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, 
 from typing import Any, ClassVar, TypeAlias
 
 from robocov.controllers.user_modules import explain_fault
-from robocov.errors import ParameterError, RobocovError, describe_unknown_name, is_number, quote
+from robocov.errors import ParameterError, RobocovError, describe_unknown_name, format_bound, is_number, quote
 
 Value: TypeAlias = float | str | None
 """Value of a gain: a number, None for no limit, or one of the choices of an `Option`."""
@@ -90,7 +90,7 @@ class Gain:
         if is_number(value) and self._is_in_range(value):
             return float(value)
         kind = "whole number" if self.whole else "number"
-        expected = f"a {kind} from {self.low:g} to {self.high:g} {self.unit}".rstrip()
+        expected = f"a {kind} from {format_bound(self.low)} to {format_bound(self.high)} {self.unit}".rstrip()
         if self.optional:
             expected += ", or null for no limit"
         raise ParameterError(f"{controller_name}.{self.name}: expected {expected}, got {quote(value)}")

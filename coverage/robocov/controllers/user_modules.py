@@ -159,7 +159,7 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
     if not class_name or not file.endswith(".py"):
         raise ParameterError(f"{source_name}: expected a file and a class, as in mine.py:MyController")
     if source is None and not Path(file).is_file():
-        raise ParameterError(f"{source_name}: file not found: {file}")
+        raise ParameterError(f"{file}: no such file")
     try:
         module = _load_module(file, source)
     except KeyboardInterrupt:
@@ -172,11 +172,11 @@ def load_class(name: str, source: ControllerSource | None) -> type[Any]:
         raise ParameterError(f"controller {file}: {describe_unknown_name('class', class_name, names)}")
     if not isinstance(kind, type) or not (hasattr(kind, "decide") or hasattr(kind, "force")):
         raise ParameterError(
-            f"{source_name}: {class_name}: expected a class with a method decide(seen, memory) or force(own)"
+            f"{file}: {class_name}: expected a class with a method decide(observations, memory) or force(own)"
         )
     if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
         raise ParameterError(
-            f"{source_name}: {class_name}: expected a frozen dataclass. "
+            f"{file}: {class_name}: expected a frozen dataclass. "
             "Write @dataclass(frozen=True) above the class."
         )
     return kind

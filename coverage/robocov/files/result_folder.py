@@ -14,7 +14,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
@@ -335,7 +335,53 @@ def report_folder_errors(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        if isinstance(error, FileExistsError) and not folder.is_dir():
+            raise OutputError(f"{folder}: expected a folder, got a file") from error
         raise OutputError(f"{folder}: cannot be written: {describe_error(error)}") from error
+
+
+def require_result(folder: Path, expected: str, files: Sequence[str]) -> None:
+    """Raise an error unless a folder contains one of the files that mark a result.
+
+    Parameters
+    ----------
+    folder : Path
+    expected : str
+        Description of the folder, such as "the folder of a run".
+    files : sequence of str
+        Names of files.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist, or contains none of the files.
+    """
+    if any((folder / file).is_file() for file in files):
+        return
+    if folder.is_dir():
+        *first_files, last_file = files
+        listing = f"{', '.join(first_files)} or {last_file}" if first_files else last_file
+        actual = f"a folder without {listing}"
+    else:
+        actual = describe_path(folder)
+    raise InputError(f"{folder}: expected {expected}, got {actual}")
+
+
+def describe_path(path: Path) -> str:
+    """Return what a path leads to, for an error message.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+        "a folder", "a file" or "a path that does not exist".
+    """
+    if path.is_dir():
+        return "a folder"
+    return "a file" if path.exists() else "a path that does not exist"
 
 
 def _read_manifest(path: Path) -> tuple[set[str], set[str]] | None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from difflib import get_close_matches
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from robocov.density import MAX_RASTER_SIZE
-from robocov.errors import Issue, JsonPath, MapError, describe_unknown_name, format_path
+from robocov.errors import Issue, JsonPath, MapError, describe_unknown_name, find_similar_names, format_path
 from robocov.files.documents import build_document_error, check_header, describe_mismatch
 from robocov.mapfile.models import (
     COORDINATE_EXPECTED,
@@ -35,8 +34,6 @@ from robocov.mapfile.models import (
 
 NO_WEIGHT = "expected at least one weight above 0, got none"
 """Message about a density that is 0 everywhere."""
-_MIN_KIND_SIMILARITY = 0.5
-"""Minimum similarity between an unknown kind and a suggested one, as `difflib` measures it."""
 _MIN_RELATIVE_DETERMINANT = 1e-9
 """Minimum determinant of a covariance matrix, relative to the product of its diagonal."""
 _BASE_WEIGHTS = {"uniform": "weight", "gaussians": "floor", "polygons": "background"}
@@ -152,8 +149,9 @@ def _build_unknown_kind_issue(path: JsonPath, value: object, kinds: list[str]) -
         return Issue.at_path(path, describe_mismatch(expected, None, is_missing=True))
     message = describe_mismatch(expected, value["kind"])
     name = str(value["kind"]).lower()
-    for similar_kind in get_close_matches(name, kinds, n=1, cutoff=_MIN_KIND_SIMILARITY):
-        message += f" (did you mean {similar_kind!r}?)"
+    similar_kinds = find_similar_names(name, kinds)
+    if similar_kinds:
+        message += f" (did you mean {' or '.join(map(repr, similar_kinds))}?)"
     return Issue.at_path(path, message)
 
 

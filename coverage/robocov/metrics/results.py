@@ -14,6 +14,7 @@ import numpy as np
 
 from robocov.errors import InputError, describe_unknown_name, format_count, quote
 from robocov.files.csv_cells import unquote_cell
+from robocov.files.result_folder import require_result
 from robocov.files.result_names import COST_FILE, ERROR_FILE, RUNS_FOLDER, STUDY_FILE, SWEEP_TABLE_FILE
 from robocov.metrics.cost_history import CostHistory
 from robocov.optional_imports import import_optional
@@ -300,8 +301,7 @@ def read_results(folder: Path | str) -> Results:
     2 [{'controller': 'rapf', 'mean_distance_m': 1.25}, {'controller': 'lloyd', 'mean_distance_m': 1.31}]
     """
     folder = Path(folder)
-    if not (folder / SWEEP_TABLE_FILE).is_file():
-        raise InputError(f"{folder}: not the folder of a sweep (there is no results.csv)")
+    require_result(folder, "the folder of a sweep", (SWEEP_TABLE_FILE,))
     return Results(folder)
 
 

@@ -86,7 +86,7 @@ def check_decision(
     ParameterError
         If it is not a `Decision`, or its forces are not finite numbers of shape (robot_count, 2).
     """
-    subject = f"controller {controller!r}: decide(seen, memory) returned"
+    subject = f"controller {controller!r}: decide(observations, memory) returned"
     suffix = f" at {time:.3f} s{source}"
     if not isinstance(returned, Decision):
         hint = " (is a return statement missing?)" if returned is None else ""
@@ -125,7 +125,7 @@ def copy_decision(decision: Decision, controller: str, source: str = "") -> Deci
         If `terms` is not a mapping of names to forces of all robots, `cells` is not a `Cells` object, or
         `messages` are not messages of each robot.
     """
-    subject = f"controller {controller!r}: decide(seen, memory) returned"
+    subject = f"controller {controller!r}: decide(observations, memory) returned"
     if not isinstance(decision.terms, Mapping):
         raise ParameterError(f"{subject} terms {quote(decision.terms)}{source}, expected a dict of forces")
     terms = {}

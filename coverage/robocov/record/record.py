@@ -19,7 +19,7 @@ from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import InputError, OutputError, ParameterError, describe_error, format_count, quote
 from robocov.files.documents import read_document
-from robocov.files.result_folder import complete_commit
+from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import RECORD_FILE, RUN_FILE
 from robocov.files.writing import replace_file
 from robocov.mapfile import from_json, to_json
@@ -436,8 +436,7 @@ class Record(Drawable):
         # If `save` was interrupted while it replaced files, the replacement is completed first.
         complete_commit(folder)
         for file in (RUN_FILE, RECORD_FILE):
-            if not (folder / file).is_file():
-                raise InputError(f"{folder}: not the folder of a run (there is no {file})")
+            require_result(folder, "the folder of a run", (file,))
         path = folder / RUN_FILE
         document = read_document(path, RunDocument, FORMAT, FORMAT_VERSION)
         environment = from_json(document.map, f"{path}: map")

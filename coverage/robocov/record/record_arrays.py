@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robocov.errors import InputError
+from robocov.errors import InputError, format_bound
 from robocov.files.array_files import read_arrays
 from robocov.team import Team
 from robocov.typing import FloatArray
@@ -108,5 +108,6 @@ def _check_range(path: Path, name: str, array: FloatArray, maximum: float) -> No
     is_in_range = np.abs(array) <= maximum
     if not is_in_range.all():
         raise InputError(
-            f"{path}: {name}: expected finite numbers up to {maximum:g}, got {array[~is_in_range][0]:g}"
+            f"{path}: {name}: expected finite numbers up to {format_bound(maximum)}, "
+            f"got {array[~is_in_range][0]:g}"
         )

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import AliasChoices, Field, create_model
 
 from robocov.conditions import PARAMETERS, DensityKnowledge
+from robocov.errors import format_bound
 from robocov.files.documents import Document, expect
 from robocov.team import MAX_ROBOTS
 
@@ -43,7 +44,7 @@ _LATER_CONDITIONS = ("bandwidth",)
 def _build_number_field(minimum: float, maximum: float, *, allow_null: bool, is_required: bool) -> Any:
     """Return the type and the default of a field for a number in a range, or null."""
     null = " or null" if allow_null else ""
-    description = expect(f"a number from {minimum:g} to {maximum:g}{null}")
+    description = expect(f"a number from {format_bound(minimum)} to {format_bound(maximum)}{null}")
     number: Any = Annotated[float, Field(ge=minimum, le=maximum)]
     default: Any = ... if is_required else None
     return Annotated[number | None if allow_null else number, description], default

@@ -17,7 +17,7 @@ from robocov.errors import ParameterError, quote
 from robocov.metrics import CostHistory, compute_cost_history, summarize
 from robocov.optional_imports import import_optional
 from robocov.record import Record
-from robocov.scenario.scenario import Scenario
+from robocov.scenario.scenario import Scenario, require_scenario_options
 
 DEFAULT_CONTROLLERS = ("rapf", "rpf", "lloyd")
 """The controllers of the paper."""
@@ -186,6 +186,8 @@ def compare(
     ------
     RobocovError
         If an argument cannot be used, or a controller fails.
+    TypeError
+        If a keyword argument is not a parameter of `Scenario`.
 
     See Also
     --------
@@ -199,6 +201,7 @@ def compare(
     >>> list(comparison.records)
     ['RAPF', 'Lloyd']
     """
+    require_scenario_options("compare", options)
     if isinstance(controllers, str) or len(controllers) == 0:
         raise ParameterError(f"controllers: expected a list of controllers, got {quote(controllers)}")
     scenario = Scenario(environment, controllers[0], **options)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +25,7 @@ from robocov.errors import (
     ParameterError,
     StartError,
     describe_unknown_name,
+    find_similar_names,
     format_count,
     quote,
     require_number,
@@ -576,6 +578,8 @@ def run(
     ------
     RobocovError
         If an argument cannot be used, or the controller fails.
+    TypeError
+        If a keyword argument is not a parameter of `Scenario`.
 
     See Also
     --------
@@ -589,7 +593,36 @@ def run(
     >>> rc.run("rooms", "rapf", robots=6, duration=1.0)
     <Record rapf on Rooms, 6 robots, 1.0 s>
     """
+    require_scenario_options("run", options)
     return Scenario(environment, controller, **options).run()
+
+
+def require_scenario_options(function_name: str, options: Iterable[str]) -> None:
+    """Raise an error unless the keyword arguments that a function passes on are options of `Scenario`.
+
+    Without this check, the error would name ``Scenario.__init__``, which the caller has not called.
+
+    Parameters
+    ----------
+    function_name : str
+        Name of the function that was called.
+    options : iterable of str
+        Names of its keyword arguments.
+
+    Raises
+    ------
+    TypeError
+        If `Scenario` has no such parameter.
+    """
+    known_options = list(inspect.signature(Scenario).parameters)
+    for option in options:
+        if option in known_options:
+            continue
+        message = f"{function_name}() got an unexpected keyword argument {option!r}"
+        similar_options = find_similar_names(option, known_options)
+        if similar_options:
+            message += f". Did you mean {' or '.join(map(repr, similar_options))}?"
+        raise TypeError(message)
 
 
 def _build_team(team: Team | None, robots: int | None, state: TeamState | None) -> Team:

@@ -60,12 +60,22 @@ class ControllerCaller:
         self._informed_controller: Controller = self._call(
             time, inform_controller, team_controller, environment
         )
+        if isinstance(team_controller, IndividualControllerAdapter):
+            self._reject_unused_scanning(team_controller, time)
         # In a user's controller, `scanning` may be a property that fails.
         self.scanning: Scanning | None = self._call(time, getattr, team_controller, "scanning", None)
         if not isinstance(self.scanning, Scanning | None):
             raise ParameterError(
                 f"controller {team_controller.name!r}: scanning: expected a Scanning, "
                 f"got {quote(self.scanning)}"
+            )
+
+    def _reject_unused_scanning(self, adapter: IndividualControllerAdapter, time: float) -> None:
+        """Raise an error if an individual controller requests range scans, which it would never receive."""
+        if self._call(time, getattr, adapter.controller, "scanning", None) is not None:
+            raise ParameterError(
+                f"controller {adapter.name!r}: scanning: expected none in a controller with force(own), "
+                "which receives no range scans. Write decide(observations, memory) to use observations.scans."
             )
 
     def begin(self, region: Region, team: Team, time: float) -> Any:

@@ -87,9 +87,12 @@ def test_a_controller_in_a_file_is_made_with_its_gains(controller_file: Path) ->
 def test_mistakes_in_the_name_of_a_file_or_class_are_explained(controller_file: Path) -> None:
     for name, message in [
         (f"{controller_file}:Nine", "did you mean 'Mine'"),
-        (f"{controller_file}:Plain", "Plain: expected a class with a method decide"),
-        (f"{controller_file}:Thawed", "Thawed: expected a frozen dataclass"),
-        (f"{controller_file.parent}/no.py:Mine", "file not found"),
+        (
+            f"{controller_file}:Plain",
+            r"mine\.py: Plain: expected a class with a method decide\(observations, memory\) or force",
+        ),
+        (f"{controller_file}:Thawed", r"mine\.py: Thawed: expected a frozen dataclass"),
+        (f"{controller_file.parent}/no.py:Mine", r"no\.py: no such file"),
         (f"{controller_file}", "expected a file and a class"),
     ]:
         with pytest.raises(ParameterError, match=message):

@@ -165,7 +165,7 @@ def test_an_emptied_result_folder_can_be_used_again(tmp_path: Path) -> None:
 
 def test_a_file_instead_of_a_folder_is_rejected(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
-    with pytest.raises(OutputError, match="cannot be written"):
+    with pytest.raises(OutputError, match="x: expected a folder, got a file"):
         save_result(tmp_path / "x", NEW)
 
 

@@ -192,13 +192,13 @@ def test_the_same_call_gives_the_same_bits():
 @pytest.mark.parametrize(
     ("parameters", "error", "message"),
     [
-        ({"radius": 0.0}, ParameterError, "radius: expected a number from 1e-06 to inf m, got 0.0"),
+        ({"radius": 0.0}, ParameterError, "radius: expected a number from 0.000001 to inf m, got 0.0"),
         (
             {"radius": 3.0},
             ParameterError,
             "radius: expected a disc that fits in the free space around the positions, got 3 m",
         ),
-        ({"precision": 0.0}, ParameterError, "precision: expected a number from 1e-05 to 1, got 0.0"),
+        ({"precision": 0.0}, ParameterError, "precision: expected a number from 0.00001 to 1, got 0.0"),
         ({"lattice": 0}, ParameterError, "lattice: expected a whole number from 1 to 4096, got 0"),
         ({"positions": [[3.0, 3.0]]}, InputError, "positions[0]: expected a point inside the boundary"),
         ({"positions": []}, InputError, "positions: expected at least one robot, got none"),

@@ -184,7 +184,7 @@ GEOMETRIC = [
         edit("starts", "given", "positions", 1, [1, 1]),
         "starts.given.positions: duplicate position",
     ),
-    (edit("boundary", [[0, 0], [0.15, 0], [0, 0.15]]) | {"obstacles": []}, "(and 3 more)"),
+    (edit("boundary", [[0, 0], [0.15, 0], [0, 0.15]]) | {"obstacles": []}, "(and 3 more issues)"),
 ]
 
 
@@ -247,14 +247,14 @@ def test_values_that_are_not_json_are_rejected_in_documents(value: object) -> No
 def test_a_misspelt_key_is_reported_before_the_missing_one() -> None:
     document = edit("boundry", DOCUMENT["boundary"], document=edit("boundary", DELETED))
     with pytest.raises(
-        MapError, match=r"^map: unknown key 'boundry': did you mean 'boundary'\?.*\(and 1 more\)$"
+        MapError, match=r"^map: unknown key 'boundry': did you mean 'boundary'\?.*\(and 1 more issue\)$"
     ):
         from_json(document)
 
 
 def test_several_errors_are_counted() -> None:
     document = edit("boundary", 0, 0, "a", document=edit("obstacles", 1, "radius", -1))
-    with pytest.raises(MapError, match=r"boundary\[0\]\[0\].*\(and 1 more\)$"):
+    with pytest.raises(MapError, match=r"boundary\[0\]\[0\].*\(and 1 more issue\)$"):
         from_json(document)
 
 
@@ -269,7 +269,7 @@ def test_every_issue_has_its_line() -> None:
         assert issue.line is not None
         assert issue.column is not None
         assert lines[issue.line - 1][issue.column - 1 :].startswith(value)
-    assert str(caught.value) == f"m.json:{first.line}:{first.column}: {first.text} (and 1 more)"
+    assert str(caught.value) == f"m.json:{first.line}:{first.column}: {first.text} (and 1 more issue)"
     assert (caught.value.line, caught.value.column) == (first.line, first.column)
 
 
@@ -279,7 +279,7 @@ def test_the_first_of_many_issues_are_listed_and_all_are_counted(
 ) -> None:
     """The issues violate the structure of the file or the rules of positions."""
     starts = {"given": {"kind": "points", "positions": [build_position(k) for k in range(50)]}}
-    with pytest.raises(MapError, match=r"\(and 49 more\)$") as caught:
+    with pytest.raises(MapError, match=r"\(and 49 more issues\)$") as caught:
         parse_map(json.dumps(edit("starts", starts)), "m.json")
     assert len(caught.value.issues) == MapError.MAX_LISTED
     assert caught.value.unlisted == 50 - MapError.MAX_LISTED

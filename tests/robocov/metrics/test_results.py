@@ -184,7 +184,7 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("notes.txt", b"", "not the folder of a sweep (there is no results.csv)"),
+        ("notes.txt", b"", "expected the folder of a sweep, got a folder without results.csv"),
         (
             "results.csv",
             b"",

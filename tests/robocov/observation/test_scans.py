@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from robocov.controllers import OwnView
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations, Scanning, compute_ray_directions
@@ -30,6 +31,21 @@ class ScanCollector:
             assert not seen.scans.distances.flags.writeable
             memory = (*memory, round(seen.time, 9))
         return Decision(np.zeros_like(seen.positions), memory=memory)
+
+
+class IndividualWithScanning:
+    """Stands still; it requests scans, which `force` does not receive."""
+
+    scanning = Scanning(rays=8, period=0.1)
+
+    def force(self, own: OwnView) -> list[float]:
+        return [0.0, 0.0]
+
+
+def test_an_individual_controller_cannot_request_scans(cluttered: Environment) -> None:
+    message = r"'IndividualWithScanning': scanning: expected none in a controller with force\(own\)"
+    with pytest.raises(ParameterError, match=message):
+        Simulation(cluttered, IndividualWithScanning(), [[1.0, 2.0]])
 
 
 def test_scans_arrive_with_the_requested_period(cluttered: Environment) -> None:

@@ -106,6 +106,13 @@ def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> N
         rc.Scenario(ROOM, **arguments)
 
 
+def test_unknown_keyword_arguments_are_reported_by_the_function_that_was_called() -> None:
+    with pytest.raises(TypeError, match=r"^run\(\) got .* 'durtion'. Did you mean 'duration'\?$"):
+        rc.run(ROOM, durtion=3)
+    with pytest.raises(TypeError, match=r"^compare\(\) got an unexpected keyword argument 'xyz'$"):
+        rc.compare(ROOM, xyz=3)
+
+
 def test_maps_are_found_by_name_and_path(tmp_path: Path) -> None:
     rc.save_map(ROOM, tmp_path / "room.json")
     assert rc.Scenario("rooms").environment.name == "Rooms"

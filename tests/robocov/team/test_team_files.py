@@ -96,7 +96,7 @@ def test_teams_of_groups_are_unchanged_by_json(groups: list[dict[str, float]]) -
         ),
         (
             "[[group]]\ncount = 1\nmax_speed = -1",
-            r"group\[0\].max_speed: expected a number from 1e-06 to 1000, got -1",
+            r"group\[0\].max_speed: expected a number from 0.000001 to 1000, got -1",
         ),
         ("[[group]]\ncount = 1\nradius = 'big'", r"group\[0\].radius: expected a number, got 'big'"),
         ("[[group]]\ncount = 1\nradius = 'null'", r"group\[0\].radius: expected a number, got 'null'"),

@@ -61,7 +61,7 @@ def test_json_output_contains_lines_and_columns(map_file: Path, capsys: pytest.C
     invalid, missing = json.loads(capsys.readouterr().out)["maps"]
     assert (invalid["line"], invalid["column"]) == (7, 39)
     assert invalid["error"].startswith(f"{map_file}:7:39: obstacles[1]: unknown key")
-    assert "(and 3 more)" in invalid["error"]
+    assert "(and 3 more issues)" in invalid["error"]
     second = invalid["issues"][1]
     assert {key: second[key] for key in ("path", "line", "column")} == {
         "path": "obstacles[0].radius",

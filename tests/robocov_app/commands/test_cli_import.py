@@ -90,7 +90,7 @@ def test_the_source_file_is_never_overwritten(tmp_path: Path, capsys: pytest.Cap
         ("grid.map", "--unknown free", "--unknown: no option of the format movingai, whose options are: --"),
         ("plan.pgm", "--trees obstacle", "--trees: no option of the format image"),
         ("plan.pgm", "", "expected --cell, the meters per pixel (or import plan.yaml next to it)"),
-        ("plan.pgm", "--cell nan", "--cell: expected a number from 1e-06 to 10000 m"),
+        ("plan.pgm", "--cell nan", "--cell: expected a number from 0.000001 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "--threshold: expected a number from 0 to 1"),
         ("plan.pgm", "--cell 0.001", "no position has enough clearance for a robot of radius 0.1 m"),
         ("plan.yaml", "--inside 1", "--inside: expected two numbers, got '1'"),

@@ -136,11 +136,11 @@ def test_figures_are_reproducible_in_both_themes(tmp_path: Path, capsys: pytest.
         (("rooms", "--restarts", "0"), "--restarts: expected a whole number from 1 to 100000, got 0"),
         (("rooms", "--lattice", "1"), "--lattice: expected a whole number from 2 to 2048, got 1"),
         (("rooms", "--seed", "-1"), "--seed: expected a whole number of at least 0, got -1"),
-        (("rooms", "--precision", "0"), "--precision: expected a number from 1e-05 to 1, got 0.0"),
+        (("rooms", "--precision", "0"), "--precision: expected a number from 0.00001 to 1, got 0.0"),
         (("rooms", "--radius", "-1"), "radius: expected a number above 0 m, got -1.0"),
         (("square", "--radius", "6"), "robots: expected at most about 0, as many as fit with radius 6 m in"),
         (("rooms", "--plot", "a.jpg"), "'.jpg'"),
-        (("--run", "nowhere"), "nowhere: not the folder of a run"),
+        (("--run", "nowhere"), "nowhere: expected the folder of a run"),
         (
             ("--run", "x", "--robots", "3"),
             "--robots: cannot be combined with --run, which gives its value; got 3",

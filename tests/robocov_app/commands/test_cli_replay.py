@@ -185,7 +185,7 @@ def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, ca
         monkeypatch.delenv(name, raising=False)
     printed = read_error(capsys, "replay", str(run))
     assert printed.startswith(
-        "no display: the window needs one. Over ssh, try ssh -X. To render without a display, use --out DIR"
+        "no display: the window needs one. Add --serve to use it in a browser, or try ssh -X over ssh. "
     )
 
 
@@ -202,7 +202,7 @@ def test_without_a_display_alternatives_are_suggested(run: Path, monkeypatch, ca
             "--frames --out video --controller a.py:A",
             "--controller: cannot be combined with --frames or --video",
         ),
-        ("--controller gone.py:Mine", "controller 'gone.py:Mine': file not found: gone.py"),
+        ("--controller gone.py:Mine", "gone.py: no such file"),
         ("--controller lloyd", "--controller: expected the controller of a run (rapf), got lloyd"),
         ("--size 480x320", "--size: expected a number from 900 to 7680 pixels wide, got 480"),
         ("--frames --out video --fps 0", "--fps: expected a number from 1 to 240, got 0"),
@@ -226,11 +226,11 @@ def edit_arrays(folder: Path, **changes) -> None:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (shutil.rmtree, "{run}: not the folder of a run or a comparison (there is no run.json and no comp"),
+        (shutil.rmtree, "{run}: expected the folder of a run or comparison, got a path that does not exist"),
         (lambda run: (run / "run.json").write_text("{"), "{run}/run.json:1:2: end of file: not JSON: "),
         (
             lambda run: (run / "record.npz").unlink(),
-            "{run}: not the folder of a run (there is no record.npz)",
+            "{run}: expected the folder of a run, got a folder without record.npz",
         ),
         (
             lambda run: edit_json(run / "run.json", session=[1]),
@@ -312,7 +312,7 @@ def test_a_damaged_run_is_rejected_in_one_line(run: Path, capsys, damage, messag
         ),
         (
             lambda both: edit_json(both / "comparison.json", folders=["gone"], runs=[{}]),
-            "{both}/gone: not the folder of a run (there is no run.json)",
+            "{both}/gone: expected the folder of a run, got a path that does not exist",
         ),
         (
             lambda both: build_records(advance_session(start_session(RAPF, environment=EMPTY), 60))[0].save(

@@ -211,7 +211,7 @@ def test_a_custom_controller_can_be_run(tmp_path: Path, capsys: pytest.CaptureFi
         ),
         (
             "def decide(self, seen, memory): return 3",
-            "controller 'Mine': decide(seen, memory) returned 3 at 0.000 s (mine.py, line 7), expected",
+            "controller 'Mine': decide(observations, memory) returned 3 at 0.000 s (mine.py, line 7)",
         ),
     ],
 )

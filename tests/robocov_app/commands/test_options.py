@@ -58,10 +58,11 @@ def test_invalid_run_options_are_rejected(values: dict[str, object]) -> None:
 def test_the_folder_of_a_window_must_exist(kind: type, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(
-        ParameterError, match=r"^--folder: .*missing: folder not found; choose an existing one$"
+        ParameterError,
+        match=r"^--folder: .*missing: expected an existing folder, got a path that does not",
     ):
         kind(folder=tmp_path / "missing")
-    with pytest.raises(ParameterError, match=r"^--folder: .*file: not a folder"):
+    with pytest.raises(ParameterError, match=r"^--folder: .*file: expected an existing folder, got a file"):
         kind(folder=tmp_path / "file")
 
 

@@ -356,7 +356,8 @@ def test_a_missing_display_is_reported_in_one_line(folders: Path, monkeypatch, c
     for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     line = read_error(capsys, "edit", "rooms")
-    assert line.startswith("no display: the editor needs one") and "--screenshot" in line
+    assert line.startswith("no display: the editor needs one. Add --serve to use it in a browser")
+    assert "--screenshot" in line
 
 
 @pytest.mark.parametrize(

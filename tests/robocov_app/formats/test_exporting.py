@@ -55,7 +55,7 @@ def test_unknown_formats_and_options_are_rejected(tmp_path: Path) -> None:
     ):
         export_map(ROOM, tmp_path / "a.png", options=WriteOptions(mode="raw"))
     for options, expected in (
-        ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
+        ({"cell": 0.0}, "cell: expected a number from 0.000001 to 10000 m, got 0.0"),
         ({"mode": "binary"}, "mode: expected one of trinary, scale, raw"),
         ({"image": "bmp"}, "image: expected one of pgm, png, got 'bmp'"),
         ({"digits": 99}, "digits: expected a number from 0 to 12, got 99"),

@@ -84,10 +84,10 @@ def test_a_format_may_be_forced(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ({"cell": 0.0}, "cell: expected a number from 1e-06 to 10000 m, got 0.0"),
-        ({"cell": float("nan")}, "cell: expected a number from 1e-06 to 10000 m, got nan"),
-        ({"scale": -1.0}, "scale: expected a number from 1e-06 to 10000 m, got -1.0"),
-        ({"thickness": float("inf")}, "thickness: expected a number from 1e-06 to 10000 m, got inf"),
+        ({"cell": 0.0}, "cell: expected a number from 0.000001 to 10000 m, got 0.0"),
+        ({"cell": float("nan")}, "cell: expected a number from 0.000001 to 10000 m, got nan"),
+        ({"scale": -1.0}, "scale: expected a number from 0.000001 to 10000 m, got -1.0"),
+        ({"thickness": float("inf")}, "thickness: expected a number from 0.000001 to 10000 m, got inf"),
         ({"threshold": 1.1}, "threshold: expected a number from 0 to 1"),
         ({"threshold": float("nan")}, "threshold: expected a number from 0 to 1, got nan"),
         ({"unknown": "solid"}, "unknown: expected one of obstacle, free, cut"),

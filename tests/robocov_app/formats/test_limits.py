@@ -57,7 +57,7 @@ def test_limits_are_checked() -> None:
     files.require_length(0.05, "resolution")
     files.require_coordinate(-1e7, "origin")
     for bad in (float("nan"), float("inf"), -float("inf"), -1.0, 0.0, 1e5):
-        with pytest.raises(MapError, match=r"^resolution: expected a number from 1e-06 to 10000 \(m\)"):
+        with pytest.raises(MapError, match=r"^resolution: expected a number from 0.000001 to 10000 \(m\)"):
             files.require_length(bad, "resolution")
     for bad in (float("nan"), float("inf"), 1.1e7):
         with pytest.raises(MapError, match=r"^origin: "):

@@ -70,8 +70,11 @@ def test_overwriting_results_removes_reports_but_no_foreign_files(run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nothing"], "nothing: folder not found"),
-        (["."], ".: not the folder of a run, a comparison or a sweep"),
+        (
+            ["nothing"],
+            "nothing: expected the folder of a run, comparison or sweep, got a path that",
+        ),
+        (["."], ".: expected the folder of a run, comparison or sweep, got a folder without run.json, "),
         (["one", "--out", "no/page.html"], "no/page.html: cannot be written: there is no folder no"),
         (["one", "--out", "one"], "one: expected a file, got a folder"),
         ([], "DIR"),

@@ -146,8 +146,8 @@ def write_file(folder: Path, name: str, text: str) -> Path:
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda copy: copy / "nothing", "folder not found"),
-        (lambda copy: copy / "runs", "not the folder of a run, a comparison or a sweep"),
+        (lambda copy: copy / "nothing", "got a path that does not exist"),
+        (lambda copy: copy / "runs", "got a folder without run.json, comparison.json or study.json"),
         (lambda copy: write_file(copy, "study.json", "{"), "study.json: cannot be read"),
         (
             lambda copy: write_file(copy, "study.json", '{"runs": 3}'),
@@ -174,8 +174,8 @@ def test_unreadable_files_are_reported_by_name(folder, tmp_path, damage, message
 @pytest.mark.parametrize(
     ("damage", "reason"),
     [
-        (shutil.rmtree, "there is no run.json"),
-        (lambda run: (run / "run.json").unlink(), "there is no run.json"),
+        (shutil.rmtree, "got a path that does not exist"),
+        (lambda run: (run / "run.json").unlink(), "got a folder without run.json"),
         (lambda run: (run / "run.json").write_text('{"format": "robocov-run", "version": 99}'), ""),
         (lambda run: (run / "record.npz").write_bytes(b"PK" * 9), ""),
         (lambda run: (run / "record.npz").unlink(), ""),

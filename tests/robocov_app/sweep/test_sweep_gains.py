@@ -122,7 +122,7 @@ class Picky:
 
 WRONG = [
     (Rapf, {"k_rap": 1}, "gains.x: unknown gain 'k_rap': did you mean 'k_rep'? (known: "),
-    (Rapf, {"k_rep": -1}, "gains.x.k_rep: expected a number from 0 to 1e+06 N m³, got -1"),
+    (Rapf, {"k_rep": -1}, "gains.x.k_rep: expected a number from 0 to 1000000 N m³, got -1"),
     (Rapf, {"k_rep": [1, "big"]}, "gains.x.k_rep[1]: expected a number from "),
     (
         Rapf,

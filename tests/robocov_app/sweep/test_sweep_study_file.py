@@ -147,7 +147,7 @@ WRONG = [
     ("seeds = 4", "seeds = 0", "seeds: expected a whole number from 1, got 0"),
     ("seeds = 4", "seeds = [-1]", "seeds[0]: expected a whole number from 0 to "),
     ("seeds = 4", "seeds = 1e3", "seeds: expected a number of seeds, or a list of seeds, got 1000.0"),
-    ("duration = 5.0", "duration = nan", "duration: expected a number from 0 to 1e+06, got nan"),
+    ("duration = 5.0", "duration = nan", "duration: expected a number from 0 to 1000000, got nan"),
     ("duration = 5.0", "duration = [5]", "duration: expected a number, got [5]"),
     (
         "duration = 5.0",
@@ -171,7 +171,7 @@ WRONG = [
     (
         "max_speed = [0.5, 1]",
         "max_speed = [0.5, -1]",
-        "team.max_speed[1]: expected a number from 1e-06 to 1000, got -1.0 m/s",
+        "team.max_speed[1]: expected a number from 0.000001 to 1000, got -1.0 m/s",
     ),
     ("max_speed = [0.5, 1]", 'max_speed = "null"', "team.max_speed: expected a number, got 'null'"),
     (
@@ -195,7 +195,7 @@ WRONG = [
     (
         "high = 10.0",
         "high = 1e9",
-        "gains.rapf.k_rep.high: expected a number from 0 to 1e+06 N m³, got 1000000000.0",
+        "gains.rapf.k_rep.high: expected a number from 0 to 1000000 N m³, got 1000000000.0",
     ),
     ('"log"', '"lag"', 'gains.rapf.k_rep.scale: expected "linear" or "log", got \'lag\''),
     ("k_rep =", "krep =", "gains.rapf: unknown gain 'krep': did you mean 'k_rep'? (known: "),
@@ -215,9 +215,13 @@ WRONG = [
     (
         '"null"]\nk_att',
         '"nul"]\nk_att',
-        "gains.rapf.attraction_limit[1]: expected a number from 1e-06 to 1e+06 N, or null for no limit, ",
+        "gains.rapf.attraction_limit[1]: expected a number from 0.000001 to 1000000 N, or null for no limit",
     ),
-    ("[gains.rapf]", "[gains.raf]", "gains.raf: unknown controller of the study 'raf': did you mean 'rapf'?"),
+    (
+        "[gains.rapf]",
+        "[gains.raf]",
+        "gains.raf: unknown controller of the study 'raf': did you mean 'rapf' or 'rpf'?",
+    ),
     ("[gains.rapf]", "[gain.rapf]", "unknown key 'gain': did you mean 'gains'? (known: "),
     ("pull = [1, 2]", "pull = [1, {}]", 'gains["mine.py:Mine"].pull[1]: expected a number, "null" for'),
     ("pull = [1, 2]", "push = 1", "gains[\"mine.py:Mine\"]: unknown gain 'push': did you mean 'pull'?"),
@@ -280,7 +284,7 @@ def test_invalid_values_are_reported_with_file_and_key(
 
 def test_the_first_issue_is_reported_with_the_number_of_others(folder: Path) -> None:
     text = STUDY.replace("seeds = 4", "seeds = 4.5").replace("robots = [3, 6]", 'robot = "six"')
-    with pytest.raises(InputError, match=r"unknown key 'robot'.*\(and 1 more\)$"):
+    with pytest.raises(InputError, match=r"unknown key 'robot'.*\(and 1 more issue\)$"):
         read_study(write_study(folder, text))
 
 
@@ -376,7 +380,7 @@ def test_a_team_of_groups(folder: Path) -> None:
         (
             "max_speed = 1.0",
             "max_speed = 0",
-            "team.group[0].max_speed: expected a number from 1e-06 to 1000, got 0.0 m/s",
+            "team.group[0].max_speed: expected a number from 0.000001 to 1000, got 0.0 m/s",
         ),
     ],
 )

@@ -36,8 +36,9 @@ from robocov_app.toolkit.window.layout import explain_reduced_scale
 from robocov_app.toolkit.window.window_settings import limit_window_size
 
 NO_DISPLAY = (
-    "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
-    "and map files can be edited by hand: robocov check --watch FILE"
+    "no display: the editor needs one. Add --serve to use it in a browser, or try ssh -X over ssh. "
+    "--screenshot FILE renders it without a display. Map files can also be edited by hand: see robocov check "
+    "--watch FILE."
 )
 
 

@@ -1,6 +1,6 @@
 """Size limits of foreign files and of the maps in them."""
 
-from robocov.errors import MapError, quote
+from robocov.errors import MapError, format_bound, quote
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 
 MAX_FILE_BYTES = 256_000_000
@@ -43,7 +43,7 @@ def require_length(
 ) -> None:
     """Raise MapError if a length, in m, is out of range."""
     if not minimum <= value <= maximum:
-        expected = f"expected a number from {minimum:.10g} to {maximum:.10g} (m)"
+        expected = f"expected a number from {format_bound(minimum)} to {format_bound(maximum)} (m)"
         raise MapError(f"{source_name}: {expected}, got {quote(value)}")
 
 

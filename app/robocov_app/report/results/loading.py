@@ -17,7 +17,7 @@ from robocov.controllers.registry import get_controller_label
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError, quote
 from robocov.files.documents import read_document
-from robocov.files.result_folder import complete_commit
+from robocov.files.result_folder import complete_commit, require_result
 from robocov.files.result_names import COMPARISON_FILE, RUN_FILE, RUNS_FOLDER, STUDY_FILE
 from robocov.mapfile import from_json
 from robocov.metrics import CostHistory, compute_mean_over_run
@@ -54,14 +54,12 @@ def load_result(folder: Path) -> ReportedResult:
     InputError
         If the folder contains no result, or if the result cannot be read.
     """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: folder not found, expected the folder of a run, comparison or sweep")
-    if (folder / STUDY_FILE).is_file():
-        return _load_sweep(folder)
-    complete_commit(folder)
-    if not any((folder / name).is_file() for name in (COMPARISON_FILE, RUN_FILE)):
-        missing = "(there is no run.json, no comparison.json and no study.json)"
-        raise InputError(f"{folder}: not the folder of a run, a comparison or a sweep {missing}")
+    if folder.is_dir():
+        if (folder / STUDY_FILE).is_file():
+            return _load_sweep(folder)
+        complete_commit(folder)
+    marks = (RUN_FILE, COMPARISON_FILE, STUDY_FILE)
+    require_result(folder, "the folder of a run, comparison or sweep", marks)
     return _load_runs(folder)
 
 

@@ -29,6 +29,7 @@ from robocov.errors import (
     InputError,
     ParameterError,
     describe_unknown_name,
+    format_bound,
     format_path,
     quote,
     require_number,
@@ -317,8 +318,9 @@ class Study:
         rows = self.duration / self.dt * robots
         if rows > MAX_RECORD_ROWS:
             raise ParameterError(
-                f"duration: expected a record of at most {MAX_RECORD_ROWS:.0e} rows, "
-                f"got {self.duration:g} s of {robots} robots at {self.dt:g} s, which are {rows:.3g} rows"
+                f"duration: expected a record of at most {MAX_RECORD_ROWS / 1e6:g} million rows, "
+                f"got {format_bound(self.duration)} s of {robots} robots at {self.dt:g} s, "
+                f"which are {rows / 1e6:.3g} million rows"
             )
 
     def __len__(self) -> int:

@@ -11,7 +11,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
-from robocov.errors import InputError, JsonPath, describe_unknown_name, format_path, quote, to_one_line
+from robocov.errors import (
+    InputError,
+    JsonPath,
+    describe_unknown_name,
+    format_count,
+    format_path,
+    quote,
+    to_one_line,
+)
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.sweep.study.gains import NO_LIMIT
@@ -352,7 +360,7 @@ def build_study(document: dict[str, Any], folder: Path, source_name: str) -> Stu
         message = f"{source_name}: {reader.issues[0]}"
         other_count = len(reader.issues) - 1
         if other_count:
-            message += f" (and {other_count} more)"
+            message += f" (and {format_count(other_count, 'more issue')})"
         raise InputError(message)
     try:
         return Study(**_convert_to_arguments(values, folder), folder=folder)

@@ -17,7 +17,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from robocov.errors import MapError, ParameterError, quote, summarize_names, to_one_line
+from robocov.errors import MapError, ParameterError, quote, to_one_line
 from robocov.typing import FloatArray
 from robocov_app.formats import files
 from robocov_app.formats.files.xml_tree import read_xml_tree
@@ -97,7 +97,7 @@ def _choose_pixel_size(tile: FloatArray, options: ReadOptions, notes: list[str])
 
 
 def _raise_nothing_solid_error(layers: list[Layer], source_name: str) -> NoReturn:
-    names = summarize_names([quote(layer.labels[0]) for layer in layers if layer.labels])
+    names = ", ".join(quote(layer.labels[0]) for layer in layers if layer.labels)
     problem = "nothing is solid by properties, collision objects or names of layers"
     expected = f"expected --only LAYER with one of walls: {names or 'there is none'}"
     raise MapError(f"{source_name}: {problem}, {expected}")
