@@ -132,7 +132,8 @@ class Menu(Dialog):
         title_size = round(TEXT_PX * scale)
         key_size = round(SMALL_TEXT_PX * scale)
         widths = [
-            measure_text(self._get_title(command), title_size) + measure_text(self._get_key_text(command), key_size)
+            measure_text(self._get_title(command), title_size)
+            + measure_text(self._get_key_text(command), key_size)
             for command in self.rows
             if command is not None
         ]
