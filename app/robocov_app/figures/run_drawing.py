@@ -63,6 +63,9 @@ _HALO_PT = 2.6
 """Width of the lines of a cross or star with its light edge."""
 _GOAL_DIAMETERS = 0.6
 """Size of the mark of a goal, in diameters of a large robot."""
+MIN_GOAL_DISTANCE = 0.03
+"""Minimum distance of a goal that is drawn from its robot, as a fraction of the longer side of the map. The
+rule does not depend on the size of the map on the page, so a run has the same crosses in all figures."""
 _CONTACT_PT = 8.0
 _CONTACT_WIDTH_PT = 1.3
 _CONTACT_RAYS = 8
@@ -181,7 +184,7 @@ def draw_run(
         _draw_headings(axes, record, record.steering[-1], radii, theme)
     marks = [discs, starts]
     if has_goals(record):
-        marks.append(_draw_goals(axes, record, cells.centroids, radii, theme))
+        marks.append(_draw_goals(axes, record, cells.centroids, theme))
     if contacts is not None and len(contacts):
         marks.append(_draw_contacts(axes, contacts, theme))
     _draw_numbers(axes, record, _RunMarks(present, discs, starts, join_discs(marks)), run_colors, theme)
@@ -310,10 +313,10 @@ def _draw_headings(axes: Axes, record: Record, steering: FloatArray, radii: Floa
         )
 
 
-def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, radii: FloatArray, theme: Theme) -> Discs:
+def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, theme: Theme) -> Discs:
     """Draw the goals of working robots, or the centroids of their cells if all goals are centroids.
 
-    `radii`, (n,), are those of the discs of all robots, points. Returned are the marks, in points.
+    Robots that are at their goals, or nearly there, have no cross. Returned are the marks, in points.
     """
     working = np.flatnonzero(record.is_working[-1])
     goals = record.goals[-1][working]
@@ -321,11 +324,10 @@ def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, radii: FloatA
     if is_centroid:
         goals = centroids
     goal_points = to_points(axes, goals)
-    distances = np.hypot(*(goal_points - to_points(axes, record.positions[-1][working])).T)
+    distances = np.hypot(*(goals - record.positions[-1][working]).T)
     max_size = _choose_max_mark_size(axes, record, _GOAL_PT, _GOAL_DIAMETERS)
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, max_size)
-    # A robot at its goal needs no cross, which would cover its disc.
-    is_away = distances > radii[working] + 0.5 * size
+    is_away = distances > MIN_GOAL_DISTANCE * np.ptp(record.environment.boundary, axis=0).max()
     if is_away.any():
         style = _build_goal_style(is_centroid, theme, size)
         axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, path_effects=_build_halo(theme), **style)

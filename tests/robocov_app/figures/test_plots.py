@@ -304,6 +304,17 @@ class TestTrajectories:
         assert not has_marks(figure.axes[0], "+")
         assert "cell centroid" not in list_legend_texts(figure)
 
+    def test_a_run_has_the_same_goals_in_figures_of_all_sizes(self):
+        record = record_walk(ROOMS, 5)
+        goals = record.goals.copy()
+        # The longer side of the map is 16 m, so the limit is 0.48 m.
+        goals[-1] = record.positions[-1] + [[0.0, 0.0], [0.3, 0.0], [0.47, 0.0], [0.49, 0.0], [0.6, 0.0]]
+        record_with_goals = replace(record, goals=goals)
+        figure = plot_trajectories(record_with_goals)
+        narrow_figure = plot_comparison([record_with_goals] * 4)
+        for axes in (figure.axes[0], narrow_figure.axes[0]):
+            assert find_marks(axes, "x").get_xydata() == pytest.approx(goals[-1, 3:])
+
     def test_the_cell_of_a_single_robot_has_no_legend_entry(self):
         assert "final Voronoi cell" in list_legend_texts(plot_trajectories(record_walk(ROOMS, 2)))
         assert "final Voronoi cell" not in list_legend_texts(plot_trajectories(record_walk(ROOMS, 1)))

@@ -359,6 +359,7 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         units=UNITS,
         team=TEAM,
         limited_ranges=LIMITED_RANGES,
+        is_rpf_unaffected=_is_rpf_unaffected(),
         families=FAMILIES,
         robots=ROBOTS,
         settled=(SETTLED_DISTANCE_M, SETTLED_WINDOW_S),
@@ -372,6 +373,16 @@ def _render(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     own_style = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(build_theme_rules(":root") + read_replay_css() + read_asset("report.css") + own_style)
     return escape_controls(environment.get_template(template).render(style=style, **context))
+
+
+def _is_rpf_unaffected() -> bool:
+    """Return whether RPF with shared gains moves alike at limited and at unlimited ranges.
+
+    Robots and obstacles beyond the range of the repulsion exert no force.
+    """
+    repulsion_range = contenders.SHARED["rho_0"]
+    assert isinstance(repulsion_range, float)
+    return repulsion_range <= min(LIMITED_RANGES.values())
 
 
 def format_span(numbers: Sequence[int]) -> str:

@@ -127,7 +127,7 @@ function drawArena(canvas, run, time, look, show) {
   if (show.trajectories && run.path) drawTrajectories(context, run, time, places, frame, look);
   drawStarts(context, run, states, frame, look);
   const radii = drawnRadii(run, places, states, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
-  if (show.goals && run.goals) drawGoals(context, run.positionsAt(time, run.goals), places, radii, frame, look);
+  if (show.goals && run.goals) drawGoals(context, run.positionsAt(time, run.goals), places, radii, frame, run.arenaMap, look);
   drawFailed(context, run, places, states, radii, frame, look);
   if (run.headings) drawNoses(context, run, time, places, states, radii, frame, look);
   drawRobots(context, run, places, states, radii, frame, look);
@@ -254,14 +254,18 @@ function drawStarts(context, run, states, frame, look) {
   }
 }
 
-function drawGoals(context, goals, places, radii, frame, look) {
+/** Minimum distance of a goal that is drawn from its robot, as a fraction of the longer side of the map, as in figures. */
+const MIN_GOAL_DISTANCE = 0.03;
+
+function drawGoals(context, goals, places, radii, frame, arenaMap, look) {
+  const minDistance = MIN_GOAL_DISTANCE * Math.max(arenaMap.width, arenaMap.height) * frame.zoom;
   context.lineWidth = 1.6;
   context.strokeStyle = look.ink;
   context.beginPath();
   for (let i = 0; i < radii.length; i += 1) {
     const [x, y] = [frame.x(goals[2 * i]), frame.y(goals[2 * i + 1])];
     const away = Math.hypot(x - frame.x(places[2 * i]), y - frame.y(places[2 * i + 1]));
-    if (!(away > radii[i])) continue; // there, or no goal at all
+    if (!(away > minDistance)) continue; // there, or no goal at all
     context.moveTo(x - 5, y);
     context.lineTo(x + 5, y);
     context.moveTo(x, y - 5);
