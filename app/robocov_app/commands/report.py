@@ -37,7 +37,7 @@ class Arguments(JsonOption):
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR [DIR ...]")]
     """Folders of runs, comparisons and sweeps, and session files (all branches); one section each."""
     out: Path | None = None
-    """The page; by default report.html in the (first) folder."""
+    """The page; by default report.html in the folder, or next to the folders if there are several."""
     overwrite: bool = False
     """Replace a file that is not a report; an earlier report is always replaced."""
     title: str | None = None
@@ -52,9 +52,8 @@ def command(options: Arguments) -> None:
     """Run `robocov report`."""
     if not options.folders:
         raise ParameterError("DIR: expected the folder of a run, a comparison or a sweep")
-    target = options.out or _choose_target(options.folders[0])
-    is_session = options.folders[0].suffix == _SESSION_SUFFIX
-    if options.out is not None or is_session:
+    target = options.out or _choose_target(options.folders)
+    if target.parent not in options.folders:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
         scratch = Path(temporary)
@@ -62,8 +61,16 @@ def command(options: Arguments) -> None:
         _write_report(options, sections, target, scratch)
 
 
-def _choose_target(source: Path) -> Path:
-    """Return the default file for the page about a folder or a session."""
+def _choose_target(sources: Sequence[Path]) -> Path:
+    """Return the default file for the page about folders and sessions.
+
+    A page about several of them is not saved in the first folder, where it would replace the page about this
+    folder alone. It is saved next to them, or in the current folder if they have different parents.
+    """
+    source = sources[0]
+    if len(sources) > 1:
+        parents = {path.parent for path in sources}
+        return parents.pop() / REPORT_FILE if len(parents) == 1 else Path(REPORT_FILE)
     if source.suffix == _SESSION_SUFFIX:
         return source.with_suffix(".html")
     return source / REPORT_FILE
@@ -106,6 +113,7 @@ def _write_report(
     run_folder = None
     if target == options.folders[0] / REPORT_FILE and results[0].kind != "sweep":
         run_folder = options.folders[0]
+    replaced = ", replacing an earlier report" if target.exists() else ""
     _write_page(content, target, run_folder)
     counts = []
     lines = []
@@ -113,7 +121,7 @@ def _write_report(
         counts.append(_count_runs(result, _name_folder(folder, scratch), shown))
         lines.append(_describe_result(result, _name_folder(result.folder, scratch)))
     answer = {"path": str(target), "bytes": len(content), "results": counts}
-    print_answer(options, answer, *lines, f"saved in {target} ({len(content) / 1e6:.2f} MB)")
+    print_answer(options, answer, *lines, f"saved in {target} ({len(content) / 1e6:.2f} MB){replaced}")
 
 
 def _read_runs(options: Arguments, results: Sequence[ReportedResult]) -> list[ReportedResult]:

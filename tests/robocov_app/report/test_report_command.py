@@ -28,9 +28,26 @@ def test_the_page_is_saved_in_the_folder_of_the_run(run, capsys) -> None:
     output = capsys.readouterr()
     assert output.out.splitlines()[0] == f"{run}: run"
     assert is_report(run / "report.html")
+    assert "replacing" not in output.out
     before = (run / "report.html").read_bytes()
-    assert main(["report", str(run)]) == 0  # An earlier report is replaced.
+    assert main(["report", str(run)]) == 0
+    assert capsys.readouterr().out.rstrip().endswith("MB), replacing an earlier report")
     assert (run / "report.html").read_bytes() == before
+
+
+def test_the_page_about_several_folders_is_saved_next_to_them(run, tmp_path, monkeypatch, capsys) -> None:
+    save_run(tmp_path / "two", build_record(SQUARE, robots=2, seconds=1.0))
+    save_run(tmp_path / "more" / "three", build_record(SQUARE, robots=2, seconds=1.0))
+    monkeypatch.chdir(tmp_path / "more")
+    folders = [str(run), str(tmp_path / "two")]
+    assert read_json(capsys, "report", *folders)["path"] == str(tmp_path / "report.html")
+    assert read_json(capsys, "report", *folders, "three")["path"] == "report.html"
+    assert sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.html")) == [
+        "more/report.html",
+        "report.html",
+    ]
+    (tmp_path / "report.html").write_text("mine")
+    assert "is not a report of robocov" in read_error(capsys, "report", *folders)
 
 
 def test_a_summary_is_printed_as_json(run, tmp_path, capsys) -> None:
