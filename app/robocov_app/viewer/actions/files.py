@@ -236,7 +236,9 @@ class FileActions:
         seconds = self._viewer.session.playback.seek_seconds
         workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seconds)
         keeps_draft = self._replace_workspace(workspace, view)
-        message = f"recovered: {describe_draft(draft)}. {explain_pause(self._viewer.view)}"
+        description = describe_draft(draft)
+        recovered = f"recovered: {description[0].lower()}{description[1:]}"
+        message = f"{recovered}. {explain_pause(self._viewer.view)}"
         if keeps_draft:
             message += f" {explain_kept_session(self._viewer.view)}"
         return message
