@@ -177,7 +177,7 @@ def test_a_session_that_another_one_replaces_can_be_recovered(tmp_path: Path) ->
     viewer.session.fail_robot(3)
     message = viewer.files.recover()
     assert viewer.session.displayed.numbers == (1, 3)
-    assert message.startswith("recovered: unsaved session of ")
+    assert message.startswith("recovered: unsaved changes to other.robocov, ")
     assert message.endswith(
         "It is paused: press Space or Play to continue. Your unsaved session is kept: Ctrl+Shift+O opens it."
     )
