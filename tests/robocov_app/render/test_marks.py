@@ -143,6 +143,18 @@ class TestFailedRobots:
         assert crowded_radius < 6.0
         assert 7.0 < radius < 10.0
 
+    def test_a_failed_robot_is_not_larger_than_small_working_ones(self):
+        radii = []
+        for spacing in (0.15, 1.0):
+            crowd = 1.0 + spacing * np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+            scene = replace(build_failed_scene({9: (6.0, 6.0)}, crowd), team=Team.homogeneous(4, radius=0.02))
+            pixels, painter = list_pixels(scene, "failed")
+            _, y = painter.camera.to_pixels(np.array([6.0, 6.0]))
+            radii.append((y - pixels[:, 1].min()) / painter.scale)
+        crowded_radius, radius = radii
+        assert crowded_radius < 6.0
+        assert 7.0 < radius < 10.0
+
     def test_a_large_failed_robot_is_drawn_to_scale(self):
         scene = replace(build_failed_scene({4: (4.0, 4.0)}), team=Team.homogeneous(2, radius=1.0))
         frame, painter = render_layers(scene, "failed")

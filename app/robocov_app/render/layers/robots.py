@@ -191,7 +191,11 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
     failed_centers = canvas.camera.to_pixels(np.array(list(scene.failed.values())))
     working_centers = np.empty((0, 2))
     true_radii = [scene.get_failed_radius(number) for number in scene.failed]
+    max_readable_radius = _FAILED_SIZE_FACTOR * READABLE_RADIUS_PX * canvas.scale
     if scene.snapshot is not None:
+        # Where working robots are small, failed ones are not larger.
+        working_radius = _compute_readable_radius(scene, canvas.camera, canvas.scale)
+        max_readable_radius = min(max_readable_radius, working_radius)
         working_centers = canvas.camera.to_pixels(scene.snapshot.positions)
         true_radii += scene.team.radius.tolist()
     centers = np.concatenate([failed_centers, working_centers])
@@ -199,7 +203,7 @@ def draw_failed_robots(canvas: Canvas, scene: Scene) -> None:
         centers,
         np.array(true_radii) * canvas.camera.zoom,
         low=MIN_RADIUS_PX * canvas.scale,
-        high=_FAILED_SIZE_FACTOR * READABLE_RADIUS_PX * canvas.scale,
+        high=max_readable_radius,
     )
     failed_radii = round_to_half(np.minimum(fitted_radii[: len(failed_centers)], _MAX_RADIUS_PX))
     all_radii = np.concatenate([failed_radii, compute_drawn_radii(canvas, scene)])
