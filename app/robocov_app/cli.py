@@ -70,16 +70,16 @@ def main(arguments: list[str] | None = None) -> int:
         atexit.register(gc.freeze)
     words = sys.argv[1:] if arguments is None else arguments
     if not words:
-        print(_FIRST_STEPS if sys.stdout.isatty() else _format_overview())
+        _print_text(_FIRST_STEPS if sys.stdout.isatty() else _format_overview())
         return BAD_INPUT
     name, *rest = words
     if name in ("-h", "--help", "help"):
-        print(_format_overview())
+        _print_text(_format_overview())
         return OK
     if name == "--version":
         from robocov import __version__
 
-        print(f"robocov {__version__}")
+        _print_text(f"robocov {__version__}")
         return OK
     if name not in COMMANDS:
         from robocov.errors import find_similar_names
@@ -174,8 +174,7 @@ def _print_failure(error: BaseException, name: str) -> int:
         echo("robocov: stopped", to_stderr=True)
         return INTERRUPTED
     if isinstance(error, BrokenPipeError):
-        # The reader of the pipe has ended. Without this, Python would print an error when it exits.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return OK
     if isinstance(error, OSError):
         return _print_os_error(error)
@@ -186,6 +185,22 @@ def _print_failure(error: BaseException, name: str) -> int:
     if not isinstance(error, Exception):
         return _print_error(f"ended by {type(error).__name__}: {error}", FAILED)
     return _print_internal_error(error)
+
+
+def _print_text(text: str) -> None:
+    """Print a text, and return quietly if the reader of the output has ended, as `head` does."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        _discard_output()
+
+
+def _discard_output() -> None:
+    """Discard all further output, because the reader of the pipe has ended.
+
+    Without this, Python would print an error when it exits.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _find_users_fault(error: BaseException) -> "RobocovError | None":

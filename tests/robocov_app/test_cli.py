@@ -4,7 +4,10 @@ import contextlib
 import gc
 import io
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +47,17 @@ def test_the_help_of_every_command_has_an_example(name: str, capsys: pytest.Capt
 def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"robocov {robocov.__version__}\n"
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"]])
+def test_a_reader_that_has_ended_causes_no_error(arguments: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "robocov_app", *arguments]
+    process = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert process.stderr == ""
+    assert process.returncode == (0 if arguments else 2)
 
 
 def test_the_process_of_a_command_collects_no_garbage_at_exit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ class Arguments(RunOptions):
     """Compare controllers that start from the same positions, under the same limits.
 
     The folder contains a run's folder for each controller, figures of the trajectories and costs side by side
-    as PNG and SVG, comparison.csv and comparison.json, and on request frames and a video.
+    as PNG and SVG, comparison.csv and comparison.json, and with --frames or --video frames or a video.
 
     --set k_rep=1 applies to every controller with such a gain, --set rapf.k_rep=1 to one. Controllers in
     files are named by their class, as in --set MyController.k_rep=1.

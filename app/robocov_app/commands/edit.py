@@ -33,7 +33,7 @@ class Arguments(WindowOptions):
     """
 
     map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
-    """Map file, new or existing; bundled map, opened as a copy; or foreign file to import."""
+    """A new or existing map file, a bundled map to open as a copy, or a file of another program to import."""
     background: Path | None = None
     """Image to display under the map, such as a scanned floor plan."""
     screenshot: Path | None = None

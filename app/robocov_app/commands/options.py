@@ -147,7 +147,7 @@ class ConditionOptions:
     delay: float = 0.0
     """Message latency, s."""
     message_rate: float | None = None
-    """Times per second at which each robot sends messages, with its position; by default in every step."""
+    """Times per second that each robot sends its position and messages; by default in every step."""
     bandwidth: float | None = None
     """Bytes per second that each robot can send; by default unlimited."""
     forget_after: float = 3.0
@@ -297,7 +297,7 @@ class ScenarioOptions:
     radius: float = DEFAULT_RADIUS_M
     """Radius of a robot, m."""
     team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
-    """TOML or JSON file of a mixed team; options apply where a group sets no value."""
+    """TOML or JSON file of a mixed team; options apply if a group sets no value."""
     lattice: int = DEFAULT_LATTICE
     """Compute the coverage cost on a lattice of N x N sites over the map."""
     condition: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)

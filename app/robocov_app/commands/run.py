@@ -29,7 +29,7 @@ class Arguments(RunOptions):
     """Simulate one run without a window, and save everything in a folder.
 
     The folder contains run.json and record.npz (the whole run), cost.csv, figures of the trajectories and
-    the cost as PNG and SVG, and on request frames and a video.
+    the cost as PNG and SVG, and with --frames or --video frames or a video.
 
     MAP may also be a session that was saved in the window, such as session.robocov: it is simulated again
     with all edits.

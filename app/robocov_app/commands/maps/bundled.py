@@ -11,7 +11,7 @@ from robocov_app.terminal.output import BOLD, print_answer, print_table
 
 @dataclass
 class Arguments(JsonOption):
-    """List the bundled maps with size, starts and a description.
+    """List the bundled maps with their sizes, starts and descriptions.
 
     Example: robocov maps
     """

@@ -18,7 +18,7 @@ from robocov_app.terminal.progress import show_progress
 
 @dataclass
 class Arguments(JsonOption):
-    """Convert a foreign map file to a map of robocov, and report dropped, repaired and changed elements.
+    """Convert a map of another program, and report dropped, repaired and changed elements.
 
     The format is detected from the content, otherwise from the suffix. Inapplicable options are rejected.
 
@@ -46,13 +46,13 @@ class Arguments(JsonOption):
     """
 
     file: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
-    """Foreign map file."""
+    """Map file of another program."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")] = None
     """Map file to write; by default the name of FILE with .json, in the current folder."""
     format: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Format of FILE; by default detected."""
     preview: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Figure (.png, .svg or .pdf) of the foreign map next to the converted one."""
+    """Figure (.png, .svg or .pdf) of the original map next to the converted one."""
     overwrite: bool = False
     """Replace existing files."""
     read: tyro.conf.OmitArgPrefixes[ReadOptions] = field(default_factory=ReadOptions)
