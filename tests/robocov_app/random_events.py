@@ -182,7 +182,7 @@ ODD_FILES: dict[str, bytes] = {
 
 
 def write_odd_files(folder: Path) -> list[str]:
-    """Write files that a window cannot open, and return their paths, and some paths without files."""
+    """Write odd files and a valid map, and return their paths, paths that do not exist, and bundled maps."""
     folder.mkdir()
     (folder / "folder.json").mkdir()
     for name, content in ODD_FILES.items():
@@ -277,7 +277,7 @@ class RandomEvents:
             self.post_key(key)
 
     def repeat_key(self) -> None:
-        """Press a key many times without releasing it, and then a key that hardly exists."""
+        """Press a key many times without releasing it, then an unusual or invalid key."""
         content = build_key_event(self.random.choice(REPEATED_KEYS))
         for _ in range(self.random.randint(2, 25)):
             self.post(pygame.KEYDOWN, **content)

@@ -41,7 +41,7 @@ class RepeatedRun:
     robots : sequence of int
         Rows of the robots whose decisions are repeated in processes of their own.
     seed : sequence of int
-        Seed of the placeholders.
+        Seed of the placeholders for other robots; see `robocov_app.benchmark.isolation`.
     """
 
     task: Task
@@ -58,7 +58,8 @@ class RunCheck:
     Attributes
     ----------
     outcome : Outcome or None
-        Outcome of the repeated run; None if its process ended.
+        Outcome of the repeated run; None if its process ended, or if the referees were killed before it
+        started.
     robots : int
         Number of robots in processes of their own.
     differences : list of str
@@ -82,21 +83,21 @@ class RefereeService:
         """Repeat a run while other processes execute its controller."""
         run = questions[-1]
         with ExitStack() as stack:
-            team = _start_process(stack)
-            robots = {robot: _start_process(stack) for robot in run.robots}
+            team_process = _start_controller_process(stack)
+            robot_processes = {robot: _start_controller_process(stack) for robot in run.robots}
             environment = None
             if run.description.information == "whole map":
                 environment = run.task.hide_unknown_density().build_environment().static
             isolated_team = IsolatedTeam(
                 run.code,
-                team,
-                robots,
+                team_process,
+                robot_processes,
                 scanning=run.description.scanning,
                 environment=environment,
                 rng=np.random.default_rng(run.seed),
             )
             outcome = perform(run.task, isolated_team.compare_decisions, isolated_team)
-        processes = (team, *robots.values())
+        processes = (team_process, *robot_processes.values())
         violations = [action for process in processes for action in process.violations]
         read_files = [file for process in processes for file in process.read_files]
         differences = [f"its controller tried {action}" for action in dict.fromkeys(violations)]
@@ -104,12 +105,12 @@ class RefereeService:
         # Most files of the run are not needed for its row, and are not sent back.
         files = {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
         return RunCheck(
-            replace(outcome, files=files), len(robots), differences, list(dict.fromkeys(read_files))
+            replace(outcome, files=files), len(robot_processes), differences, list(dict.fromkeys(read_files))
         )
 
 
-def _start_process(stack: ExitStack) -> ControllerProcess:
-    """Start a process for a controller, which ends with the context of the stack."""
+def _start_controller_process(stack: ExitStack) -> ControllerProcess:
+    """Start a process for a controller. It ends when the stack is closed."""
     process = ControllerProcess()
     stack.callback(process.end)
     return process

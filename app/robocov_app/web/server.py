@@ -174,9 +174,13 @@ class WebDisplay:
         self.shared.window_input.wait(seconds)
 
     def receive(self, window: BaseWindow) -> None:
-        """Fit the window to the controlling page, and post that page's input as events."""
+        """Post the input of the controlling page as events, and fit the window to that page.
+
+        The status and the controls of the window are kept, because `send` sends them to the pages.
+        """
         self._window = window
         self._status = window.status_text
+        # In play mode, another window replaces this one.
         controls = (window.replacement or window).controls
         self._controls = None if controls is None else asdict(controls)
         self.shared.window_input.post(window)
@@ -238,7 +242,10 @@ class WebDisplay:
             self._file_executor.shutdown(wait=False, cancel_futures=True)
 
     async def _serve(self) -> None:
-        """Run the server until it is asked to stop; report an error in listening to the window's thread."""
+        """Run the server until it is asked to stop.
+
+        If the port cannot be opened, keep the error for the window's thread.
+        """
         self._loop = asyncio.get_running_loop()
         listener = Listener(self._answer, self._talk)
         try:

@@ -115,6 +115,10 @@ class TestEdits:
         [
             (lambda: density_edits.add_peak(build_dense_map(), (1.0, 1.0), 0.001, 4.0), "needs a size"),
             (
+                lambda: density_edits.add_peak(build_dense_map(), (1.0, 1.0), 1e5, 4.0),
+                "a size from 20 mm to 10 km",
+            ),
+            (
                 lambda: density_edits.add_peak(build_dense_map(), (1.0, 1.0), 1.0, 0.0),
                 "weight: expected .*, got 0",
             ),

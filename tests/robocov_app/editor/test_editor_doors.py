@@ -46,7 +46,8 @@ def test_the_nearest_wall_is_found(sketch):
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
-        (lambda s: create.open_door(s, 3, (1.0, 0.0), 0.001), "at least 2 cm"),
+        (lambda s: create.open_door(s, 3, (1.0, 0.0), 0.001), "a door width from 20 mm to 10 km"),
+        (lambda s: create.open_door(s, 3, (1.0, 0.0), 1e5), "a door width from 20 mm to 10 km"),
         (lambda s: create.open_door(s, 3, (1.0, 0.0), 7.0), "not longer than a door"),
         (lambda s: create.open_wall(s, 3, (0.0, 0.0), (4.0, 3.0)), "nothing would be left"),
         (lambda s: create.open_wall(s, 5, (0.0, 0.0), (4.0, 3.0)), "opened in walls"),

@@ -20,7 +20,7 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
-from robocov_app.editor.edits import create, properties, transform
+from robocov_app.editor.edits import boolean, create, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import round_length, round_point, round_ring
@@ -91,10 +91,11 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: create.add_polygon(s, [(0, 0), (1, 1), (2, 2)]), "enclose an area"),
         (lambda s: create.add_rectangle(s, [(0, 0), (0, 3)]), "a width and a height"),
         (lambda s: create.add_circle(s, (0, 0), 0.0), "needs a radius"),
+        (lambda s: create.add_circle(s, (0, 0), 1e5), "a radius from 20 mm to 10 km"),
         (lambda s: create.add_circle(s, (math.nan, 0), 1.0), "too far away"),
         (lambda s: create.add_circle(s, (1e8, 0), 1.0), "too far away"),
         (lambda s: create.add_wall(s, [(1, 1), (1, 1)], 0.1), "two different points"),
-        (lambda s: create.add_wall(s, [(1, 1), (2, 1)], 0.0), "width is at least 1 mm"),
+        (lambda s: create.add_wall(s, [(1, 1), (2, 1)], 0.0), "a width from 1 mm to 10 km"),
         (lambda s: create.set_boundary(s, [(1, 1), (2, 1)]), "three corners"),
         (lambda s: create.add_disc_start(s, (1, 1), 0.0), "needs a radius"),
         (lambda s: create.add_points_start(s, []), "at least one position"),
@@ -102,7 +103,8 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: transform.move(s, ALL, 1e9, 1), "too far away"),
         (lambda s: transform.move(s, ALL, math.nan, 1), "too far away"),
         (lambda s: transform.rotate(s, ALL, math.inf), "an angle"),
-        (lambda s: transform.scale(s, ALL, 0.0, 0.0), "a factor that is not 0"),
+        (lambda s: transform.scale(s, ALL, 0.0, 0.0), "a factor other than 0"),
+        (lambda s: transform.scale(s, ALL, 1e9, 1e9), r"the factor 1e\+09 is too small or too large"),
         (lambda s: transform.scale(s, Selection.of("corner"), 1.0, 2.0), "by the same factor both ways"),
         (lambda s: transform.resize(s, Selection.of(0), None, None), "a width or a height"),
         (lambda s: transform.resize(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
@@ -121,8 +123,9 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: properties.set_title(s, ""), "a map needs a name"),
         (lambda s: properties.set_description(s, "x" * 10001), "at most 10000"),
         (lambda s: properties.set_width(s, Selection.of(0), 0.2), "select walls"),
-        (lambda s: properties.set_width(s, ALL, -0.2), "at least 1 mm"),
+        (lambda s: properties.set_width(s, ALL, 1e5), "a width from 1 mm to 10 km"),
         (lambda s: properties.set_radius(s, Selection.of(0), 0.2), "select circles"),
+        (lambda s: boolean.offset(s, ALL, 1e5), "a length from 1 mm to 10 km"),
         (lambda s: properties.restack(s, ALL, "left"), "top or bottom"),
         (lambda s: properties.make_default_start(s, "none"), "no start “none”"),
         (lambda s: properties.convert_to_polygons(s, Selection.of(0)), "select circles or walls"),

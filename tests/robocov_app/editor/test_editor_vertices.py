@@ -241,7 +241,7 @@ def test_a_straight_vertex_is_no_corner():
         vertices.bevel_corners(sketch, select_vertices(Vertex(key, 0, 1)), 0.1)
     spike = WallObstacle(((0.0, 0.0), (1.0, 0.0), (0.2, 0.0)), 0.1)
     sketch, (key,) = Sketch().with_obstacles([spike])
-    with pytest.raises(MapError, match="turns right back"):
+    with pytest.raises(MapError, match="fold back on each other"):
         vertices.bevel_corners(sketch, select_vertices(Vertex(key, 0, 1)), 0.1)
 
 

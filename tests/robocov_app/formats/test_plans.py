@@ -215,6 +215,23 @@ def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: 
         import_picture(tmp_path, draw_on_transparency(), unknown="obstacle")
 
 
+@pytest.mark.parametrize(
+    ("unknown", "treatment"), [("obstacle", "treated as obstacles"), ("cut", "cut away")]
+)
+def test_the_treatment_of_transparency_is_reported_if_nothing_is_free(
+    tmp_path: Path, unknown: str, treatment: str
+) -> None:
+    with pytest.raises(MapError, match=f"of the pixels are transparent and {treatment}"):
+        import_picture(tmp_path, draw_on_transparency(), unknown=unknown)
+
+
+def test_brightness_is_reported_if_few_pixels_of_a_dark_picture_are_transparent(tmp_path: Path) -> None:
+    picture = Image.new("RGBA", (30, 30), (51, 51, 51, 255))
+    picture.putpixel((3, 3), (0, 0, 0, 0))
+    with pytest.raises(MapError, match="no cell is free: the brightness of the pixels"):
+        import_picture(tmp_path, picture)
+
+
 def test_transparency_is_reported_if_nothing_is_solid(tmp_path: Path) -> None:
     picture = Image.new("RGBA", (40, 40), (255, 255, 255, 255))
     ImageDraw.Draw(picture).rectangle((10, 10, 19, 19), fill=(0, 0, 0, 100))
@@ -224,7 +241,7 @@ def test_transparency_is_reported_if_nothing_is_solid(tmp_path: Path) -> None:
 
 
 def test_brightness_is_reported_if_everything_is_solid_or_free(tmp_path: Path) -> None:
-    with pytest.raises(MapError, match=r"its brightness is from 0.2 to 0.4 .*--threshold"):
+    with pytest.raises(MapError, match=r"the brightness of the pixels is from 0.2 to 0.4 .*--threshold"):
         picture = Image.new("L", (30, 30), 51)
         ImageDraw.Draw(picture).rectangle((5, 5, 20, 20), fill=102)
         import_picture(tmp_path, picture)

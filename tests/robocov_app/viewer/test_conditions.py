@@ -214,8 +214,8 @@ def test_the_beliefs_of_the_selected_robot_are_drawn() -> None:
     plain = painter.render_frame(replace(scene, numbers=session.displayed.numbers))
     selected = replace(scene, numbers=session.displayed.numbers, selected=1)
     assert (painter.render_frame(selected) != plain).any(axis=-1).sum() > 200
-    assert "position believed by robot 2" in list_legend_texts(painter, selected)
-    assert "position believed by robot 2" not in list_legend_texts(painter, scene)
+    assert "position according to robot 2" in list_legend_texts(painter, selected)
+    assert "position according to robot 2" not in list_legend_texts(painter, scene)
 
 
 def test_a_saved_run_with_conditions_is_replayed_and_continued(tmp_path: Path) -> None:

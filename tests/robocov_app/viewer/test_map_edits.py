@@ -200,7 +200,7 @@ class TestDrawnShapes:
         rim = center[0] + radius * math.cos(angle), center[1] + radius * math.sin(angle)
         assume(abs(radius - MIN_SHAPE_SIZE_M) > 1e-6)
         if radius < MIN_SHAPE_SIZE_M:
-            with pytest.raises(MapError, match="drag from its middle"):
+            with pytest.raises(MapError, match="drag from its center"):
                 build_circle(center, rim)
         else:
             circle = build_circle(center, rim)

@@ -356,7 +356,7 @@ def test_a_circle_is_drawn_from_its_center():
 def test_a_click_draws_no_circle():
     tool = AddCircleTool()
     session = start_session()
-    with pytest.raises(MapError, match="drag from its middle"):
+    with pytest.raises(MapError, match="drag from its center"):
         click(tool, session, (3.5, 3.2))
     tool.press(session, build_event((3.5, 3.2)))
     assert tool.cancel(session)

@@ -8,9 +8,9 @@ import shapely
 
 from robocov.environment import GRID_M, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, format_count
-from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
+from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.editor.model import require
-from robocov_app.editor.model.geometry import extract_polygons, round_length
+from robocov_app.editor.model.geometry import extract_polygons, require_size, round_length
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
@@ -56,8 +56,7 @@ def divide(sketch: Sketch, selection: Selection) -> Change:
 
 def offset(sketch: Sketch, selection: Selection, distance: float) -> Change:
     """Grow the selected obstacles on all sides by a distance, m; a negative distance shrinks them."""
-    is_possible = MIN_SIZE_M <= abs(distance) <= MAX_SIZE_M
-    require(is_possible, f"expected a length of at least {1000 * MIN_SIZE_M:g} mm")
+    require_size("length", abs(distance))
     require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in selection.list_items(sketch):

@@ -12,11 +12,12 @@ from shapely.ops import substring
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
-from robocov.mapfile.models import MAX_LABEL_CHARACTERS, MAX_SIZE_M, MIN_SIZE_M
+from robocov.mapfile.models import MAX_LABEL_CHARACTERS, MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     build_rectangle,
     drop_repeated_points,
+    require_size,
     round_length,
     round_map_point,
     round_point,
@@ -62,8 +63,7 @@ def add_wall(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
     line = drop_repeated_points(round_ring(points), is_closed=False)
     if len(line) < 2 or shapely.LineString(line).length < MIN_DRAWN_LENGTH_M:
         raise MapError("a wall needs two different points")
-    is_possible = MIN_SIZE_M <= width <= MAX_SIZE_M
-    require(is_possible, f"a wall's width is at least {1000 * MIN_SIZE_M:g} mm")
+    require_size("width", width)
     return add_obstacle(sketch, env.WallObstacle(line, round_length(width)))
 
 
@@ -171,8 +171,8 @@ def _build_outline(points: Sequence[Point], label: str) -> Ring:
 
 def _round_radius(radius: float, label: str) -> float:
     """Round a radius to tenths of a millimeter; raise MapError if it is out of range."""
-    is_possible = MIN_DRAWN_LENGTH_M <= radius <= MAX_SIZE_M
-    require(is_possible, f"{label} needs a radius: drag from its middle to its rim")
+    require(radius >= MIN_DRAWN_LENGTH_M, f"{label} needs a radius: drag from its center to its rim")
+    require_size("radius", radius, MIN_DRAWN_LENGTH_M)
     return round_length(radius)
 
 
@@ -211,8 +211,7 @@ def project_on_wall(sketch: Sketch, key: int, point: Point) -> Point:
 
 def require_door_width(width: float) -> None:
     """Raise MapError if the width of a door, m, is out of range."""
-    is_possible = MIN_DRAWN_LENGTH_M <= width <= MAX_SIZE_M
-    require(is_possible, f"a door's width is at least {100 * MIN_DRAWN_LENGTH_M:g} cm")
+    require_size("door width", width, MIN_DRAWN_LENGTH_M)
 
 
 def open_door(sketch: Sketch, key: int, point: Point, width: float) -> Change:

@@ -9,11 +9,11 @@ import shapely
 from robocov.density import MAX_WEIGHT, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import Point, PolygonObstacle
 from robocov.errors import MapError, format_count
-from robocov.mapfile.models import MAX_SIZE_M
 from robocov_app.editor.edits import create, transform
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import (
     drop_repeated_points,
+    require_size,
     round_length,
     round_map_point,
     round_ring,
@@ -236,8 +236,8 @@ def _check_area(area: WeightedArea) -> WeightedArea:
 
 
 def _round_sigma(sigma: float) -> float:
-    is_possible = create.MIN_DRAWN_LENGTH_M <= sigma <= MAX_SIZE_M
-    require(is_possible, "a hot spot needs a size: drag from its middle outward")
+    require(sigma >= create.MIN_DRAWN_LENGTH_M, "a hot spot needs a size: drag outward from its center")
+    require_size("size", sigma, create.MIN_DRAWN_LENGTH_M)
     return round_length(sigma)
 
 

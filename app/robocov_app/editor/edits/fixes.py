@@ -116,7 +116,7 @@ def fill_unreachable(sketch: Sketch, radius: float) -> Change:
     swept, untouched = compute_reach(free, radius)
     require(swept, f"no robot of radius {radius:g} m fits anywhere")
     unreachable: list[Geometry | None] = [*swept[1:], untouched, *list(free.geoms)[1:]]
-    return _fill(sketch, _find_parts(free, swept[0], unreachable))
+    return _fill(sketch, _find_unreachable_parts(free, swept[0], unreachable))
 
 
 def _draw_boundary(request: FixRequest) -> Change:
@@ -142,7 +142,7 @@ def _fill_sealed_area(request: FixRequest) -> Change:
 def _fill_cut_off_area(request: FixRequest) -> Change:
     _, free = find_problems(request.sketch, request.radius)
     swept, _ = compute_reach(free, request.radius)
-    return _fill(request.sketch, _find_parts(free, swept[0], [request.problem.geometry]))
+    return _fill(request.sketch, _find_unreachable_parts(free, swept[0], [request.problem.geometry]))
 
 
 def _widen_gap(request: FixRequest) -> Change:
@@ -270,11 +270,15 @@ def _fill(sketch: Sketch, area: Geometry | None) -> Change:
     return Change(filled, Selection.of(*keys), "unreachable areas filled")
 
 
-def _find_parts(free: MultiPolygon, largest: Geometry, areas: list[Geometry | None]) -> Geometry:
-    """Return the parts of the free space outside its largest part that intersect any of the given areas."""
-    parts = shapely.get_parts(free - largest.buffer(MAX_SAGITTA_M))
-    inside = shapely.union_all(areas).buffer(-MAX_SAGITTA_M)
-    return shapely.union_all(parts[shapely.intersects(parts, inside)])
+def _find_unreachable_parts(
+    free: MultiPolygon, reachable: Geometry, areas: list[Geometry | None]
+) -> Geometry:
+    """Return the parts of the free space outside the reachable space that overlap any of the given areas."""
+    # Without the tolerance, slivers along the border of the reachable space would remain.
+    parts = shapely.get_parts(free - reachable.buffer(MAX_SAGITTA_M))
+    # Parts that only touch an area do not count.
+    shrunk_areas = shapely.union_all(areas).buffer(-MAX_SAGITTA_M)
+    return shapely.union_all(parts[shapely.intersects(parts, shrunk_areas)])
 
 
 FIXES: Final[dict[ProblemKind, Fix]] = {

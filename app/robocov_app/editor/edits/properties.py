@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, to_one_line
-from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov_app.editor.edits import create, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.geometry import extract_polygons, round_length
+from robocov_app.editor.model.geometry import extract_polygons, require_size, round_length
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
@@ -123,7 +122,7 @@ def set_description(sketch: Sketch, description: str) -> Change:
 
 def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
     """Set the width of the selected walls, m."""
-    width = _check_size("width", width)
+    width = _round_size("width", width)
     walls: dict[Owner, Any] = {}
     for owner in selection.owners:
         shape = sketch.get_shape(owner)
@@ -136,7 +135,7 @@ def set_width(sketch: Sketch, selection: Selection, width: float) -> Change:
 
 def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Set the radius of the selected circles and disc-shaped starts, m."""
-    radius = _check_size("radius", radius)
+    radius = _round_size("radius", radius)
     circles: dict[Owner, Any] = {}
     for owner in selection.owners:
         shape = sketch.get_shape(owner)
@@ -147,10 +146,9 @@ def set_radius(sketch: Sketch, selection: Selection, radius: float) -> Change:
     return Change(sketch.with_objects(circles), selection, description)
 
 
-def _check_size(name: str, size: float) -> float:
+def _round_size(name: str, size: float) -> float:
     """Return a size rounded to tenths of a millimeter, m; raise MapError if it is out of range."""
-    is_possible = MIN_SIZE_M <= size <= MAX_SIZE_M
-    require(is_possible, f"expected a {name} of at least {1000 * MIN_SIZE_M:g} mm")
+    require_size(name, size)
     return round_length(size)
 
 

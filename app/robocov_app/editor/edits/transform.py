@@ -17,7 +17,7 @@ from robocov_app.editor.edits.create import add_objects
 from robocov_app.editor.edits.vertices import place_vertices
 from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.background import rotate_background
-from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes, round_length
+from robocov_app.editor.model.geometry import Box, compute_center, enclose_boxes, require_size, round_length
 from robocov_app.editor.model.selection import Change, Selection, Vertex, find_position
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.toolkit.tools.geometry import compute_cos_sin
@@ -175,8 +175,9 @@ def scale(
     Negative factors mirror the selection.
     """
     for factor in (factor_x, factor_y):
+        require(factor != 0.0, "expected a factor other than 0")
         if not MIN_SIZE_M / MAX_SIZE_M <= abs(factor) <= MAX_SIZE_M / MIN_SIZE_M:
-            raise MapError("expected a factor that is not 0")
+            raise MapError(f"the factor {factor:g} is too small or too large")
     center = about or _compute_center(sketch, selection)
     return _transform(sketch, selection, Affine.scaling(factor_x, factor_y, center), "scaled")
 
@@ -194,18 +195,18 @@ def resize(sketch: Sketch, selection: Selection, width: float | None, height: fl
         Size of the bounding box, m; None to keep the proportions.
     """
     low_x, low_y, high_x, high_y = _require_bounds(sketch, selection)
-    present_width = high_x - low_x
-    present_height = high_y - low_y
-    _check_size(width, present_width, "width")
-    _check_size(height, present_height, "height")
+    current_width = high_x - low_x
+    current_height = high_y - low_y
+    _check_size(width, current_width, "width")
+    _check_size(height, current_height, "height")
     require(width is not None or height is not None, "expected a width or a height")
     if width is not None and height is not None:
         return _scale_to_size(sketch, selection, width, height)
     factor = 1.0
     if width is not None:
-        factor = width / present_width
+        factor = width / current_width
     elif height is not None:
-        factor = height / present_height
+        factor = height / current_height
     return _transform(sketch, selection, Affine.scaling(factor, factor, (low_x, low_y)), "resized")
 
 
@@ -215,10 +216,10 @@ def _scale_to_size(sketch: Sketch, selection: Selection, width: float, height: f
     Walls keep their width, so the box does not scale exactly by the factors, which are found by iteration.
     """
     low_x, low_y, high_x, high_y = _require_bounds(sketch, selection)
-    present_width = high_x - low_x
-    present_height = high_y - low_y
-    factor_x = width / present_width
-    factor_y = height / present_height
+    current_width = high_x - low_x
+    current_height = high_y - low_y
+    factor_x = width / current_width
+    factor_y = height / current_height
     for _ in range(MAX_RESIZE_STEPS):
         affine = Affine.scaling(factor_x, factor_y, (low_x, low_y))
         change = _transform(sketch, selection, affine, "resized")
@@ -228,18 +229,17 @@ def _scale_to_size(sketch: Sketch, selection: Selection, width: float, height: f
         if max(abs(missing_width), abs(missing_height)) <= RESIZE_TOLERANCE_M:
             shift = Affine(x0=low_x - box[0], y0=low_y - box[1])
             return replace(change, sketch=_apply_affine(change.sketch, change.selection, shift))
-        factor_x = max(factor_x + missing_width / present_width, MIN_RESIZE_FACTOR)
-        factor_y = max(factor_y + missing_height / present_height, MIN_RESIZE_FACTOR)
+        factor_x = max(factor_x + missing_width / current_width, MIN_RESIZE_FACTOR)
+        factor_y = max(factor_y + missing_height / current_height, MIN_RESIZE_FACTOR)
     raise MapError("this size is not possible: walls keep their width unless all lengths are scaled alike")
 
 
-def _check_size(size: float | None, present: float, name: str) -> None:
+def _check_size(size: float | None, current: float, name: str) -> None:
     """Raise MapError if a size, m, is out of range, or if the current size is too small to be scaled."""
     if size is None:
         return
-    if not MIN_SIZE_M <= size <= MAX_SIZE_M:
-        raise MapError(f"expected a {name} from {1000 * MIN_SIZE_M:g} mm to {MAX_SIZE_M / 1000:g} km")
-    require(present >= MIN_SIZE_M, f"it has no {name} that could be scaled")
+    require_size(name, size)
+    require(current >= MIN_SIZE_M, f"the selection has no {name} that can be scaled")
 
 
 def place(sketch: Sketch, selection: Selection, x: float | None, y: float | None) -> Change:

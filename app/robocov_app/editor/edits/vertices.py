@@ -233,7 +233,10 @@ def _replace_corners(ring: Ring, cuts: Mapping[int, CornerCut], is_closed: bool)
 def _compute_cuts(
     ring: Ring, indices: set[int], is_closed: bool, compute_cut: ComputeCut
 ) -> dict[int, CornerCut]:
-    """Return the cut of each given vertex that is a corner; raise MapError if an edge is too short."""
+    """Return the cut of each given vertex that is a corner.
+
+    Raises MapError if the edges of a corner fold back on each other, or are too short for the cut.
+    """
     cuts: dict[int, CornerCut] = {}
     count = len(ring)
     for index in sorted(indices):
@@ -241,7 +244,9 @@ def _compute_cuts(
         if is_end:
             continue
         turn = _compute_turn(ring, index)
-        require(turn <= math.pi - MIN_CORNER_RAD, "a corner that turns right back cannot be cut off")
+        require(
+            turn <= math.pi - MIN_CORNER_RAD, "a corner whose edges fold back on each other cannot be cut off"
+        )
         if turn >= MIN_CORNER_RAD:
             cuts[index] = compute_cut(turn)
     for index, cut in cuts.items():

@@ -10,7 +10,7 @@ import shapely
 from shapely import Polygon
 
 from robocov.environment import Point, PolygonObstacle, Ring
-from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
+from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M, MIN_SIZE_M
 from robocov.typing import FloatArray
 from robocov_app.editor.model import require
 from robocov_app.toolkit.tools.geometry import compute_bearing
@@ -25,6 +25,13 @@ def round_length(length: float) -> float:
     """Round a length to tenths of a millimeter; never return minus zero."""
     # Adding 0.0 turns -0.0 into 0.0.
     return round(float(length), DECIMALS) + 0.0
+
+
+def require_size(label: str, size: float, minimum: float = MIN_SIZE_M) -> None:
+    """Raise MapError if a size, m, is out of range or nan; `label` is its name in the message."""
+    is_in_range = minimum <= size <= MAX_SIZE_M
+    limits = f"from {1000 * minimum:g} mm to {MAX_SIZE_M / 1000:g} km"
+    require(is_in_range, f"expected a {label} {limits}")
 
 
 def round_point(point: Iterable[float]) -> Point:

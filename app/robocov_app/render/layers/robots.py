@@ -57,13 +57,14 @@ _NUMBER_GAP_PX = 7.0
 _INK_HALF_HEIGHT = 0.4
 """Half the height of digits, as a fraction of the text size."""
 _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
-"""Positions of the number of a failed robot: right, left, above, below."""
+"""Positions of the number of a failed or selected robot: right, left, above, below."""
 
 
 def compute_drawn_radii(canvas: Canvas, scene: Scene) -> FloatArray:
     """Compute the radii at which robots are drawn.
 
-    Discs are large enough for readable numbers. In a crowd they are smaller, but never below the true radius.
+    Discs are large enough for readable numbers. In a crowd they are smaller, but not below the true
+    radius. Very large discs are limited to `_MAX_RADIUS_PX`.
     Robots of the same radius have discs of the same size.
 
     Parameters
@@ -294,9 +295,9 @@ build_failed_robots_legend = build_legend(legend.FAILED_ROBOT, _draw_failed_symb
 
 
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
-    """Draw a ring around the selected robot and, if messages can get lost, its beliefs.
+    """Draw a ring around the selected robot, and its beliefs if robots know others only from messages.
 
-    These are the cell that it computes, and the positions at which it believes itself and its neighbors.
+    The beliefs are the cell that it computes, and where it believes itself and its neighbors to be.
     If its disc is too small for its number, the number is drawn next to it.
     """
     assert scene.selected is not None
@@ -341,17 +342,21 @@ def _draw_believed_cell(canvas: Canvas, scene: Scene, robot: int) -> None:
         canvas.draw_outline(corners, canvas.theme.ink, width)
 
 
-def _draw_believed_positions(canvas: Canvas, scene: Scene, robot: int, positions: list[list[float]]) -> None:
-    """Draw where a robot believes itself and its neighbors, connected with the true positions, px."""
+def _draw_believed_positions(
+    canvas: Canvas, scene: Scene, robot: int, true_pixels: list[list[float]]
+) -> None:
+    """Draw where a robot believes itself and its neighbors to be, with lines to their true positions.
+
+    `true_pixels` are the true positions of all robots, px.
+    """
     seen = scene.now.seen
-    robots = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
+    # The first row is that of the robot itself.
+    rows = [robot, *seen.neighbors.list_neighbors(robot).tolist()]
     believed = np.concatenate([seen.positions[[robot]], seen.get_neighbor_positions(robot)])
-    for other, position in zip(robots, canvas.camera.to_pixels(believed).tolist(), strict=True):
-        hue = int(canvas.hues[other])
-        canvas.draw_dashed_line(
-            positions[other], position, _get_belief_color(canvas, hue), dash=_BELIEF_DASH_PX
-        )
-        _draw_belief_ring(canvas, hue, position[0], position[1])
+    for row, pixel in zip(rows, canvas.camera.to_pixels(believed).tolist(), strict=True):
+        hue = int(canvas.hues[row])
+        canvas.draw_dashed_line(true_pixels[row], pixel, _get_belief_color(canvas, hue), dash=_BELIEF_DASH_PX)
+        _draw_belief_ring(canvas, hue, pixel[0], pixel[1])
 
 
 def _get_belief_color(canvas: Canvas, hue: int) -> Color:
@@ -366,9 +371,12 @@ def _draw_belief_ring(canvas: Canvas, hue: int, x: float, y: float) -> None:
 
 
 def build_selection_legend(scene: Scene) -> list[LegendEntry]:
-    """Build the legend of the positions that the selected robot believes, if messages can get lost."""
+    """Build the legend of the positions that the selected robot believes.
+
+    It has no entries unless robots know each other's positions only from messages.
+    """
     assert scene.selected is not None
     if scene.now.seen.reported_positions is None:
         return []
-    text = f"position believed by robot {scene.get_number(scene.selected)}"
+    text = f"position according to robot {scene.get_number(scene.selected)}"
     return [LegendEntry(text, lambda canvas, x, y: _draw_belief_ring(canvas, 0, x, y))]

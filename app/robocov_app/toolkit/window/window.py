@@ -52,7 +52,7 @@ class Remote(Protocol):
         """Wait until a message arrives, at most for the given time."""
 
     def receive(self, window: "BaseWindow") -> None:
-        """Give the window the size and appearance requested there, and post the input as events."""
+        """Give the window the size and appearance that the display requests, and post its input as events."""
 
     def send(self, surface: Surface, cursor: int) -> None:
         """Show the current frame and the shape of the cursor (a pygame constant)."""

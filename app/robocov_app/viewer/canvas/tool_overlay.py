@@ -60,7 +60,8 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
 
 
 def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
-    """Draw a ring around the robot under the cursor, unless it is selected and has a ring already."""
+    """Draw a ring around the working robot under the cursor, unless it is selected and has a ring already."""
+    # Failed robots are not in `scene.numbers`.
     numbers = list(scene.numbers or ())
     if number not in numbers:
         return

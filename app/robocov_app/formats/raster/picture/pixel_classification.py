@@ -164,15 +164,16 @@ def require_free_cells(cells: Cells, unknown: str, picture: Brightness, source_n
     counts = np.bincount(cells.ravel(), minlength=3)
     if counts[FREE] or (unknown == "free" and counts[UNKNOWN]):
         return
-    if counts[UNKNOWN]:
+    if counts[UNKNOWN] > counts[BLOCKED]:
         percentage = 100 * counts[UNKNOWN] / cells.size
-        cause = f"{percentage:.3g}% of the pixels are transparent, which counts as solid"
+        treatment = "cut away" if unknown == "cut" else "treated as obstacles"
+        cause = f"{percentage:.3g}% of the pixels are transparent and {treatment}"
         advice = "--unknown free treats transparent cells as free"
     else:
         darkest = picture.level.min() / picture.max_level
         lightest = picture.level.max() / picture.max_level
-        cause = f"its brightness is from {darkest:.2g} to {lightest:.2g}"
-        advice = "--threshold, --invert or --free-color choose otherwise"
+        cause = f"the brightness of the pixels is from {darkest:.2g} to {lightest:.2g}"
+        advice = "--threshold, --invert and --free-color classify pixels differently"
     raise MapError(f"{source_name}: no cell is free: {cause} ({advice})")
 
 

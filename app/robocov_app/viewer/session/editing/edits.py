@@ -116,12 +116,12 @@ class ReleaseRobot(_Edit):
 
 @dataclass(frozen=True)
 class PlaceRobot(RobotEdit):
-    """Put a robot, working or failed, at a point.
+    """Put a robot, working or failed, at the free position nearest to a point.
 
     Attributes
     ----------
     at : tuple
-        The point, (x, y) m.
+        The requested point, (x, y) m.
     """
 
     at: Position
@@ -138,12 +138,12 @@ class PlaceRobot(RobotEdit):
 
 @dataclass(frozen=True)
 class AddRobot(RobotEdit):
-    """Add a robot, at rest at a point.
+    """Add a robot, at rest, at the free position nearest to a point.
 
     Attributes
     ----------
     at : tuple
-        The point, (x, y) m.
+        The requested point, (x, y) m.
     """
 
     at: Position
@@ -379,7 +379,7 @@ def _require_another_robot(pane: Pane, number: int) -> None:
 
 
 def _find_free_position(pane: Pane, number: int, point: Point) -> Point:
-    """Return the position nearest to a point at which a robot overlaps no obstacle and no other robot."""
+    """Return the free position nearest to a point, where a robot overlaps no obstacle and no other robot."""
     setup = pane.setup
     other_rows = [row for row, other in enumerate(pane.numbers) if other != number]
     other_failed = {other: position for other, position in setup.failed.items() if other != number}

@@ -175,7 +175,7 @@ def build_circle(center: Point, rim: Point) -> CircleObstacle:
     """
     radius = float(np.hypot(rim[0] - center[0], rim[1] - center[1]))
     if radius < MIN_SHAPE_SIZE_M:
-        raise MapError("a circle needs a radius: drag from its middle to its rim")
+        raise MapError("a circle needs a radius: drag from its center to its rim")
     return CircleObstacle(_round_points([center])[0], round(radius, _COORDINATE_DECIMALS))
 
 
