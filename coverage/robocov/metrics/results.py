@@ -330,7 +330,9 @@ def read_rows(
         If the table cannot be read; the message names the row.
     """
     lines = _read_lines(table)
-    names = next(lines)
+    names = next(lines, None)
+    if names is None:
+        raise InputError(f"{table}: cannot be read: the file is empty")
     selected = list(columns or names)
     column_indices = [names.index(name) for name in selected]
     for row_index, cells in enumerate(lines):
@@ -344,7 +346,10 @@ def read_rows(
 
 
 def _read_lines(table: Path) -> Iterator[list[str]]:
-    """Yield the header and then the rows of a table, as lists of strings."""
+    """Yield the header and then the rows of a table, as lists of strings.
+
+    Raise an InputError if the table cannot be read.
+    """
     try:
         with table.open(encoding="utf-8", newline="") as file:
             yield from csv.reader(file)

@@ -203,6 +203,13 @@ def test_errors_name_files_that_are_no_tables(
     assert str(caught.value).startswith(str(tmp_path)) and message in str(caught.value)
 
 
+def test_errors_name_a_table_that_was_emptied_after_it_was_opened(folder: Path) -> None:
+    results = read_results(folder)
+    (folder / "results.csv").write_bytes(b"")
+    with pytest.raises(InputError, match=r"results.csv: cannot be read: the file is empty"):
+        list(results.rows())
+
+
 def test_errors_name_an_unreadable_study(folder: Path) -> None:
     (folder / "study.json").write_text("{")
     with pytest.raises(InputError, match=r"study.json: cannot be read"):
