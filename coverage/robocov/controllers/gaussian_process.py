@@ -13,7 +13,7 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 
 NOISE_VARIANCE = 1e-2
 """Variance of a measurement, relative to that of the prior. It includes changes of φ within a square."""
-SAMPLES_PER_SQUARE = 2
+SAMPLES_PER_SIDE = 2
 """Number of samples along each side of a square."""
 
 
@@ -24,12 +24,13 @@ class ProcessGrid:
     centers: FloatArray
     """(s, 2) m, centers of the squares, row by row from the lowest."""
     prior_correlations: FloatArray
-    """(s, s) Correlations of φ at the centers of the squares, before any measurement."""
+    """(s, s) Correlations of φ at the centers of the squares, before any measurement. They are a
+    squared-exponential function of the distance."""
     samples: FloatArray
     """(k, 2) m, samples of the region."""
-    corners: IntArray
+    surrounding_squares: IntArray
     """(k, 4) Indices of the four squares around each sample."""
-    corner_weights: FloatArray
+    square_weights: FloatArray
     """(k, 4) Weights of these squares in the bilinear interpolation."""
 
     @classmethod
@@ -48,19 +49,19 @@ class ProcessGrid:
         rows, columns = grid.shape
         low, high = np.reshape(region.bounds, (2, 2))
         length = correlation * float((high - low).max())
-        sample_cells = _list_cells(SAMPLES_PER_SQUARE * rows, SAMPLES_PER_SQUARE * columns)
+        sample_cells = _list_cells(SAMPLES_PER_SIDE * rows, SAMPLES_PER_SIDE * columns)
         # Coordinates of the samples in squares, from the lower left corner of the grid.
-        coordinates = (sample_cells + 0.5) / SAMPLES_PER_SQUARE
+        coordinates = (sample_cells + 0.5) / SAMPLES_PER_SIDE
         samples = low + grid.side * coordinates
         is_inside = region.contains(samples)
-        corners, corner_weights = _find_corners(coordinates[is_inside], rows, columns)
+        surrounding_squares, square_weights = _find_surrounding_squares(coordinates[is_inside], rows, columns)
         squared_distances = ((grid.centers[:, None] - grid.centers) ** 2).sum(axis=2)
         return cls(
             centers=grid.centers,
             prior_correlations=np.exp(-squared_distances / (2.0 * length**2)),
             samples=samples[is_inside],
-            corners=corners,
-            corner_weights=corner_weights,
+            surrounding_squares=surrounding_squares,
+            square_weights=square_weights,
         )
 
     def find_square(self, position: FloatArray) -> int:
@@ -69,7 +70,7 @@ class ProcessGrid:
 
     def interpolate(self, values: FloatArray) -> FloatArray:
         """Interpolate values of the squares, (s,), to the samples, (k,)."""
-        return np.asarray((values[self.corners] * self.corner_weights).sum(axis=1))
+        return np.asarray((values[self.surrounding_squares] * self.square_weights).sum(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +155,9 @@ def _list_cells(rows: int, columns: int) -> FloatArray:
     return np.column_stack([column_numbers.ravel(), row_numbers.ravel()])
 
 
-def _find_corners(coordinates: FloatArray, rows: int, columns: int) -> tuple[IntArray, FloatArray]:
+def _find_surrounding_squares(
+    coordinates: FloatArray, rows: int, columns: int
+) -> tuple[IntArray, FloatArray]:
     """Return the four squares around each point, and their weights in the bilinear interpolation.
 
     The coordinates, (k, 2), are in squares, from the lower left corner of the grid. Points that are not
@@ -165,7 +168,7 @@ def _find_corners(coordinates: FloatArray, rows: int, columns: int) -> tuple[Int
     lower = np.minimum(from_centers.astype(np.intp), np.maximum(limits - 1, 0))
     upper = np.minimum(lower + 1, limits)
     fraction_x, fraction_y = (from_centers - lower).T
-    corners = np.column_stack(
+    surrounding_squares = np.column_stack(
         [
             lower[:, 1] * columns + lower[:, 0],
             lower[:, 1] * columns + upper[:, 0],
@@ -181,7 +184,7 @@ def _find_corners(coordinates: FloatArray, rows: int, columns: int) -> tuple[Int
             fraction_x * fraction_y,
         ]
     )
-    return corners, weights
+    return surrounding_squares, weights
 
 
 @kernel

@@ -229,7 +229,7 @@ def is_box_hidden(boxes: FloatArray, box: int, index: AngularWallIndex, source: 
 def _wrap_bin(unwrapped_bin: int, bin_count: int) -> int:
     """Convert the index of a bin that was counted beyond a full turn, or backward, to 0 up to `bin_count`.
 
-    Since `bin_count` is a power of 2, the bit mask gives the remainder of the division by it, also for a
+    Since `bin_count` is a power of 2, the bit mask gives the remainder of the division by it, even for a
     negative index.
     """
     return unwrapped_bin & (bin_count - 1)
@@ -504,7 +504,7 @@ def _compute_max_squared_chain_distance(
 
 
 @kernel
-def find_bin(bin_count: int, dx: float, dy: float) -> int:
+def find_angular_bin(bin_count: int, dx: float, dy: float) -> int:
     """Return the angular bin of a direction.
 
     Parameters
@@ -544,7 +544,7 @@ def is_visible(walls: Walls, index: AngularWallIndex, source: int, x: float, y: 
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
     squared_distance = dx * dx + dy * dy
-    k = find_bin(index.squared_clear_distances.shape[1], dx, dy)
+    k = find_angular_bin(index.squared_clear_distances.shape[1], dx, dy)
     # In angular bin k around the source, every point up to the clear distance is visible, and every point
     # beyond the horizon is hidden. These two comparisons decide most cases.
     if squared_distance <= index.squared_clear_distances[source, k]:
@@ -575,7 +575,7 @@ def is_certainly_visible(index: AngularWallIndex, source: int, x: float, y: floa
     """
     dx = x - index.positions[source, 0]
     dy = y - index.positions[source, 1]
-    k = find_bin(index.squared_clear_distances.shape[1], dx, dy)
+    k = find_angular_bin(index.squared_clear_distances.shape[1], dx, dy)
     is_clear: bool = dx * dx + dy * dy <= index.squared_clear_distances[source, k]
     return is_clear
 

@@ -21,7 +21,7 @@ from robocov.geodesic.angular_index import (
     NO_SPACE,
     ONLY_SOURCE,
     AngularWallIndex,
-    find_bin,
+    find_angular_bin,
     index_walls,
 )
 from robocov.geodesic.integer_grid import Grid
@@ -205,7 +205,7 @@ def _find_nearest_walls(
         nearest[m] = NO_WALL
         min_distance = np.inf
         # The walls of a bin are a linked list, from its last entry to the first one.
-        entry = index.heads[ONLY_SOURCE, find_bin(_BIN_COUNT, x, y)]
+        entry = index.heads[ONLY_SOURCE, find_angular_bin(_BIN_COUNT, x, y)]
         while entry != NO_ENTRY:
             wall = index.entry_walls[entry]
             # The vector a leads from the source to the start of the wall, and u from there to its end.

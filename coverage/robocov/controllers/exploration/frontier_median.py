@@ -169,7 +169,7 @@ class FrontierMedian(SharedMapController):
     def _compute_median(self, situation: Situation) -> FloatArray:
         """Return the final goals of all robots, (k, 2) m."""
         weights = situation.compute_weights(situation.known_map.state == FREE)
-        candidates = Candidates.build_for_team(situation, weights)
+        candidates = Candidates.build_spread_out(situation, weights)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return situation.positions

@@ -55,7 +55,7 @@ class GreedySubmodular(SharedMapController):
     def compute_placement(self, situation: Situation) -> Placement:
         """Compute the greedy placement, or the previous one if that is about as good, after descent."""
         weights = situation.compute_weights(~situation.known_map.is_blocked)
-        candidates = Candidates.build_for_team(situation, weights)
+        candidates = Candidates.build_spread_out(situation, weights)
         count = len(situation.positions)
         if len(candidates.positions) < count:
             return Placement(goals=situation.positions, is_final=False)

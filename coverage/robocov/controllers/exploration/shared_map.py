@@ -53,14 +53,15 @@ class Group(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Goals of a group of robots."""
+    """Goals of a group of robots, and whether they are final."""
 
     goals: FloatArray
     """(k, 2) m, in the order of the robots of the group."""
     is_final: bool
     """Whether the goals stay the same until the map, the density or the group changes."""
     inspected_targets: FloatArray = np.empty((0, 2))
-    """(t, 2) Targets that need no further visit, m, for a controller that looks at unknown space."""
+    """(t, 2) m, targets on frontiers that need no further visit: a robot has been there, or was stuck on its
+    path. Empty for controllers that do not explore frontiers."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,8 +147,8 @@ class Candidates(NamedTuple):
         return cls(positions=situation.planner.map_window.nodes[nodes], table=np.ascontiguousarray(table))
 
     @classmethod
-    def build_for_team(cls, situation: Situation, weights: FloatArray) -> Candidates:
-        """Build candidates at nodes that are spread over the nodes with clearance.
+    def build_spread_out(cls, situation: Situation, weights: FloatArray) -> Candidates:
+        """Build candidates that are spread over the nodes with clearance and a positive weight.
 
         Parameters
         ----------

@@ -146,7 +146,7 @@ def test_every_narrow_passage_has_candidates() -> None:
     window = Window.build_around(RASTER, np.array([4.0, 4.0]), np.inf, 1600)
     planner = GridPlanner(DiscoveredMap(RASTER, state), window, 0.13)
     situation = build_situation(state, THREE_ROBOTS)._replace(planner=planner)
-    candidates = Candidates.build_for_team(situation, np.ones(len(planner.map_window.nodes)))
+    candidates = Candidates.build_spread_out(situation, np.ones(len(planner.map_window.nodes)))
     distances = planner.compute_distances_from(candidates.positions)
     assert distances[planner.map_window.has_clearance].max() < 1.0
 
