@@ -30,9 +30,11 @@ JsonPath: TypeAlias = tuple[str | int, ...]
 _MAX_QUOTED_CHARACTERS = 60
 """Longer values and names are cut in messages."""
 _MAX_LISTED_NAMES = 3
+"""Maximum number of names in a summary; further ones are only counted."""
 _MIN_SIMILARITY = 0.5
 """Minimum similarity, as measured by `difflib`, of a known name that is suggested."""
 _MAX_SUGGESTIONS = 3
+"""Maximum number of known names that are suggested."""
 
 
 class RobocovError(Exception):
@@ -659,6 +661,7 @@ def format_bound(bound: float) -> str:
 
 
 def _shorten(text: str) -> str:
+    """Cut a text that is longer than `_MAX_QUOTED_CHARACTERS`, and mark the cut by three dots."""
     if len(text) <= _MAX_QUOTED_CHARACTERS:
         return text
     return f"{text[: _MAX_QUOTED_CHARACTERS - 3]}..."

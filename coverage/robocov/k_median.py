@@ -83,8 +83,9 @@ def seed_sources(table: FloatArray, source_count: int, rng: np.random.Generator)
     distances = np.ones(len(table))
     is_chosen = np.zeros(table.shape[1], dtype=bool)
     for _ in range(source_count):
-        # Draw a target with a probability proportional to its distance from the sources so far. The nearest
-        # column becomes a source. If all distances are zero, the last target is as good as any other.
+        # Draw a target with a probability proportional to its distance from the sources so far. The first
+        # target is drawn uniformly, because `distances` is 1 everywhere. The nearest column becomes a source.
+        # If all distances are zero, the last target is as good as any other.
         cumulative = np.cumsum(distances)
         target = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
         target = min(target, len(distances) - 1)

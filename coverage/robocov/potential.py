@@ -111,7 +111,8 @@ def compute_potential_forces(
         dx = x - obstacle_points[i, 0]
         dy = y - obstacle_points[i, 1]
         factor = _compute_repulsion_factor(np.sqrt(dx * dx + dy * dy), gains.k_rep, gains.rho_0)
-        # The factor is nan if there is no obstacle point.
+        # Without an obstacle point, the distance is nan and the factor is 0. The product of the factor and dx
+        # would be nan.
         if factor > 0.0:
             obstacle[i, 0] = factor * dx
             obstacle[i, 1] = factor * dy
@@ -169,7 +170,7 @@ def compute_spread_directions(numbers: IntArray) -> FloatArray:
 
 @kernel
 def _compute_repulsion_factor(distance: float, k_rep: float, rho_0: float) -> float:
-    """Return the magnitude of the repulsion (24) divided by the distance, N/m; 0 if the distance is 0."""
+    """Return the magnitude of the repulsion (24) divided by the distance, N/m; 0 if that is 0 or nan."""
     inverse = 1.0 / max(distance, CONTACT_DISTANCE)
     magnitude = k_rep * max(inverse - 1.0 / rho_0, 0.0) * inverse * inverse
     return magnitude / distance if distance > 0.0 else 0.0

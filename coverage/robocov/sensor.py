@@ -17,7 +17,7 @@ from robocov.world.bodies import build_obstacle_space
 from robocov.world.obstacle_pieces import MovingObstacle, Obstacles
 
 _MAX_RANGE_M = 1e6
-"""Maximum range of a query, also if the sensing range is infinite, because bounding boxes in pymunk must be
+"""Maximum range of a query, even if the sensing range is infinite, because bounding boxes in pymunk must be
 finite."""
 _INDEXING_STEP_S = 1e-9
 """Duration of the step in which pymunk builds its spatial index. Nothing moves in this step."""
@@ -31,7 +31,7 @@ class RangeSensor:
     Parameters
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free; see
+        Convex polygons that tile the static obstacles and the surroundings of the map; see
         `world.obstacle_pieces.build_solid_pieces`.
     moving_obstacles : tuple of MovingObstacle
         Moving obstacles. They are at their positions at time zero until `set_time` is called.
@@ -79,7 +79,7 @@ class RangeSensor:
         return RangeSensor, (self._walls, self._moving_obstacles)
 
     def set_time(self, time: float, failed_robots: FloatArray | None = None) -> None:
-        """Move the obstacles to their positions at a given time.
+        """Move the obstacles to their positions at a given time, and set the failed robots.
 
         Parameters
         ----------
@@ -94,6 +94,7 @@ class RangeSensor:
         failed = set() if failed_robots is None else set(map(tuple, failed_robots.tolist()))
         for robot in self._failed_robots.keys() - failed:
             self._space.remove(self._failed_robots.pop(robot))
+        # The order in which shapes are added must not depend on the arbitrary order of a set.
         for x, y, radius in sorted(failed - self._failed_robots.keys()):
             disc = pymunk.Circle(self._space.static_body, radius, (x, y))
             self._space.add(disc)
@@ -133,7 +134,7 @@ class RangeSensor:
         rays : int
             Number of rays of each robot.
         ranges : (n,) array, m
-            Sensing ranges, which may be infinite.
+            Sensing ranges. An infinite range counts as 1e6 m.
 
         Returns
         -------
@@ -162,7 +163,7 @@ class RangeSensor:
         rays : int
             Number of rays.
         sensing_range : float, m
-            Sensing range, which may be infinite.
+            Sensing range. An infinite range counts as 1e6 m.
 
         Returns
         -------

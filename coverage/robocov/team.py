@@ -126,7 +126,7 @@ class Team:
     max_speed, max_acceleration : m/s, m/s²
         Kinematic limits, which every controller is subject to.
     viscosity : N s/m
-        nu of equation (28), with the sign that dissipates energy.
+        ν of equation (28), with the sign that dissipates energy.
     sensing_range : m
         Distance from the robot's center up to which the range sensor detects obstacles.
     communication_range : m
@@ -386,11 +386,13 @@ def _read_column(document: Mapping[str, Any], name: str, robot_count: int) -> Fl
 
 
 def _is_valid_json(parameter: TeamParameter, value: object) -> bool:
+    """Return whether a JSON value is valid for a parameter. None, which is null in JSON, means infinity."""
     if value is None:
         return parameter.may_be_infinite
     return is_number(value) and bool(parameter.minimum <= value <= parameter.maximum)
 
 
 def _build_json_error(document: Mapping[str, Any], key: str, expected: str) -> ParameterError:
+    """Return the error for a missing or invalid value of a JSON object."""
     got = quote_json(document[key]) if key in document else "nothing"
     return ParameterError(f"team.{key}: expected {expected}, got {got}")

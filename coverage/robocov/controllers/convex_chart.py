@@ -162,8 +162,8 @@ class _PiecewiseAffineMap(NamedTuple):
 def _find_triangles(points: FloatArray, inverses: FloatArray, origins: FloatArray) -> IntArray:
     """Return the index of the triangle that contains each of (n, 2) points, (n,).
 
-    A point inside a triangle has no negative barycentric coordinate. For a point outside all triangles, it is
-    the triangle in which the smallest barycentric coordinate of the point is largest.
+    A point inside a triangle has no negative barycentric coordinate. For a point outside all triangles,
+    return the triangle in which the smallest barycentric coordinate of the point is largest.
     """
     triangles = np.zeros(len(points), dtype=np.intp)
     for i in range(len(points)):

@@ -9,7 +9,7 @@ from robocov.voronoi.delaunay import Mesh
 
 
 def cells_choice() -> Any:
-    """Declare the gain that decides how the cells of a controller are divided, as a dataclass field."""
+    """Declare the gain that decides how the region is divided into cells, as a dataclass field."""
     return choice(
         "distance",
         ("distance", "time"),

@@ -361,7 +361,7 @@ class Poduri(BaseController):
 
     @property
     def _min_degree(self) -> float:
-        """K, the number of neighbors that each robot keeps."""
+        """K, which avoids confusion: elsewhere, `neighbors` are the robots at the far ends of links."""
         return self.neighbors
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
@@ -404,15 +404,21 @@ class Poduri(BaseController):
     def _find_critical_links(
         self, seen: Observations, links: NeighborPairs, link_ranges: FloatArray
     ) -> BoolArray:
-        """Return a mask of the links that are critical for the robot or, as far as it knows, the neighbor."""
+        """Return a mask of the links that are critical for one of their ends.
+
+        These are critical for the robot or, as far as the robot knows, for the neighbor.
+        """
         n = len(seen.positions)
+        # Entry (i, j) says whether robot j is within η R_c of robot i.
         is_near = np.zeros((n, n), dtype=bool)
         is_near[links.robots, links.neighbors] = links.distances <= self.eta * link_ranges
         rank = _rank_by_distance(links.robots, links.distances)
         has_few_near = is_near.sum(axis=1) <= self._min_degree
         is_critical: BoolArray = has_few_near[links.robots] & (rank < self._min_degree)
+        # Only the other links have to be tested from the neighbor's point of view.
         others = np.flatnonzero(~is_critical)
         if seen.reported_positions is None:
+            # Without reports, all robots use the same positions, so that all links can be tested together.
             is_critical[others] = self._is_critical_for_neighbor(seen, links, is_near, others)
         else:
             is_critical[others] = self._is_critical_by_reports(seen, links, link_ranges, others)

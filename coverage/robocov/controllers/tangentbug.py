@@ -178,27 +178,28 @@ class TangentBug(BaseController):
     """Voronoi coverage of non-convex environments (Breitenmoser et al., ICRA 2010).
 
     The goal of each robot is the centroid of its Voronoi cell of the convex region, as for `Lloyd`.
-    TangentBug (Kamon, Rivlin and Rimon 1996) drives it there by its scans:
+    TangentBug (Kamon, Rivlin and Rimon 1996) steers it there by means of its range scans:
 
-    - *Motion to the goal*: the robot moves straight to the goal. If an obstacle blocks the path, it moves to
-      the end of the blocking contour with the shorter path to the goal, as long as the distance to the goal
-      decreases.
-    - *Boundary following*: otherwise it follows the boundary until a point in view is nearer to the goal than
-      the boundary followed so far: d_reach < d_followed.
+    - *Motion to the goal*: the robot moves straight to the goal. If an obstacle blocks the path, the robot
+      moves to one end of the blocking contour. Of the ends that are nearer to the goal than the robot is, it
+      chooses the one with the shorter path to the goal.
+    - *Boundary following*: if there is no such end, it follows the boundary until a point in view is nearer
+      to the goal, by at least 0.2 m, than any boundary point seen so far (d_reach < d_followed).
     - *Projection*: a robot that has followed the whole boundary without finding such a point cannot reach its
-      goal, which is inside an obstacle. It moves to the point of the boundary nearest to the goal, and comes
-      to rest. It does so at once if the goal is in a known obstacle, or closer to one than a robot can be.
+      goal, which is inside an obstacle. It moves to the point of the boundary nearest to the goal, its best
+      point, and comes to rest. It does so at once if the goal is closer to a detected obstacle point than a
+      robot can be, or if it may follow the boundary for less than 1 m.
 
     Notes
     -----
     We had only the paper's abstract, not the full texts of the papers; details may differ. The following
-    choices are our own. A robot's centroid moves with the robot, and would draw it back from each detour;
-    therefore the goal is fixed from the time when the robot starts to follow a boundary until it is reached
-    or given up. Because a boundary may be as long as the building, the robot follows it for at most `detour`
-    times the distance to its goal, a limit that shrinks by a tenth with each attempt, and then returns. It
-    tries again after its centroid has moved by `moved` times the number of attempts. Obstacles in a scan are
-    enlarged by the radius of the robot and `clearance`. Robots slide along each other, and assume that others
-    may be as large as the largest of the team.
+    choices are our own. The centroid of a robot's cell moves with the robot, and would draw it back from each
+    detour; therefore the goal is fixed from the time when the robot starts to follow a boundary until it is
+    reached or given up. Because a boundary may be as long as the building, the robot follows it for at most
+    `detour` * 0.9**k times the distance to its goal in attempt k = 1, 2, ... It then returns to its best
+    point, and comes to rest there. It tries again after the centroid has moved by `moved` times the number of
+    attempts. Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along
+    each other, and assume that others may be as large as the largest of the team.
     """
 
     name = "tangentbug"
@@ -208,7 +209,7 @@ class TangentBug(BaseController):
     memory_type = TangentBugMemory
 
     clearance: float = gain(0.05, "m", "minimum gap to obstacles and other robots", high=10.0)
-    jump: float = gain(0.5, "m", "minimum jump of the measured distance at the end of an obstacle", low=0.01)
+    jump: float = gain(0.5, "m", "minimum jump of the free distance at the end of a contour", low=0.01)
     detour: float | None = gain(
         4.0,
         "distances",
@@ -216,7 +217,11 @@ class TangentBug(BaseController):
         optional=True,
     )
     moved: float = gain(
-        0.25, "m", "distance that an unreachable goal must move before it is tried again", high=1e4
+        0.25,
+        "m",
+        "distance, times the number of attempts, that the centroid must move before an unreachable goal is "
+        "tried again",
+        high=1e4,
     )
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
@@ -232,7 +237,8 @@ class TangentBug(BaseController):
             NavigationState(Mode.GOAL, COUNTERCLOCKWISE, position) for position in seen.positions
         )
         obstacle_squares = memory.obstacle_squares or (frozenset(),) * len(team)
-        # Robots navigate after each scan. Before the first one, they use the closest obstacle points instead.
+        # Robots navigate after each scan. Before the first scan, they navigate in every step, by the closest
+        # obstacle points.
         if not memory.states or seen.scans is not None or returns is None:
             obstacle_squares = tuple(
                 _add_squares(squares, points)
@@ -301,7 +307,7 @@ class TangentBug(BaseController):
         """Return the desired velocities toward the waypoints, (n, 2) m/s."""
         waypoints = np.array([state.waypoint for state in states])
         passes_waypoint = np.array([state.passes_waypoint for state in states])
-        # A robot with its centroid in view follows it until the next scan.
+        # A robot whose path toward its centroid is free follows the centroid until the next scan.
         follows_centroid = np.array(
             [state.fixed_goal is None and not state.passes_waypoint for state in states]
         )
@@ -311,7 +317,7 @@ class TangentBug(BaseController):
         speed = np.where(passes_waypoint, team.max_speed, np.minimum(self.k_prop * distance, team.max_speed))
         # A waypoint that is close must not be overshot.
         speed = np.minimum(speed, distance / self.response_time)
-        return compute_approach_velocities(offsets, math.inf, speed)
+        return compute_approach_velocities(offsets, gain=math.inf, max_speed=speed)
 
 
 def _add_squares(squares: Squares, points: FloatArray) -> Squares:
@@ -485,8 +491,8 @@ class Navigator:
     def _enter_boundary(self, state: NavigationState, ends: dict[int, ContourEnd]) -> NavigationState:
         """Fix the goal where it is now, start to follow a boundary, and return the new state.
 
-        If the goal is blocked, or the robot may follow the boundary only for a short length, it moves to its
-        best point instead.
+        If the goal is too close to an obstacle, or the robot may follow the boundary only for a short length,
+        it moves to its best point instead.
         """
         attempts = state.attempts
         best_point = None
@@ -515,7 +521,10 @@ class Navigator:
         return self.controller.detour * math.hypot(*self.goal_offset) * _MAX_LENGTH_DECAY**attempts
 
     def _is_goal_blocked(self) -> bool:
-        """Return whether the goal is in a known obstacle, or too close to one."""
+        """Return whether the goal is too close to a detected obstacle point.
+
+        A goal deep inside an obstacle is not recognized.
+        """
         if not self.obstacle_squares:
             return False
         centers = (np.array(list(self.obstacle_squares)) + 0.5) * _SQUARE_SIDE_M

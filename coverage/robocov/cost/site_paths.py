@@ -98,12 +98,12 @@ class Search(NamedTuple):
     def allocate(
         cls, wall_index: AngularWallIndex, robot_count: int, corner_count: int, tile_count: int
     ) -> Search:
-        """Allocate an uninitialized search.
+        """Allocate a search; all its own arrays except `all_robots` are uninitialized.
 
         Parameters
         ----------
         wall_index : AngularWallIndex
-            An index with space for the walls around all robots.
+            An index with one source for each robot.
         robot_count, corner_count, tile_count : int
             Number of robots of a team, of corners and of tiles.
 
@@ -409,7 +409,7 @@ def _try_nearest_robots(walls: Walls, search: Search, robots: FloatArray) -> int
     """
     tree = walls.corner_tree
     paths = search.corner_paths
-    # This scratch space is not used for groups of tiles at the same time.
+    # The scratch space of groups of tiles is free at this time.
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0
@@ -444,6 +444,7 @@ def _try_closer_robots(walls: Walls, search: Search, robots: FloatArray) -> int:
     consecutive corners. Return the number of corners in the queue.
     """
     tree = walls.corner_tree
+    # The scratch space of groups of tiles is free at this time.
     leaf_robots = search.group_robots
     candidate_count = 0
     waiting_count = 0

@@ -19,7 +19,7 @@ from robocov.cost.site_paths import NO_ROBOT
 from robocov.typing import BoolArray, FloatArray
 
 _MAX_CACHED_MAPS = 64
-"""Maximum number of maps whose costs are cached, because maps recur if obstacles move periodically."""
+"""Maximum number of maps whose costs are cached. Maps recur if obstacles move periodically."""
 
 
 class CostSummary(NamedTuple):
@@ -93,6 +93,7 @@ class TimeVaryingCost:
         if not environment.has_moving_obstacles:
             return self._cost
         current = environment.at(time)
+        # Maps with the same free space have the same cost, wherever their obstacles are.
         key = current.free.wkb
         if key not in self._cost_by_map:
             if len(self._cost_by_map) >= _MAX_CACHED_MAPS:
@@ -206,5 +207,10 @@ class TimeVaryingCost:
         """
         result = self(time, positions, is_working)
         if result is None:
-            return CostSummary(np.nan, np.nan, self.get_cost(time).environment.free_area)
-        return CostSummary(result.mean_distance, result.value, result.uncovered_area)
+            free_area = self.get_cost(time).environment.free_area
+            return CostSummary(mean_distance=np.nan, value=np.nan, uncovered_area=free_area)
+        return CostSummary(
+            mean_distance=result.mean_distance,
+            value=result.value,
+            uncovered_area=result.uncovered_area,
+        )

@@ -90,6 +90,7 @@ class Environment(Drawable):
     density: Density | None = None
 
     def __hash__(self) -> int:
+        # The other attributes include mappings, which cannot be hashed.
         return hash((self.name, self.boundary, self.obstacles))
 
     def __repr__(self) -> str:

@@ -33,7 +33,8 @@ _CHAMFER_FRACTIONS = (0.2, 0.45)
 _NOTCH_FRACTIONS = (0.35, 0.6)
 """Minimum and maximum fraction of an edge that a notch cuts off; see `Trim`."""
 _CORNER_CHOICES = 12
-"""Range of the random number that, modulo the number of corners, is the corner to trim."""
+"""Number of possible values of `Trim.corner`. It is a multiple of 3, 4 and 6, so that all corners of a block
+with that many corners are equally probable. The number of corners is not yet known when a trim is sampled."""
 _MAX_UNEVENNESS = 0.25
 """Maximum offset of a cut from an even division, relative to the width of one block."""
 _MIN_THICKNESS = 0.3
@@ -76,7 +77,7 @@ class Trim(NamedTuple):
     Attributes
     ----------
     corner : int
-        Index of the corner, modulo the number of corners.
+        Whole number whose remainder, divided by the number of corners, is the index of the corner.
     before, after : float
         Fractions of the edges before and after the corner that are cut off.
     is_notch : bool
@@ -410,7 +411,7 @@ def _sample_trim(rng: np.random.Generator) -> Trim | None:
         fraction = rng.uniform(*_CHAMFER_FRACTIONS)
         return Trim(corner, before=fraction, after=fraction, is_notch=False)
     if choice < _CHAMFER_PROBABILITY + _NOTCH_PROBABILITY:
-        before, after = rng.uniform(*_NOTCH_FRACTIONS, 2).tolist()
+        before, after = rng.uniform(*_NOTCH_FRACTIONS, size=2).tolist()
         return Trim(corner, before=before, after=after, is_notch=True)
     return None
 

@@ -91,7 +91,7 @@ def build_maze(
             continue
         area_error = abs(_compute_union_area(obstacles) - request.blocked_area)
         if area_error <= max_area_error:
-            return [*obstacles]
+            return list(obstacles)
         _remove_wall(walls, rng)
     return None
 
@@ -162,8 +162,8 @@ def _compute_line_coordinates(
 ) -> list[float]:
     """Return the coordinates, m, of the lines that divide the map's side into `cell_count` columns or rows.
 
-    Walls are centered on the inner lines. The boundary has no thickness. All corridors are equally wide, also
-    those along the boundary.
+    Walls are centered on the inner lines. The boundary has no thickness. All corridors are equally wide,
+    including those along the boundary.
     """
     # The sum of one corridor's width and the thickness of one wall.
     pitch = (length + thickness) / cell_count

@@ -272,7 +272,7 @@ def build_building(
     plan = sample_floor_plan(request, wall_thickness, rng)
     if plan is None:
         return None
-    walls: list[Obstacle] = [*plan.build_walls()]
+    walls: list[Obstacle] = list(plan.build_walls())
     map_area = shapely.box(0.0, 0.0, request.width, request.height)
     wall_area = 0.0
     if walls:
@@ -466,7 +466,8 @@ def _find_shared_walls(plan: FloorPlan) -> list[_SharedWall]:
     The first room of a pair ends, and the second one begins, at the position of the wall on the axis
     perpendicular to it.
     """
-    # Rooms by the axis and the coordinate at which they begin, and at which they end.
+    # Rooms by the axis and the coordinate at which they begin, and at which they end. These coordinates are
+    # compared exactly, because walls and rooms contain the same rounded numbers.
     rooms_by_low: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     rooms_by_high: defaultdict[tuple[int, float], list[int]] = defaultdict(list)
     for index, room in enumerate(plan.rooms):
@@ -552,7 +553,8 @@ def _shrink_to_wall_faces(request: MapRequest, room: Box, thickness: float) -> B
     bottom = room.bottom if room.bottom == 0.0 else room.bottom + half_thickness
     right = room.right if room.right == request.width else room.right - half_thickness
     top = room.top if room.top == request.height else room.top - half_thickness
-    return Box(*(round(float(edge), request.decimals) for edge in (left, bottom, right, top)))
+    edges = (left, bottom, right, top)
+    return Box(*(round(float(edge), request.decimals) for edge in edges))
 
 
 class _FurniturePiece(NamedTuple):

@@ -178,7 +178,8 @@ def skip_subtree(node: int) -> int:
         The next node, or `END_OF_TREE`.
     """
     # The children of node i are 2 i and 2 i + 1. After a first child, the search continues with the second
-    # one. After a second child, whose number is odd, it continues after the subtree of the parent.
+    # one. After a second child, whose number is odd, it continues after the subtree of the parent. The number
+    # of the root is odd too. Its parent would be node 0, which ends the search.
     while node & 1:
         node >>= 1
     return node + 1 if node != 0 else END_OF_TREE

@@ -371,7 +371,7 @@ class Geodesics:
         paths = CornerPaths.allocate(corner_count)
 
         def fill_index(index: AngularWallIndex) -> AngularWallIndex | None:
-            """Fill the index and write the distances; return None if the index has too little space."""
+            """Fill the index, `distances` and `paths`; return None if the index has too little space."""
             has_space = _find_corner_distances(
                 self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
             )
@@ -442,6 +442,7 @@ def _find_corner_distances(
     whether the index has enough space.
     """
     corner_count = len(walls.corners)
+    # Kernels cannot call class methods, such as `CornerQueue.allocate`.
     queue = CornerQueue(np.empty(corner_count + 1, np.int64), np.empty(corner_count, np.bool_))
     squared_range = np.inf
     entry_count = 0

@@ -124,15 +124,17 @@ def compute_crosses(u: FloatArray, v: FloatArray) -> FloatArray:
     Parameters
     ----------
     u, v : (n, 2) array, grid steps
-        The first and the second vector of each pair.
+        The first and the second vector of each pair: integers of magnitude up to 2**49.
 
     Returns
     -------
     (n,) array
         Positive where v points to the left of u.
     """
-    value = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    values = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     integer_u = u.astype(np.int64)
     integer_v = v.astype(np.int64)
-    exact = integer_u[:, 0] * integer_v[:, 1] - integer_u[:, 1] * integer_v[:, 0]
-    return np.where(np.abs(value) < _MAX_CROSS_ERROR, exact, value)
+    # The products wrap around at 2**64. Where the cross product is small, their difference is still exact, as
+    # in `cross`.
+    wrapped = integer_u[:, 0] * integer_v[:, 1] - integer_u[:, 1] * integer_v[:, 0]
+    return np.where(np.abs(values) < _MAX_CROSS_ERROR, wrapped, values)

@@ -360,7 +360,8 @@ def _compute_descent_step(
 
     The matrix with these eigenvalues, and the eigenvectors of the Hessian, is positive definite, so that the
     step always descends. The component of the step along an eigenvector is minus that of the gradient,
-    divided by the eigenvalue.
+    divided by the eigenvalue. The smaller eigenvalue is replaced by at least `_MIN_CURVATURE` times the
+    larger one.
     """
     # The eigenvalues are mean + radius and mean - radius.
     mean = 0.5 * (xx + yy)
@@ -374,9 +375,10 @@ def _compute_descent_step(
         magnitude = abs(large)
         small = (xx * yy - xy * xy) / large
     else:
-        # The Hessian is zero. The length of the step does not matter, because the caller limits it.
+        # The Hessian is zero. The step descends, but mainly along y, because `small` is replaced by its
+        # minimum below. Its length does not matter, because the caller limits it.
         magnitude = 1.0
-        small = xx * yy - xy * xy
+        small = 0.0
     # The eigenvector of `large`. If the Hessian is multiplied by `sign`, `large` becomes its larger
     # eigenvalue.
     x, y = _compute_eigenvector(sign * half_difference, sign * xy, radius)

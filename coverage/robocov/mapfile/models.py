@@ -291,7 +291,7 @@ class RasterModel(Model, title="raster density"):
     @model_validator(mode="before")
     @classmethod
     def _rename_picture(cls, content: Any) -> Any:
-        """Rename the key ``picture``, as ``image`` is called in files of earlier versions."""
+        """Rename the key ``picture`` to ``image``; files of earlier versions use the old name."""
         if not isinstance(content, dict) or "picture" not in content or "image" in content:
             return content
         return {"image" if key == "picture" else key: value for key, value in content.items()}

@@ -134,12 +134,15 @@ class DensitySensor:
 class RecordedDensitySensor(DensitySensor):
     """Repeats the measurements of another sensor, without the density.
 
+    A point that was not measured raises a ParameterError.
+
     Parameters
     ----------
     log : mapping
         The measurements of the other sensor.
     robot : int or None
-        The only robot whose measurements are repeated; all other robots measure 1. None: all robots.
+        The only robot whose measurements are repeated. For all other robots, every measurement is 1, so that
+        nothing that they measured is revealed. By default, the measurements of all robots are repeated.
     """
 
     def __init__(self, log: DensityLog, robot: int | None = None) -> None:

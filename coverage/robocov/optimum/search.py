@@ -418,7 +418,8 @@ def _spread_points(area: BaseGeometry, spacing: float) -> FloatArray:
     """Return points in an area, (p, 2), at least `spacing` apart, with no large gaps between them.
 
     Every third row and column of a fine grid form a coarse grid. The gaps between the coarse grid and the
-    walls are filled by other points of the fine grid.
+    walls are filled by other points of the fine grid. On a map that is very large for `spacing`, all
+    distances are larger, because the fine grid is limited to `_MAX_GRID_POINTS`.
     """
     low_x, low_y, high_x, high_y = area.bounds
     min_step = math.sqrt((high_x - low_x) * (high_y - low_y) / _MAX_GRID_POINTS)
@@ -436,6 +437,7 @@ def _spread_points(area: BaseGeometry, spacing: float) -> FloatArray:
     is_on_coarse_grid = (rows % _STEPS_PER_SPACING == 0) & (columns % _STEPS_PER_SPACING == 0)
     coarse_points = fine_points[is_inside & is_on_coarse_grid]
     if len(coarse_points) == 0:
+        # The area may be too narrow to contain a point of the coarse grid.
         point = area.representative_point()
         coarse_points = np.array([[point.x, point.y]])
     other_points = fine_points[is_inside & ~is_on_coarse_grid]

@@ -81,7 +81,7 @@ class SimulationBatch:
 
     See Also
     --------
-    Simulation : One run, also with moving obstacles and under conditions.
+    Simulation : One run, which may have moving obstacles and conditions.
 
     Notes
     -----
@@ -133,7 +133,7 @@ class SimulationBatch:
             self._complete_graphs = [Neighbors(robot_count)] * run_count
             self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
         self._decides_jointly = robot_count <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
-        # One memory for all runs, or one for each.
+        # There is one memory for all runs, or one for each.
         if self._decides_jointly:
             memories = [self._controller_caller.begin(environment.region, self._joint_team, self.time)]
         else:
@@ -197,8 +197,8 @@ class SimulationBatch:
         Parameters
         ----------
         forces : (runs, n, 2) array or None, N
-            Forces that replace the controller's, for example in reinforcement learning. In that case
-            the controller is not called.
+            Forces that replace the controller's, for example in reinforcement learning. The controller is
+            then not called: its memory stays the same, and no controller messages are sent.
 
         Raises
         ------
@@ -329,6 +329,7 @@ class SimulationBatch:
         sent_bytes = np.zeros(len(self))
         is_working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
+            # The inbox before is None: all earlier messages have arrived, because there are no delays.
             positions = self._world.positions[self._rows[run]]
             inboxes[run], sent_bytes[run] = self._radio.send_messages(
                 None, self._steps, run_messages, positions, is_working

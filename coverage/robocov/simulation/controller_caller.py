@@ -26,8 +26,8 @@ class ControllerCaller:
     """Calls a controller and checks its decisions.
 
     A built-in controller is trusted. A user's controller may change its arguments, return arrays that it
-    changes later, or raise anything. Therefore it receives copies, its decisions are copied, and its errors
-    are reported in one line with the file and line of its code.
+    changes later, or raise anything. Therefore it receives copies of the observations and of its memory, its
+    decisions are copied, and its errors are reported in one line with the file and line of its code.
 
     Parameters
     ----------
@@ -114,14 +114,18 @@ class ControllerCaller:
         Raises
         ------
         ParameterError
-            If the controller fails, or returns anything but a decision for each robot.
+            If a user's controller fails, or a controller returns anything but a decision for each robot.
+            Exceptions of built-in controllers are not caught.
         """
         robot_count = len(observations.positions)
         name = self.controller.name
         decide = self._informed_controller.decide
         if self._is_built_in:
             return check_decision(decide(observations, memory), robot_count, name, observations.time)
+        # A shallow copy is enough: arrays that outlive the step are read-only, and the others belong to this
+        # step only.
         returned = self._call(observations.time, decide, replace(observations), _copy_memory(memory))
+        # `decide` of the adapter is part of robocov; its location would not help the user.
         source = ""
         if not isinstance(self._informed_controller, IndividualControllerAdapter):
             source = format_location(decide)

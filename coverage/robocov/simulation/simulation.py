@@ -63,7 +63,8 @@ class Simulation:
     team : Team or None
         By default `Team.homogeneous(n)`.
     dt : float, s
-        Control period. The physics takes shorter substeps when contacts require them.
+        Control period. The physics divides it into substeps if it is longer than 0.02 s or robots are fast,
+        and into finer ones for robots in contact.
     conditions : Conditions or None
         Imperfect sensing and communication, failing and joining robots; by default everything is ideal.
 
@@ -223,8 +224,8 @@ class Simulation:
             Forces that act in addition to the controller's, such as those of a pointer that drags a robot;
             see `World.step`. Records do not contain them.
         forces : (n, 2) array or None, N
-            Forces that replace the controller's, for example in reinforcement learning. In that case
-            the controller is not called.
+            Forces that replace the controller's, for example in reinforcement learning. The controller is
+            then not called: its memory stays the same, and no new controller messages are sent.
 
         Raises
         ------
@@ -246,7 +247,8 @@ class Simulation:
         else:
             forces = check_forces(forces, robot_count, "forces")
         inbox = self.inbox
-        if self._perception is not None or inbox is not None:
+        if inbox is not None:
+            # Deliver the messages of this step, even if `forces` replaces the decision.
             inbox = self._get_knowledge().inbox
         next_inbox, sent_bytes = self._radio.send_messages(
             inbox, self._steps, messages, self.positions, self.is_working

@@ -279,10 +279,13 @@ def _create_mesh(robot_count: int, previous: Mesh | None, *, is_complete: bool) 
 def _compute_edges(
     points: FloatArray, sides: FloatArray, neighbor_positions: NeighborPositions, mesh: Mesh, edge_count: int
 ) -> CellEdges:
-    """Compute the cells again, with space for all `edge_count` edges, and return the edges."""
+    """Compute the cells again, with space for all `edge_count` edges, and return the edges.
+
+    `partition` only counts the edges, because many callers need nothing but masses and centroids.
+    """
     edges = np.empty((edge_count, EDGE_COLUMNS))
     cells = CellArrays(masses=np.empty(len(points)), centroids=np.empty((len(points), 2)), edges=edges)
-    # Copies, because read-only arrays are a different type to the compiler.
+    # Pass copies, because read-only arrays have a different type for the compiler.
     _compute_cells(points.copy(), sides, neighbor_positions, mesh.copy(), cells)
     return CellEdges(
         starts=edges[:, :EDGE_END_X].copy(),

@@ -290,6 +290,7 @@ def _cut_polygon(
         return _NOT_CUT
     cut = _find_cut_vertices(vertices, count, farthest)
     if cut.after == _NO_VERTEX:
+        # The whole polygon is beyond the bisector.
         return 0
     # Copy the vertices that remain.
     new_count = 0
@@ -318,10 +319,10 @@ def _cut_polygon(
 
 @inlined_kernel
 def _find_cut_vertices(vertices: FloatArray, count: int, farthest: int) -> _CutVertices:
-    """Return the vertices with a positive excess; `farthest` is one of them.
+    """Return the consecutive vertices with a positive excess around `farthest`, which is one of them.
 
-    They are consecutive, because the polygon is convex. If rounding separates some others, these are not cut
-    off.
+    Because the polygon is convex, there are no others, unless rounding separates some from these. Such
+    vertices are not cut off.
     """
     last = farthest
     next_vertex = _get_next_vertex(last, count)

@@ -55,6 +55,7 @@ def build_obstacle_space(obstacles: Obstacles) -> tuple[pymunk.Space, list[pymun
     """
     space = pymunk.Space()
     moving_bodies = []
+    # Walls and failed robots keep the default filter, which contains all categories and so `WALL_CATEGORY`.
     for polygon in obstacles.walls:
         space.add(pymunk.Poly(space.static_body, polygon.tolist()))
     if obstacles.failed_robots is not None:

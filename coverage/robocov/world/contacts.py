@@ -26,9 +26,10 @@ this in one substep."""
 _MAX_TRAVEL_RADII = 0.1
 """Maximum distance that a robot in contact moves in one substep, as a fraction of the smallest radius."""
 _MAX_SUBSTEPS = 64
-"""Maximum number of substeps of a step. Very fast robots may then sink in deeper than `MAX_PENETRATION_M`."""
+"""Maximum number of finer substeps into which a substep of `World` is divided. Very fast robots may then sink
+in deeper than `MAX_PENETRATION_M`."""
 _COLLISION_SLOP_M = 1e-4
-"""Overlap with a wall that pymunk does not correct."""
+"""Overlap that pymunk does not correct."""
 _MOVING_COLLISION_BIAS = 1e-9
 """Fraction of an overlap that remains after one second if obstacles move. It is not 0, so that a robot that a
 moving obstacle has run over is pushed out gradually."""
@@ -147,7 +148,9 @@ class ContactDetector:
 class ContactSolver:
     """Moves robots that touch something, in a space that contains only these robots and the obstacles.
 
-    The space stores nothing about earlier contacts, because pymunk forgets a contact when a disc is removed.
+    A step of this class is a substep of `World`. It is divided into finer substeps, so that robots in contact
+    move only a little in each. The space stores nothing about earlier contacts, because pymunk forgets a
+    contact when a disc is removed.
 
     Parameters
     ----------
@@ -166,7 +169,7 @@ class ContactSolver:
         mass_ratio = float(team.mass.max() / team.mass.min())
         space.iterations = _BASE_ITERATIONS + math.ceil(2.0 * mass_ratio)
         space.collision_slop = _COLLISION_SLOP_M
-        # If the bias is 0, each substep removes all overlap.
+        # If the bias is 0, pymunk corrects all overlap beyond the slop in one substep.
         space.collision_bias = _MOVING_COLLISION_BIAS if self._moving_bodies else 0.0
         self._space = space
         self._arrays = BodyArrays(space, capacity=len(self._moving_bodies) + len(team) + 1)
@@ -186,28 +189,28 @@ class ContactSolver:
         max_speed: FloatArray,
         dt: float,
     ) -> FloatArray:
-        """Move some robots by one step, and resolve their contacts.
+        """Move some robots by one substep of `World`, and resolve their contacts.
 
         Parameters
         ----------
         robots : (k,) array
             Indices of the robots in the team, ascending.
         states : (k, 4) array, m and m/s
-            x, y, vx and vy of these robots before the step.
+            x, y, vx and vy of these robots before the substep.
         net_forces : (k, 2) array, N
             Force on each of these robots.
         obstacle_states : (m, 4) array, m and m/s
             Displacements and velocities of the moving obstacles, as returned by
             `bodies.compute_obstacle_states`.
         max_speed : (k,) array, m/s
-            Speed to which each robot is limited after the step, because a contact may accelerate it.
+            Speed to which each robot is limited after the substep, because a contact may accelerate it.
         dt : float, s
-            Duration of the step.
+            Duration of the substep of `World`.
 
         Returns
         -------
         (k, 4) array, m and m/s
-            x, y, vx and vy of these robots after the step.
+            x, y, vx and vy of these robots after the substep.
         """
         bodies_and_discs = [self._robots[robot] for robot in robots.tolist()]
         bodies = [body for body, _ in bodies_and_discs]
@@ -220,6 +223,7 @@ class ContactSolver:
             self._arrays.states[self._moving_rows] = obstacle_states
             self._arrays.states[rows] = states
             self._arrays.write_states()
+            # As in `ContactDetector`, discs are added only after their bodies were placed.
             self._space.add(*discs)
             self._arrays.forces[rows] = net_forces
             substep_count = self._count_substeps(robots, states, net_forces, dt)
@@ -227,11 +231,12 @@ class ContactSolver:
             for _ in range(substep_count):
                 self._arrays.write_forces()
                 self._run_substep(bodies_and_discs, substep)
+            # Without the discs, the step that applies the corrections finds no new contacts.
             self._space.remove(*discs)
             self._arrays.read_states()
             final_states = self._arrays.states[rows].copy()
-            for row, (vx, vy) in enumerate(final_states[:, 2:].tolist()):
-                final_states[row, 2:] *= compute_clip_factor(vx, vy, float(max_speed[row]))
+            for k, (vx, vy) in enumerate(final_states[:, 2:].tolist()):
+                final_states[k, 2:] *= compute_clip_factor(vx, vy, float(max_speed[k]))
             self._apply_pending_corrections(bodies_and_discs, substep)
             self._arrays.read_states()
             # The corrections changed the positions. The velocities stay those from before the corrections.
@@ -246,7 +251,7 @@ class ContactSolver:
     def _count_substeps(self, robots: IntArray, states: FloatArray, net_forces: FloatArray, dt: float) -> int:
         """Return the number of substeps that limits the travel in each to `_max_travel`.
 
-        It is at most `_MAX_SUBSTEPS`, also if the travel is then longer.
+        It is at most `_MAX_SUBSTEPS`, even if the travel is then longer.
         """
         max_squared_speed = 0.0
         masses = self._team.mass[robots].tolist()

@@ -68,7 +68,10 @@ def relocate_robots(environment: Environment, positions: FloatArray, team: Team)
 
 
 def _compute_center_areas(environment: Environment, team: Team) -> dict[float, BaseGeometry]:
-    """Return the area in which the center of a robot may be, by the radius of the robot."""
+    """Return the area in which the center of a robot may be, by the radius of the robot.
+
+    Raise a StartError if a robot fits nowhere.
+    """
     areas = {}
     for radius in np.unique(team.radius).tolist():
         areas[radius] = _compute_center_area(environment, radius)

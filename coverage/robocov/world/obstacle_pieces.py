@@ -1,8 +1,9 @@
 """Walls and obstacles as convex pieces, the only polygons that the physics engine supports.
 
-Pymunk silently replaces a concave polygon by its convex hull. Therefore everything that is not free is
-triangulated, and the triangles are merged into larger pieces as long as these are convex (Hertel and
-Mehlhorn, 1983: at most four times as many pieces as in an optimal decomposition).
+Pymunk silently replaces a concave polygon by its convex hull. Therefore everything that is static and not
+free is triangulated, and the triangles are merged into larger pieces as long as these are convex (Hertel and
+Mehlhorn, 1983: at most four times as many pieces as in an optimal decomposition). Moving obstacles are split
+in the same way, each on its own.
 """
 
 import weakref
@@ -49,7 +50,8 @@ class Obstacles:
     Attributes
     ----------
     walls : tuple of (k, 2) arrays, m
-        Convex polygons that tile everything that is not free; see `build_solid_pieces`.
+        Convex polygons that tile the static obstacles and the surroundings of the map; see
+        `build_solid_pieces`.
     moving_obstacles : tuple of MovingObstacle
         Moving obstacles.
     failed_robots : (w, 3) array or None, m

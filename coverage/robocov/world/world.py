@@ -75,6 +75,10 @@ class World:
 
     Attributes
     ----------
+    team : Team
+        The n robots.
+    failed_robots : (w, 3) array or None, m
+        Center x, y and radius of the failed robots among the obstacles.
     positions : (n, 2) array, m
         Centers of the robots. Read-only.
     velocities : (n, 2) array, m/s
@@ -237,7 +241,7 @@ class World:
         return max(math.ceil(dt / MAX_SUBSTEP_S - _SUBSTEP_COUNT_TOLERANCE), math.ceil(travel_in_radii))
 
     def _run_substep(self, forces: FloatArray, external: FloatArray, dt: float) -> None:
-        """Advance one substep: move all robots freely, then redo those in contact."""
+        """Advance one substep: move all robots as if there were no contacts, then those in contact again."""
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
         may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
@@ -376,12 +380,15 @@ class World:
             space.set_moving_obstacles(self._obstacle_states)
 
     def _move_freely(self, net_forces: FloatArray, dt: float) -> FloatArray:
-        """Return the states after a substep without contacts, (n, 4): x, y, vx, vy."""
+        """Move the robots for one substep as if there were no contacts, and return their states.
+
+        The states are x, y, vx and vy, (n, 4).
+        """
         states = [space.step(net_forces[rows], dt) for rows, space in self._get_spaces()]
         return states[0] if len(states) == 1 else np.concatenate(states)
 
     def _list_touching_robots(self) -> list[int]:
-        """Return the robots that touched something in the last substep without contacts, ascending."""
+        """Return the robots that touched something during the last `_move_freely`, ascending."""
         robots: list[int] = []
         for rows, space in self._get_spaces():
             robots += [rows.start + robot for robot in space.list_touching_robots()]

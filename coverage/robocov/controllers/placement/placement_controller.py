@@ -43,7 +43,8 @@ class PlacementMap:
     nodes : int
         Approximate number of sites: the points of a square lattice that are in the free space.
     radius : float, m
-        Radius of the smallest robot. No path leads through a gap that is narrower than this robot.
+        Radius of the smallest robot, for the distances in `table`: no path leads through a gap that is
+        narrower than this robot.
 
     Attributes
     ----------
@@ -249,7 +250,11 @@ class PlacementController(WholeMapController):
         return Decision(command.forces, command.goals, terms, memory=memory)
 
     def _get_placement_map(self, team: Team) -> PlacementMap:
-        """Return the placement map of a team. Its paths are wide enough for the largest robot."""
+        """Return the placement map of a team, which is built only once.
+
+        The routes (`planner.paths`) are wide enough for the largest robot. The distances in `table` are those
+        of the coverage cost: gaps count as closed only if they are narrower than the smallest robot.
+        """
         clearance = float(team.radius.max()) + self.clearance
         return _build_cached_map(self.get_environment(), clearance, int(self.nodes), team.min_radius)
 
