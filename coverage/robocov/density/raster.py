@@ -438,8 +438,8 @@ def _find_first_line(start: float, change: float, square_count: int) -> int:
     """Return the first inner grid line that an edge crosses, for vertical or for horizontal lines.
 
     `start` is the coordinate at which the edge starts, and `change` the change of this coordinate to its end.
-    There are `square_count` squares side by side, and the inner lines are between them, from 1 up to that
-    number, exclusive. If the edge crosses no inner line, the result may be outside this range.
+    There are `square_count` squares side by side. The inner lines are between them, and are numbered from 1
+    to ``square_count - 1``. If the edge crosses no inner line, the result may be outside this range.
     """
     if change > 0.0:
         return int(max(np.floor(start) + 1.0, 1.0))
