@@ -250,7 +250,9 @@ def test_invalid_controllers_and_decisions_are_rejected(empty: Environment) -> N
             raise KeyError("start")
 
     starts = [[2.0, 2.0], [4.0, 4.0]]
-    with pytest.raises(ParameterError, match=r"decide\(seen, memory\) returned .*, expected a Decision"):
+    with pytest.raises(
+        ParameterError, match=r"decide\(observations, memory\) returned .*, expected a Decision"
+    ):
         Simulation(empty, ReturnsArray(np.zeros((2, 2))), starts).step()
     with pytest.raises(ParameterError, match=r"goals of shape \(1, 2\) at .*, expected \(2, 2\)"):
         Simulation(empty, ReturnsTooFewGoals(np.zeros((2, 2))), starts).step()
