@@ -251,7 +251,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
     notes: tuple[str, ...] = ()
     missing = sorted((label for label in labels if not by_label[label]), key=str.casefold)
     if missing:
-        notes = (f"Without runs on these tracks: {', '.join(missing)}.",)
+        notes = (f"Without runs on these tracks: {'; '.join(missing)}.",)
     return PageTable("Scores, and median gaps on each track, %", head, rows, notes=notes)
 
 
@@ -364,10 +364,10 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         svg = inline_svg(figure, f"{name}-{key}", description)
         note = ""
         if omitted:
-            labels = ", ".join(point.label for point in omitted)
+            labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
             note = (
-                f"Not drawn, because they share the value {omitted[0].x:.4g} with a controller that has a "
-                f"smaller gap: {labels}."
+                f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
+                f"gap: {labels}."
             )
         plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
     return plots

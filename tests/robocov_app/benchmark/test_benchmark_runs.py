@@ -301,7 +301,7 @@ def test_unranked_entries_are_in_alphabetical_order_and_entries_without_runs_are
     rows = re.findall(r'<th scope="row"[^>]*>(?:<svg.*?</svg>)?(.*?)</th>', overview)
     assert rows[-3:] == ["a", "b", "C"]
     plans = page.partition('id="overview-plans"')[2].partition("</section>")[0]
-    assert "Without runs on these tracks: a, b, C." in plans
+    assert "Without runs on these tracks: a; b; C." in plans
 
 
 def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:

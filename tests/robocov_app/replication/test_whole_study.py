@@ -127,6 +127,11 @@ def format_claims(claims) -> str:
     return json.dumps([claim.to_json() for claim in claims])
 
 
+def test_the_page_says_why_limited_ranges_do_not_change_rpf(paper_page):
+    assert "At the limited ranges, RPF with shared gains moves as without limits" in paper_page
+    assert "its repulsion reaches 2 m, which is not farther than either range" in paper_page
+
+
 class TestRuns:
     def test_the_forecast_is_the_number_of_runs(self, folder, paper, beyond, tmp_path):
         expected = forecast_study(tmp_path, TINY, 2, claims=True, beyond=True)
