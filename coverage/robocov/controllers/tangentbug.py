@@ -219,8 +219,7 @@ class TangentBug(BaseController):
     moved: float = gain(
         0.25,
         "m",
-        "distance, times the number of attempts, that the centroid must move before an unreachable goal is "
-        "tried again",
+        "distance per attempt that the centroid must move before an unreachable goal is tried again",
         high=1e4,
     )
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
