@@ -3,7 +3,7 @@
     python tests/bench/bench_coverage_control.py --worlds 4
 
 CoverageControl (Agarwal et al. 2024, LPAC) is another simulator. By default, 32 robots start anywhere in a
-square of 1024 m without walls, and the density has 32 peaks. Robots move at up to 5 m/s, hear each other
+square of 1024 m without walls, and the density has 32 peaks. Robots move at up to 5 m/s, communicate
 within 128 m, and sense the density in a square of 64 m around them; in robocov, they sense it in a disc with
 this diameter. The cost is the sum of the squared distances to the nearest robot, weighted by the density.
 

@@ -191,7 +191,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
         Job("import", "tmx"),
         "refers to another file",
     ),
-    "argos: quantity": (_build_case("a.argos", lambda: _ARGOS), _READ, "a number within 1e7"),
+    "argos: quantity": (_build_case("a.argos", lambda: _ARGOS), _READ, "a number from -1e7 to 1e7"),
     "argos: a file": (
         lambda: _build_external_entity("argos-configuration", "a.argos"),
         _READ,

@@ -1,3 +1,5 @@
+"""Groups of equal values, and concatenated ranges."""
+
 from __future__ import annotations
 
 import numpy as np

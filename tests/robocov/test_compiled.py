@@ -1,3 +1,5 @@
+"""Compiled kernels: their cache, its permissions, and runs without the compiler."""
+
 from __future__ import annotations
 
 import os

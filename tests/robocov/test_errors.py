@@ -1,3 +1,5 @@
+"""Errors: their classes, and the wording of messages."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

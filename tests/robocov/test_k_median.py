@@ -1,3 +1,5 @@
+"""The k-median problem: swaps, rebuilding and thresholds."""
+
 from __future__ import annotations
 
 from itertools import combinations

@@ -1,3 +1,5 @@
+"""Compilation of kernels: examples, interpreted kernels and the background process."""
+
 from __future__ import annotations
 
 import os

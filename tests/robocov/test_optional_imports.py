@@ -1,3 +1,5 @@
+"""Optional packages: imports, and messages if they are missing."""
+
 from __future__ import annotations
 
 import sys

@@ -1,3 +1,5 @@
+"""Potentials of repulsion and attraction: gradients, values by hand, and limits."""
+
 from __future__ import annotations
 
 import numpy as np

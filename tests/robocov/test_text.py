@@ -1,3 +1,5 @@
+"""Text that is safe to print: control characters become visible."""
+
 from __future__ import annotations
 
 import unicodedata

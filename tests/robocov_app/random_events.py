@@ -41,7 +41,7 @@ EXTREME_COORDINATES = (-(2**15), -1, 0, 10**5)
 BUTTONS = (1, 1, 1, 1, 1, 2, 3, 3, 4, 5, 8, 20)
 FRAME_DURATIONS_S = (0.0, 0.001, 0.01, 0.02, 0.05, 0.3)
 REPEATED_KEYS = ("a", "space", "tab", "return", "escape", "backspace", "delete", "left", "ctrl+z")
-STRANGE_KEYS = (0, 1, 127, pygame.K_CAPSLOCK, pygame.K_F15, 2**30 + 250, -1)
+UNUSUAL_KEYS = (0, 1, 127, pygame.K_CAPSLOCK, pygame.K_F15, 2**30 + 250, -1)
 TEXTS = (
     "a\x00b",
     "\x00",
@@ -258,12 +258,16 @@ class RandomEvents:
     def post(self, kind: int, **content: Any) -> None:
         pygame.event.post(pygame.event.Event(kind, **content))
 
-    def post_key(self, name: str) -> None:
-        """Post the press of a key and, mostly, its release."""
-        content = build_key_event(name)
+    def press_key(self, content: dict[str, Any]) -> None:
+        """Post the press of a key, and the text that it types."""
         self.post(pygame.KEYDOWN, **content)
         if content["unicode"]:
             self.post(pygame.TEXTINPUT, text=content["unicode"])
+
+    def post_key(self, name: str) -> None:
+        """Post the press of a key and, mostly, its release."""
+        content = build_key_event(name)
+        self.press_key(content)
         if self.random.random() < 0.9:
             self.post(pygame.KEYUP, **content)
 
@@ -280,12 +284,10 @@ class RandomEvents:
         """Press a key many times without releasing it, then an unusual or invalid key."""
         content = build_key_event(self.random.choice(REPEATED_KEYS))
         for _ in range(self.random.randint(2, 25)):
-            self.post(pygame.KEYDOWN, **content)
-            if content["unicode"]:
-                self.post(pygame.TEXTINPUT, text=content["unicode"])
-        code = self.random.choice(STRANGE_KEYS)
-        mod = self.random.randrange(2**15)
-        self.post(pygame.KEYDOWN, key=code, mod=mod, unicode="\x00", scancode=0)
+            self.press_key(content)
+        code = self.random.choice(UNUSUAL_KEYS)
+        modifiers = self.random.randrange(2**15)
+        self.post(pygame.KEYDOWN, key=code, mod=modifiers, unicode="\x00", scancode=0)
 
     def type_text(self) -> None:
         text = self.random.choice(TEXTS)

@@ -80,8 +80,8 @@ class RefereeService:
     failure_message = "the verification failed"
 
     def __call__(self, questions: list[RepeatedRun], channel: Channel) -> RunCheck:
-        """Repeat a run while other processes execute its controller."""
-        run = questions[-1]
+        """Repeat a run while other processes execute its controller. There is only one question."""
+        (run,) = questions
         with ExitStack() as stack:
             team_process = _start_controller_process(stack)
             robot_processes = {robot: _start_controller_process(stack) for robot in run.robots}

@@ -168,8 +168,9 @@ class TaskService:
     failure_message = "the run failed"
 
     def __call__(self, questions: list[Task], channel: Channel) -> Outcome:
-        """Execute the latest task."""
-        return perform(questions[-1])
+        """Execute the task. A `LocalPool` sends one at a time, so there is only one question."""
+        (task,) = questions
+        return perform(task)
 
 
 def build_failure(message: str, details: str) -> Outcome:

@@ -140,9 +140,10 @@ class FocusLost(_Message):
 
 
 class PageChanged(_Message):
-    """The page reports its size in device pixels, device pixels per CSS pixel, and the user's preferences.
+    """The page reports its size and resolution, and the preferences of its user.
 
-    `touch` is true if the main pointer is a finger.
+    `width` and `height` are in device pixels; `ratio` is the number of device pixels per CSS pixel; `touch`
+    is true if the main pointer is a finger.
     """
 
     kind: Literal["page"]
@@ -155,7 +156,7 @@ class PageChanged(_Message):
 
     @property
     def is_small(self) -> bool:
-        """Whether the page is small, such as that of a phone in portrait or landscape."""
+        """Whether the page is as small as that of a phone, in portrait or landscape."""
         return self.width < NARROW_PAGE_PX * self.ratio or self.height < LOW_PAGE_PX * self.ratio
 
     @property

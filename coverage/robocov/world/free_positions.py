@@ -105,7 +105,7 @@ def _compute_directions(
 def find_free_position(
     environment: Environment, radius: float, others: FloatArray, point: Point, radii: FloatArray | None = None
 ) -> Point:
-    """Find the position nearest to a point at which one more robot fits.
+    """Find the free position for one more robot that is nearest to a point.
 
     Parameters
     ----------

@@ -1,3 +1,5 @@
+"""Controllers that learn the density: convergence, exchanged measurements and lost messages."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace

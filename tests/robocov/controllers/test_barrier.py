@@ -1,3 +1,5 @@
+"""Control barrier functions: the quadratic program, and safe distances to robots and walls."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace

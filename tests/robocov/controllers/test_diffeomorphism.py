@@ -1,3 +1,5 @@
+"""Lloyd's algorithm in a chart without obstacles: the chart, its Jacobian and cells of samples."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -84,7 +86,7 @@ def test_maps_to_the_chart_and_back_are_inverse(seed: int) -> None:
     np.testing.assert_allclose(CHART.map_to_region(images), points, atol=1e-9)
 
 
-def test_samples_belong_to_the_nearest_robot_that_is_heard() -> None:
+def test_samples_belong_to_the_nearest_robot_in_range() -> None:
     rng = np.random.default_rng(1)
     samples = rng.uniform(0, 10, (300, 2))
     positions = rng.uniform(0, 10, (7, 2))

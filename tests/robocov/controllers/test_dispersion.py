@@ -1,3 +1,5 @@
+"""Dispersion of robots that only avoid each other and walls."""
+
 from __future__ import annotations
 
 import numpy as np

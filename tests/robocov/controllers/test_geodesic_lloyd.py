@@ -1,3 +1,5 @@
+"""Lloyd's algorithm with path lengths: goals, cost, doors and limited communication."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -32,7 +34,7 @@ DOOR = Environment("door", SQUARE.boundary, (WallObstacle(((5, 0), (5, 8)), 0.2)
 
 
 def observe(positions: np.ndarray, region: Region) -> Observations:
-    """Return the observations of robots at rest that hear each other, far from obstacles."""
+    """Return the observations of robots at rest, in range of each other and far from obstacles."""
     n = len(positions)
     return Observations(positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), region)
 
@@ -61,20 +63,20 @@ def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, expon
     assert costs[-1] < costs[0]
 
 
-def test_each_robot_divides_the_map_only_among_the_robots_that_it_hears() -> None:
+def test_each_robot_divides_the_map_only_among_the_robots_in_range() -> None:
     rooms = load_map("rooms")
     planner = GeodesicPlanner(rooms, 0.13, 32, radius=0.1)
     positions = find_nearest_inside(planner.configuration_space, rooms.start("uniform").sample(5, seed=3))
-    heard_robots = ((1, 2), (0,), (), (2, 4), (0, 1, 2, 3))
+    neighbor_rows = ((1, 2), (0,), (), (2, 4), (0, 1, 2, 3))
     neighbors = Neighbors(
         5,
-        indptr=np.cumsum([0, *map(len, heard_robots)]),
-        indices=np.concatenate([np.array(heard, dtype=np.int64) for heard in heard_robots]),
+        indptr=np.cumsum([0, *map(len, neighbor_rows)]),
+        indices=np.concatenate([np.array(rows, dtype=np.int64) for rows in neighbor_rows]),
     )
     seen = replace(observe(positions, rooms.region), neighbors=neighbors)
     goals = planner.plan(seen, 2.0).goals
-    for i, heard in enumerate(heard_robots):
-        known_positions = positions[[i, *heard]]
+    for i, rows in enumerate(neighbor_rows):
+        known_positions = positions[[i, *rows]]
         expected = planner.plan(observe(known_positions, rooms.region), 2.0).goals[0]
         assert goals[i].tolist() == expected.tolist()
 
@@ -172,7 +174,7 @@ def test_a_simulation_informs_the_controller_and_keeps_the_original() -> None:
 
 
 def test_robots_plan_by_the_robots_that_they_hear_and_the_density() -> None:
-    """Two robots that do not hear each other both move to the center of the density."""
+    """Two robots out of communication range of each other both move to the center of the density."""
     bell = replace(SQUARE, density=Gaussians((Gaussian((7.0, 7.0), 1.0, 1.0),), floor=0.001))
     controller = inform_controller(GeodesicLloyd(exponent=2.0), bell)
     positions = np.array([[6.0, 6.5], [1.0, 1.0]])

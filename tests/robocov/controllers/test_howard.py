@@ -1,3 +1,5 @@
+"""Potential fields of Howard et al.: forces of robots and walls, and friction."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -17,7 +19,10 @@ SQUARE = Environment("square", ((0, 0), (10, 0), (10, 10), (0, 10)))
 
 
 def observe(positions: np.ndarray, scans: Scans | None = None) -> Observations:
-    """Return the observations of robots at rest that hear each other, without obstacle points."""
+    """Return the observations of robots at rest within communication range of each other.
+
+    There are no obstacle points.
+    """
     n = len(positions)
     return Observations(
         positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), SQUARE.region, scans=scans

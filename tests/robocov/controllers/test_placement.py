@@ -181,7 +181,7 @@ def test_a_robot_without_a_goal_or_a_path_stays() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_robots_plan_for_the_robots_that_they_know(kind: type[PlacementController]) -> None:
-    """A robot that hears no other one moves to the median of the map."""
+    """A robot without others in communication range moves to the median of the map."""
     controller = inform_controller(kind(nodes=100.0), SQUARE)
     positions = np.array([[1.0, 1.0], [5.0, 5.0]])
     team = Team.homogeneous(2, communication_range=2.0)

@@ -1,3 +1,5 @@
+"""Spreading with at least k neighbors, by Poduri and Sukhatme."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""Lloyd's algorithm with limited interaction range: moments, goals and cost."""
+
 from __future__ import annotations
 
 from dataclasses import replace

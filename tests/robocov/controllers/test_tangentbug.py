@@ -1,3 +1,5 @@
+"""Lloyd's algorithm with TangentBug: traps, unreachable goals and free directions."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""Modules that a user's controller imports: finding them, and importing them from their texts."""
+
 from __future__ import annotations
 
 import pickle

@@ -52,7 +52,10 @@ def scan_room(position: np.ndarray, rays: int, reach: float) -> View:
 
 
 def observe(positions: np.ndarray, density: Gaussians | None = None) -> Observations:
-    """Return the observations of robots at rest that hear each other, without obstacle points."""
+    """Return the observations of robots at rest within communication range of each other.
+
+    There are no obstacle points.
+    """
     n = len(positions)
     return Observations(
         positions, np.zeros((n, 2)), Neighbors(n), np.full((n, 2), np.nan), REGION, density=density

@@ -152,21 +152,22 @@ def draw_cluttered_halls(draw: st.DrawFn) -> Environment:
 
 @settings(deadline=None, max_examples=count_examples(60))
 @given(draw_cluttered_halls(), st.sampled_from([0.05, 0.1, 0.3]))
-def test_connections_are_those_of_a_disc(hall: Environment, radius: float) -> None:
+def test_components_are_those_of_a_disc(hall: Environment, radius: float) -> None:
     # Erosion by 2% more and 2% less than the radius brackets the errors of both methods.
-    narrow = hall.free.buffer(-1.02 * radius, quad_segs=64)
-    wide = hall.free.buffer(-0.98 * radius, quad_segs=64)
+    reach_of_larger_disc = hall.free.buffer(-1.02 * radius, quad_segs=64)
+    reach_of_smaller_disc = hall.free.buffer(-0.98 * radius, quad_segs=64)
     closed = np.array(hall.close_gaps(radius).free.geoms)
-    wide_parts = shapely.get_parts(wide)
-    wide_of_closed: dict[int, int] = {}
-    for part in shapely.get_parts(narrow):
+    parts_of_smaller_disc = shapely.get_parts(reach_of_smaller_disc)
+    part_by_component: dict[int, int] = {}
+    for part in shapely.get_parts(reach_of_larger_disc):
         point = part.point_on_surface()
         (component,) = np.flatnonzero(shapely.intersects(closed, point)).tolist()
         # What a larger disc can reach stays connected.
         assert shapely.covers(closed[component].buffer(1e-5), part)
         # What a smaller disc cannot reach is not connected.
-        (wide_part,) = np.flatnonzero(shapely.intersects(wide_parts, point)).tolist()
-        assert wide_of_closed.setdefault(component, wide_part) == wide_part
+        (smaller_part,) = np.flatnonzero(shapely.intersects(parts_of_smaller_disc, point)).tolist()
+        part_by_component.setdefault(component, smaller_part)
+        assert part_by_component[component] == smaller_part
 
 
 @settings(deadline=None, max_examples=count_examples(30))

@@ -1,3 +1,5 @@
+"""Environments: polygons of obstacles, boundary, free space and its components."""
+
 from __future__ import annotations
 
 import numpy as np

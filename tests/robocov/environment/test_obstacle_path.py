@@ -1,3 +1,5 @@
+"""Moving obstacles: positions on their paths, map files and rejected paths."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""The number of points that fit into separate parts of an area."""
+
 from __future__ import annotations
 
 import shapely

@@ -1,3 +1,5 @@
+"""Starts: random and given positions, tight starts, and starts without space."""
+
 from __future__ import annotations
 
 import numpy as np

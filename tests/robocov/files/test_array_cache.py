@@ -1,3 +1,5 @@
+"""The cache of arrays: damaged files, limited size and concurrent writers."""
+
 from __future__ import annotations
 
 import multiprocessing

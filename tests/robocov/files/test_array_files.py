@@ -1,3 +1,5 @@
+"""Files of arrays: reading, and rejecting damaged or malicious ones."""
+
 from __future__ import annotations
 
 import io

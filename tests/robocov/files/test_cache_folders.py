@@ -1,3 +1,5 @@
+"""Folders of caches: their location, and permissions that are too wide."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""Locks of folders against other processes."""
+
 from __future__ import annotations
 
 import errno

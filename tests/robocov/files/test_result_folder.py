@@ -1,3 +1,5 @@
+"""Folders of results: interruptions, replacement of earlier results, and simultaneous processes."""
+
 from __future__ import annotations
 
 import json

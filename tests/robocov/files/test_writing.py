@@ -1,3 +1,5 @@
+"""Writing of files: links, permissions, special files and simultaneous writers."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""Generated blocks of a city, and the streets between them."""
+
 from __future__ import annotations
 
 from itertools import combinations

@@ -1,3 +1,5 @@
+"""Generated maps: requested properties, seeds, and maps of earlier versions."""
+
 from __future__ import annotations
 
 import hashlib

@@ -1,3 +1,5 @@
+"""Generated polygons: convex, L-shaped and U-shaped ones."""
+
 from __future__ import annotations
 
 import numpy as np

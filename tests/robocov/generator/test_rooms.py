@@ -1,3 +1,5 @@
+"""Generated plans of rooms: doors, corridors and rooms that are too small."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Lower bounds of the cost: comparison with known optima, and validity on triangles."""
+
 from __future__ import annotations
 
 from itertools import combinations_with_replacement

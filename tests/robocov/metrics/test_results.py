@@ -1,3 +1,5 @@
+"""Tables of results: columns, failed runs, finding runs, and invalid tables."""
+
 from __future__ import annotations
 
 import csv

@@ -1,3 +1,5 @@
+"""Descent to a local minimum of the cost: components, stopping, and known minima."""
+
 from __future__ import annotations
 
 from collections import deque

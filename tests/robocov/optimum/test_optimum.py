@@ -1,3 +1,5 @@
+"""Best known placements: comparison with known optima and with exhaustive search."""
+
 from __future__ import annotations
 
 import subprocess

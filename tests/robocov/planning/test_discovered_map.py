@@ -1,3 +1,5 @@
+"""Maps that robots discover: known cells, rays, and walls that are removed."""
+
 from __future__ import annotations
 
 from copy import deepcopy

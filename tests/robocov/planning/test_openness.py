@@ -1,3 +1,5 @@
+"""Openness of unknown cells: random walks, insides of obstacles, and the prior."""
+
 from __future__ import annotations
 
 import numpy as np

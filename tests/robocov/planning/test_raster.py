@@ -1,3 +1,5 @@
+"""Rasters: the cells of points, inside and outside."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Placement of a team on the nodes of a discovered map."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Roadmaps halfway between walls: connections, distances and small rooms."""
+
 from __future__ import annotations
 
 import numpy as np

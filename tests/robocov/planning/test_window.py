@@ -1,3 +1,5 @@
+"""Windows of rasters around a cell."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Records of runs: saving, loading, earlier formats and rejected files."""
+
 from __future__ import annotations
 
 import json

@@ -1,3 +1,5 @@
+"""Times at which a record is sampled."""
+
 from __future__ import annotations
 
 import numpy as np

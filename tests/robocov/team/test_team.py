@@ -1,3 +1,5 @@
+"""Teams: limits of robots, JSON and rejected values."""
+
 from __future__ import annotations
 
 from dataclasses import replace

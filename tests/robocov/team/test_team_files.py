@@ -1,3 +1,5 @@
+"""Team files: groups of robots, default values and rejected files."""
+
 from __future__ import annotations
 
 import json

@@ -1,3 +1,5 @@
+"""Circular arcs: moments, chords and rings."""
+
 from __future__ import annotations
 
 import numpy as np

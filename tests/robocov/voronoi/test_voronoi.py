@@ -136,15 +136,17 @@ def test_moments_obey_the_parallel_axis_theorem(seed: int, n: int) -> None:
     """Check equation (3) with moments from triangles that have the centroid as a corner."""
     points = scatter_points(PENTAGON, n, np.random.default_rng(seed))
     for cells in (partition(points, PENTAGON), partition_by_clipping(points, PENTAGON)):
-        direct = []
+        moments_about_centroids = []
         for ring, centroid in zip(cells.polygons, cells.centroids, strict=True):
             x, y = (ring - centroid).T
             u, v = (np.roll(ring, -1, axis=0) - centroid).T
-            edges = (x * v - u * y) * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
-            direct.append(edges.sum())
-        assert compute_moment_about_centroid(cells) == pytest.approx(np.array(direct), abs=1e-11)
-        lever = points - cells.centroids
-        shifted = np.array(direct) + cells.masses * (lever**2).sum(axis=1)
+            # Moment of the triangle (0, a, b) about 0: (a × b) (a·a + a·b + b·b) / 12.
+            triangle_moments = (x * v - u * y) * (x * x + x * u + u * u + y * y + y * v + v * v) / 12
+            moments_about_centroids.append(triangle_moments.sum())
+        expected = np.array(moments_about_centroids)
+        assert compute_moment_about_centroid(cells) == pytest.approx(expected, abs=1e-11)
+        offset = points - cells.centroids
+        shifted = expected + cells.masses * (offset**2).sum(axis=1)
         assert cells.polar_moments == pytest.approx(shifted, abs=1e-11)
 
 
@@ -158,8 +160,8 @@ def test_cells_rotate_and_mirror_with_the_robots(seed: int, n: int, angle: float
     plain = partition(points, PENTAGON)
     turned = partition(points @ turn, Region(PENTAGON.vertices @ turn))
     assert turned.masses == pytest.approx(plain.masses, abs=1e-11)
-    lever = plain.centroids @ turn - turned.centroids
-    assert plain.masses[:, None] * lever == pytest.approx(np.zeros((n, 2)), abs=1e-10)
+    offset = plain.centroids @ turn - turned.centroids
+    assert plain.masses[:, None] * offset == pytest.approx(np.zeros((n, 2)), abs=1e-10)
 
 
 @settings(deadline=None, max_examples=count_examples(60))

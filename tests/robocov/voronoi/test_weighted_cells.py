@@ -1,3 +1,5 @@
+"""Cells of robots with different speeds: partition, shape and rounding."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Convex pieces of obstacles for pymunk."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -66,7 +66,8 @@ def test_walls_have_gaps_at_their_doors() -> None:
     drawing = Drawing()
     drawing.add_wall_with_doors((0.0, 2.0), (10.0, 2.0), [6.0, 0.55], width=1.0, thickness=0.2)
     bounds = [obstacle.polygon.bounds for obstacle in drawing.obstacles]
-    # The piece between the start and the first door is too short.
+    # The doors are given out of order. The piece before the door at 0.55 m would be 0.05 m long, which is too
+    # short for a wall.
     assert bounds == [pytest.approx((1.05, 1.9, 5.5, 2.1)), pytest.approx((6.5, 1.9, 10.0, 2.1))]
 
 

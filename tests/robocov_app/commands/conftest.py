@@ -1,3 +1,5 @@
+"""Fixtures for the tests of the commands."""
+
 import pytest
 from small_studies import DirectExecutor
 

@@ -1,3 +1,5 @@
+"""`robocov check` with a report: measures, and differences from an earlier report."""
+
 from dataclasses import replace
 
 import pytest

@@ -1,3 +1,5 @@
+"""`robocov optimum`: results, lower bounds, gaps, figures and rejected options."""
+
 import json
 import signal
 import subprocess

@@ -1,3 +1,5 @@
+"""`robocov replay`: frames and videos, windows, and rejected folders."""
+
 import json
 import shutil
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""`robocov run` and `robocov compare`: files, printed results and earlier results."""
+
 import json
 import os
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""`robocov sweep`: printed results, failed runs, dry runs and rejected options."""
+
 import csv
 import errno
 import json

@@ -1,3 +1,5 @@
+"""Commands with teams of different robots."""
+
 import json
 from pathlib import Path
 

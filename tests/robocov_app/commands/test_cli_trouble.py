@@ -1,3 +1,5 @@
+"""Commands in trouble: full disks, missing permissions, Ctrl+C and restricted terminals."""
+
 import json
 import os
 import signal

@@ -1,3 +1,5 @@
+"""`robocov metrics`: the table of a run, JSON and rejected folders."""
+
 import json
 from pathlib import Path
 

@@ -1,3 +1,5 @@
+"""Options for the conditions of a run."""
+
 import json
 from pathlib import Path
 

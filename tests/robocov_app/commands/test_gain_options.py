@@ -1,3 +1,5 @@
+"""Options for the gains of controllers."""
+
 from pathlib import Path
 
 import pytest

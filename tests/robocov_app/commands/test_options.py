@@ -1,3 +1,5 @@
+"""Options of the commands: parsed values, defaults and rejected values."""
+
 from pathlib import Path
 
 import pytest

@@ -1,3 +1,5 @@
+"""Aligning and distributing objects in the editor."""
+
 import numpy as np
 import pytest
 from drawn_sketches import HALL, valid_sketches

@@ -1,3 +1,5 @@
+"""The image under the map: its position, scale and level."""
+
 import math
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""Edits that combine obstacles: areas, holes, offsets and repairs."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Copying and pasting objects in the editor, and pasting other texts."""
+
 import json
 
 import pytest

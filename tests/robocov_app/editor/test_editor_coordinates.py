@@ -1,3 +1,5 @@
+"""Typed positions, lengths, sizes and angles."""
+
 import math
 
 import pytest

@@ -1,3 +1,5 @@
+"""Documents of sketches: reading and writing them, and errors with paths."""
+
 import difflib
 import json
 import pickle

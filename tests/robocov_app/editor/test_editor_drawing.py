@@ -250,7 +250,7 @@ def test_measuring_shows_lengths_and_changes_nothing(driver: EditorDriver) -> No
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDriver, tmp_path: Path) -> None:
     Image.new("RGB", (200, 100), (200, 40, 40)).save(tmp_path / "plan.png")
-    driver.window.documents.open_background(tmp_path / "plan.png")
+    driver.window.file_commands.open_background(tmp_path / "plan.png")
     driver.settle()
     laid = driver.sketch.background
     assert laid is not None and laid.pixels == (200, 100) and laid.scale == pytest.approx(10 / 200)

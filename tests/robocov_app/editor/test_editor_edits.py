@@ -1,3 +1,5 @@
+"""Edits that add, transform and change objects, and impossible edits."""
+
 import math
 from dataclasses import replace
 

@@ -257,8 +257,8 @@ def test_settings_are_remembered(folders: Path) -> None:
         window.editor.attempt(lambda: run_typed_command(window.editor, "0.25", "grid"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
-        window.documents.remember(folders / "x.json")
-        window.documents.may_close = True
+        window.file_commands.remember(folders / "x.json")
+        window.file_commands.may_close = True
     with open_launched_editor(folders) as window:
         editor = window.editor
         assert (editor.theme, editor.grid, window.panel.tab) == ("dark", 0.25, "snap")
@@ -268,17 +268,17 @@ def test_settings_are_remembered(folders: Path) -> None:
 def test_options_are_not_saved_as_settings(folders: Path) -> None:
     with open_launched_editor(folders, theme="dark") as window:
         assert window.editor.theme == "dark"
-        window.documents.may_close = True
+        window.file_commands.may_close = True
     with open_launched_editor(folders) as window:
         assert window.editor.theme == "light"
-        window.documents.may_close = True
+        window.file_commands.may_close = True
 
 
 def test_a_picture_given_as_an_option_is_shown(folders: Path) -> None:
     Image.new("RGB", (40, 30)).save(folders / "plan.png")
     with open_launched_editor(folders) as window:
         window.editor.shown.discard("picture")
-        window.documents.may_close = True
+        window.file_commands.may_close = True
     with open_launched_editor(folders, background=folders / "plan.png") as window:
         assert "picture" in window.editor.shown and window.editor.sketch.background is not None
 
@@ -287,7 +287,7 @@ def test_recent_files_are_found_from_every_folder(
     driver: EditorDriver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    driver.window.documents.remember(Path("x.json"))
+    driver.window.file_commands.remember(Path("x.json"))
     assert driver.editor.recent == [str(tmp_path / "x.json")]
 
 
@@ -308,7 +308,7 @@ def test_abandoned_drafts_are_offered_and_recovered(folders: Path) -> None:
         EditorDriver(window).press_key("l")
         offer_recovery(window, find_recoverable(folders / "drafts"))
         EditorDriver(window).press_key("d")
-        window.documents.may_close = True
+        window.file_commands.may_close = True
     assert find_recoverable(folders / "drafts") == ()
 
 
@@ -322,9 +322,9 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(folders: Path) 
     ):
         pass
     with open_launched_editor(folders) as window:
-        window.editor.attempt(lambda: window.documents.open(folders / "plan.json"))
+        window.editor.attempt(lambda: window.file_commands.open(folders / "plan.json"))
         assert window.editor.has_error_message and "another editor" in window.editor.message
-        window.documents.may_close = True
+        window.file_commands.may_close = True
     document.close(discard=True)
 
 
@@ -334,8 +334,8 @@ def test_a_new_name_is_a_new_map(folders: Path) -> None:
             window.editor.document.title == "fresh.json"
             and not window.editor.document.history.has_unsaved_changes
         )
-        window.editor.attempt(window.documents.save)
-        window.documents.may_close = True
+        window.editor.attempt(window.file_commands.save)
+        window.file_commands.may_close = True
     assert load_map(folders / "fresh.json").area == 100.0
 
 
@@ -398,7 +398,7 @@ def test_a_map_of_another_format_opens_the_import_dialog(folders: Path) -> None:
             window.run_frame(0.01)
         assert window.editor.document.path is None and window.editor.document.history.has_unsaved_changes
         assert window.editor.sketch.build_environment().free_area == 12.0
-        window.documents.may_close = True
+        window.file_commands.may_close = True
 
 
 def test_an_unsupported_file_is_reported_by_its_format(folders: Path) -> None:

@@ -1,3 +1,5 @@
+"""Map files of the editor: saving, changes by other programs, and unreadable files."""
+
 import os
 import stat
 import sys

@@ -198,7 +198,7 @@ def play_events(name: str, seed: int, tmp_path: Path, events: int) -> None:
             else:
                 window.advance(1 / 50)
             if window.closed:
-                window.closed = window.documents.may_close = False
+                window.closed = window.file_commands.may_close = False
             if step % 50 == 0:
                 sketch = driver.sketch
                 assert parse_sketch(dump_sketch(sketch), "map") == renumber(sketch)

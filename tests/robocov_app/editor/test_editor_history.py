@@ -1,3 +1,5 @@
+"""Undoing and redoing edits, and unsaved changes."""
+
 from drawn_sketches import changes, drafts, renumber, valid_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -160,7 +160,7 @@ def test_a_click_keeps_a_part_and_enter_imports(driver: EditorDriver, plan: Path
 
 
 def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> None:
-    driver.window.documents.open(plan)
+    driver.window.file_commands.open(plan)
     dialog, view = get_dialog(driver)
     driver.type("0.1")
     driver.click(*view["menu:invert"].rect.center)
@@ -185,7 +185,7 @@ def test_options_and_buttons_have_widgets(driver: EditorDriver, plan: Path) -> N
 
 
 def test_unusable_settings_are_reported_and_not_accepted(driver: EditorDriver, plan: Path) -> None:
-    driver.window.documents.open(plan)
+    driver.window.file_commands.open(plan)
     dialog, _ = get_dialog(driver)
     driver.press_key("return")
     driver.run_frames(2)
@@ -212,7 +212,7 @@ def test_importing_asks_before_closing_the_open_map(driver: EditorDriver, plan: 
 
 
 def test_closing_the_window_closes_the_dialog(driver: EditorDriver, plan: Path) -> None:
-    driver.window.documents.open(plan)
+    driver.window.file_commands.open(plan)
     get_dialog(driver)
     driver.post(pygame.QUIT)
     driver.settle()
@@ -222,7 +222,7 @@ def test_closing_the_window_closes_the_dialog(driver: EditorDriver, plan: Path) 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
 def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size: tuple[int, int]) -> None:
     with open_editor(tmp_path, build_sheet(), size=size) as driver:
-        driver.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
+        driver.window.file_commands.ask_import(plan, IMPORTERS["svg"])  # which has most options
         driver.run_frames(2)
         dialog, view = get_dialog(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button", "area")]
@@ -230,7 +230,7 @@ def test_options_maps_and_report_do_not_overlap(tmp_path: Path, plan: Path, size
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
         driver.press_key("escape")
-        driver.window.documents.ask_import(plan, IMPORTERS["image"])
+        driver.window.file_commands.ask_import(plan, IMPORTERS["image"])
         driver.type("0.1")
         dialog, view = get_dialog(driver)
         rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]

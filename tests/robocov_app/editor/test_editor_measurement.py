@@ -1,3 +1,5 @@
+"""Measurement of sketches: reachable space, narrow gaps and warnings."""
+
 import math
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""Finding objects at a point or in a box, and selecting them."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Simplifying and straightening outlines."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Snapping to vertices, edges, crossings, angles and the grid."""
+
 import math
 from dataclasses import replace
 

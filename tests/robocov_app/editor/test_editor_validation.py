@@ -1,3 +1,5 @@
+"""Validation of sketches: errors, warnings and their positions."""
+
 from dataclasses import replace
 
 import pytest

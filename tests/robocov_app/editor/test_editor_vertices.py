@@ -1,3 +1,5 @@
+"""Edits of vertices: moving, inserting, removing them, and cutting corners."""
+
 import math
 from dataclasses import replace
 

@@ -1,3 +1,5 @@
+"""Measurement in the background, with only the changes of a sketch."""
+
 import time
 from contextlib import closing
 

@@ -92,11 +92,14 @@ def test_grids_are_read_and_random_distributions_counted(tmp_path: Path) -> None
     [
         (POST, None),  # without a body it is nowhere
         (WALL.format("a", 0, 1, 0, 0, 0), "test.argos:4: <box> 'a': expected lengths above 0"),
-        (WALL.format("a", "x", 1, 0, 0, 0), "size: expected 3 numbers within 1e7, got 'x,1,0.5'"),
-        (WALL.format("a", 1, 1, "0,0", 0, 0), "position: expected 3 numbers within 1e7, got '0,0,0,0'"),
-        ('<cylinder id="c" height="1"><body/></cylinder>', "radius: missing, expected a number within 1e7"),
+        (WALL.format("a", "x", 1, 0, 0, 0), "size: expected 3 numbers from -1e7 to 1e7, got 'x,1,0.5'"),
+        (WALL.format("a", 1, 1, "0,0", 0, 0), "position: expected 3 numbers from -1e7 to 1e7, got '0,0,0,0'"),
+        (
+            '<cylinder id="c" height="1"><body/></cylinder>',
+            "radius: missing, expected a number from -1e7 to 1e7",
+        ),
         (WALL.format("a", 1, 1, "nan", 0, 0), "position: expected 3 numbers"),
-        (WALL.format("a", 1, 1, "1e8", 0, 0), "position: expected 3 numbers within 1e7"),
+        (WALL.format("a", 1, 1, "1e8", 0, 0), "position: expected 3 numbers from -1e7 to 1e7"),
         (distribute(GRID, 5, POST), "<position>: expected one for 5, got layout [2, 2, 1]"),
         (distribute(GRID, 10**6, POST), "expected a number from 0 to 4000"),
         (

@@ -373,7 +373,7 @@ def test_a_level_is_chosen(tmp_path: Path) -> None:
             read_indoors(tmp_path, build_floor_plan(), level=asked)
     town = Extract()
     town.way(list_corners(0, 0, 9), building="yes")
-    with pytest.raises(ParameterError, match="level: expected none, got '0': no indoor spaces"):
+    with pytest.raises(ParameterError, match="level: expected no level, got '0'"):
         read_indoors(tmp_path, town, level="0")
 
 

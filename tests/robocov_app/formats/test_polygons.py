@@ -136,8 +136,12 @@ def test_ineffective_holes_are_counted() -> None:
     area = enclosed.area
     lost = enclosed.lost_holes
     assert area.area == 80
-    assert lost == {"of fewer than three points": 2, "without an area": 1, "outside of their outline": 1}
-    assert find_enclosed_area(rings[:4]).lost_holes == {"of fewer than three points": 2}
+    assert lost == {
+        "with fewer than three different points": 2,
+        "without an area": 1,
+        "outside of their outline": 1,
+    }
+    assert find_enclosed_area(rings[:4]).lost_holes == {"with fewer than three different points": 2}
 
 
 def test_edges_and_parts_are_extracted() -> None:

@@ -109,12 +109,13 @@ def test_a_map_of_floats_is_read_in_every_mode(tmp_path: Path) -> None:
 
 def test_unknown_cells_follow_the_option(tmp_path: Path) -> None:
     path = write_ros_map(tmp_path, draw_pixels(PLAN), resolution=1.0)
+    # `PLAN` has 68 free cells and 48 unknown ones.
     assert read(path).area == 68
     assert read(path, unknown="free").area == 68 + 48
     foreign = IMPORTER.read(path, ReadOptions(unknown="cut"))
     assert shapely.equals(foreign.free, ROOMS)
     assert foreign.boundary is not None
-    # Two cells around the known region of 14 x 8 cells.
+    # The known region of 14 x 8 cells gets a solid rim of two cells.
     assert shapely.equals(foreign.boundary, shapely.box(-1, -1, 17, 11))
 
 
@@ -305,8 +306,11 @@ def test_a_missing_picture_is_replaced_by_one_next_to_the_file(tmp_path: Path, n
         ({"origin": "[[1, 2], 0]"}, "origin[0]: expected a number"),
         ({"origin": 5}, "origin: expected [x, y, yaw]"),
         ({"negate": 2}, "negate: expected 0 or 1"),
-        ({"free_thresh": 0.9}, "free_thresh, occupied_thresh: expected numbers from 0 to 1, the first not"),
-        ({"free_thresh": -1}, "free_thresh, occupied_thresh: expected numbers from 0 to 1, the first not"),
+        (
+            {"free_thresh": 0.9},
+            "plan.yaml: expected 0 <= free_thresh <= occupied_thresh <= 1, got 0.9 and 0.65",
+        ),
+        ({"free_thresh": -1}, "expected 0 <= free_thresh <= occupied_thresh <= 1, got -1 and 0.65"),
         ({"occupied_thresh": "much"}, "occupied_thresh: expected a number"),
         ({"mode": "quaternary"}, "mode: expected one of trinary, scale, raw"),
         ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),

@@ -163,7 +163,7 @@ def test_only_files_in_the_folder_are_included(tmp_path: Path) -> None:
         ("model ( )\n)", ":2: expected the name of a model"),
         ("model ( pose [1 2 0 0 )", ":1: expected a \\] after its values"),
         ("model ( pose [1 x 0 0] )", ":1: expected a value"),
-        ('model ( size ["a" 1] )', ":1: expected numbers within 1e7"),
+        ('model ( size ["a" 1] )', ":1: expected numbers from -1e7 to 1e7"),
         ("model ( size [0 1] )", ":1: size: expected a number from"),
         ("model ( ) ~", ":1: expected a word, a number or a bracket"),
         ("\ndefine a b ( )\ndefine b a ( )\na ( )", ":4: the model 'a' is defined in terms of itself"),

@@ -234,9 +234,9 @@ BOMB = base64.b64encode(zlib.compress(bytes(50_000_000), 9)).decode()
         (build_tiles("walls").replace('"csv"', '"base64" compression="zstd"'), "expected CSV, or base64"),
         (build_tiles("walls", "A").replace("csv", "base64"), "not base64"),
         (build_tiles("walls", size=(4, "9" * 9)), "expected at most 16000000 tiles in all, got more"),  # type: ignore[arg-type]
-        (build_tiles("walls", more='offsetx="x"'), "offsetx: expected a number within 1e7"),
+        (build_tiles("walls", more='offsetx="x"'), "offsetx: expected a number from -1e7 to 1e7"),
         (build_tiles("walls", size=(4, -3)), "expected a whole number from 1"),
-        (build_objects("a", '<object x="nan" y="1"/>'), "x: expected a number within 1e7"),
+        (build_objects("a", '<object x="nan" y="1"/>'), "x: expected a number from -1e7 to 1e7"),
         (build_objects("a", '<object><polygon points="1,2 3"/></object>'), "points: expected 3 points"),
         (build_objects("a", '<object><polyline points="1,2"/></object>'), "points: expected 2 points"),
         ('<tileset source="a.tsx"/>', "expected a whole number from 1"),

@@ -1,3 +1,5 @@
+"""Workers in processes: questions, progress, and processes that end or take too long."""
+
 from __future__ import annotations
 
 import os

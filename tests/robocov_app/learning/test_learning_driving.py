@@ -1,3 +1,5 @@
+"""Actions of learning robots: limits, forces and velocities."""
+
 from __future__ import annotations
 
 import numpy as np

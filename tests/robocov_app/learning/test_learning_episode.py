@@ -1,3 +1,5 @@
+"""Episodes of learning: rewards, contacts, and robots that fail or join."""
+
 from __future__ import annotations
 
 from dataclasses import replace

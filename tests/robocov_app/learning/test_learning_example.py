@@ -1,3 +1,5 @@
+"""The example in the documentation of `robocov_app.learning`, in which a team learns."""
+
 from __future__ import annotations
 
 from textwrap import dedent

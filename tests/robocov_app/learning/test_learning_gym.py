@@ -1,3 +1,5 @@
+"""The environment for Gymnasium."""
+
 from __future__ import annotations
 
 import pickle

@@ -1,3 +1,5 @@
+"""Observations of learning robots: the layout of rows, and rejected layouts."""
+
 from __future__ import annotations
 
 import numpy as np

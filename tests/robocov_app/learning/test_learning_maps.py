@@ -1,3 +1,5 @@
+"""Maps of learning episodes: given, generated and rejected ones."""
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""The environment for PettingZoo."""
+
 from __future__ import annotations
 
 import warnings

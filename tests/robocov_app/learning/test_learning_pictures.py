@@ -1,3 +1,5 @@
+"""Images and the window of a learning environment."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Policies as controllers, and controllers as policies."""
+
 from __future__ import annotations
 
 import json

@@ -1,3 +1,5 @@
+"""Rewards of learning robots."""
+
 from __future__ import annotations
 
 import numpy as np

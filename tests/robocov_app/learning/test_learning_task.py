@@ -1,3 +1,5 @@
+"""Tasks of learning: times, teams and rejected values."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,3 +1,5 @@
+"""Timing of the controllers in the replication of the paper."""
+
 import json
 from dataclasses import replace
 from itertools import count

@@ -1,3 +1,5 @@
+"""The figures of the replication: text, colors, curves and files."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Plots of degradations under disturbances."""
+
 from dataclasses import replace
 from itertools import combinations
 

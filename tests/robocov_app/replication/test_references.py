@@ -1,3 +1,5 @@
+"""Reference placements for the maps of the replication."""
+
 import json
 import threading
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""Strips and bars in SVG for the report of the replication."""
+
 import math
 import re
 

@@ -1,3 +1,5 @@
+"""Sweeps over conditions: combinations, files and rejected values."""
+
 from __future__ import annotations
 
 from pathlib import Path

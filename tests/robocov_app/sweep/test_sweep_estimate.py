@@ -1,3 +1,5 @@
+"""The estimated size and duration of a sweep."""
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""Executors of sweeps: capacity, and workers that crash or are killed."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""Sweeps over gains: lists, sets and random samples."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+"""The ledger of a sweep: stored runs, damaged files, and runs of other versions."""
+
 from __future__ import annotations
 
 import errno
@@ -108,22 +110,26 @@ def test_every_flipped_bit_of_a_row_is_detected(tmp_path: Path, task: Task, vers
 
 @pytest.mark.parametrize("name", ["run.json", "record.npz", "cost.csv", "row.json"])
 @pytest.mark.parametrize("damage", ["flipped", "cut", "removed", "folder"])
-def test_a_run_with_a_damaged_file_is_repeated(tmp_path: Path, task: Task, name: str, damage: str) -> None:
+def test_a_run_with_a_damaged_file_must_be_repeated(
+    tmp_path: Path, task: Task, name: str, damage: str
+) -> None:
     file = store_run(tmp_path, task) / name
-    assert survey_folder(tmp_path, task) == Survey(bytearray([0]))
+    assert survey_folder(tmp_path, task) == Survey(must_execute=bytearray([0]))
     content = file.read_bytes()
-    file.unlink()
-    if damage == "folder":
-        file.mkdir()
-    elif damage != "removed":
+    if damage == "cut":
         file.write_bytes(content[:-3])
-        if damage == "flipped":
-            file.write_bytes(content[:-3] + bytes([content[-3] ^ 1]) + content[-2:])
+    elif damage == "flipped":
+        file.write_bytes(content[:-3] + bytes([content[-3] ^ 1]) + content[-2:])
+    elif damage == "folder":
+        file.unlink()
+        file.mkdir()
+    else:
+        file.unlink()
     survey = survey_folder(tmp_path, task)
-    assert survey == Survey(bytearray([1]), [task.name])
+    assert survey == Survey(must_execute=bytearray([1]), damaged=[task.name])
     assert survey.describe(keep_versions=False) == [f"1 damaged run will be repeated: {task.name}"]
     store_run(tmp_path, task)
-    assert survey_folder(tmp_path, task) == Survey(bytearray([0]))
+    assert survey_folder(tmp_path, task) == Survey(must_execute=bytearray([0]))
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,5 @@
+"""Execution of the runs of a sweep: outcomes, files and memory."""
+
 from __future__ import annotations
 
 import gc

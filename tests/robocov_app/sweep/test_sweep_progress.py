@@ -1,3 +1,5 @@
+"""The printed progress of a sweep."""
+
 from __future__ import annotations
 
 import io

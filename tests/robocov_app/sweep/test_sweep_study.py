@@ -1,3 +1,5 @@
+"""Studies: values, defaults, documents and rejected studies."""
+
 from __future__ import annotations
 
 import json

@@ -1,3 +1,5 @@
+"""Study files: keys, patterns of map files, and rejected values."""
+
 from __future__ import annotations
 
 import math

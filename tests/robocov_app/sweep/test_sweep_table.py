@@ -1,3 +1,5 @@
+"""The table of a sweep: columns, CSV and Parquet."""
+
 from __future__ import annotations
 
 import csv

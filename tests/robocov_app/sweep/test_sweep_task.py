@@ -1,3 +1,5 @@
+"""Tasks of a sweep: order, names, and hashes of their inputs."""
+
 from __future__ import annotations
 
 import pickle

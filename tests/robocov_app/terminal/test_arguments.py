@@ -1,3 +1,5 @@
+"""Arguments of commands: values, help and messages."""
+
 from dataclasses import dataclass, field, make_dataclass
 from typing import Annotated, Literal
 

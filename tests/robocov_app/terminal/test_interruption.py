@@ -1,3 +1,5 @@
+"""Interruption of a command by signals."""
+
 import os
 import signal
 import threading

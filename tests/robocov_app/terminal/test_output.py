@@ -1,3 +1,5 @@
+"""Printed JSON and CSV: digits, infinity and formulas."""
+
 import csv
 import io
 import json

@@ -1,3 +1,5 @@
+"""Progress bars, and progress without a terminal."""
+
 import re
 from typing import Any
 

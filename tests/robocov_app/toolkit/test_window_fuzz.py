@@ -50,7 +50,7 @@ def play_editor(folder: Path, seed: int, n_events: int) -> ExceptionLog:
         random_events = RandomEvents(driver.window, folder / "odd", seed)
 
         def stay_open() -> None:
-            driver.window.documents.may_close = False
+            driver.window.file_commands.may_close = False
 
         random_events.play(n_events, stay_open)
         restore_window(driver)

@@ -1,3 +1,5 @@
+"""Costs of the displayed states, computed in another process."""
+
 from __future__ import annotations
 
 import os

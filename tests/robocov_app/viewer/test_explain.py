@@ -1,3 +1,5 @@
+"""Explanations of the motion of a robot."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -179,6 +179,8 @@ def test_an_edit_is_compared_with_the_displayed_state():
     session.set_controller(session.timeline.panes[0], LLOYD)
     advance_session(session, 20)
     session.show_time(0.1)
+    # The newest state has this speed already, but the displayed one does not, so this is an edit: it starts a
+    # branch at 0.1 s, before the controller was replaced.
     session.set_properties(RobotProperties(max_speed=0.5))
     assert session.timeline.is_live
     assert session.timeline.panes[0].setup.properties.max_speed == 0.5

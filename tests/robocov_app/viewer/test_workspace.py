@@ -132,12 +132,12 @@ def test_branches_are_entered_by_keys(tmp_path: Path) -> None:
         assert driver.session.displayed.numbers == (2, 3)
 
 
-def test_a_file_that_is_no_session_is_rejected(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_session_is_rejected(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
-    (tmp_path / "no.robocov").write_text("{}")
+    (tmp_path / "invalid.robocov").write_text("{}")
     session = viewer.session
     with pytest.raises(MapError, match="format: missing"):
-        viewer.files.open_session(tmp_path / "no.robocov")
+        viewer.files.open_session(tmp_path / "invalid.robocov")
     assert viewer.session is session
 
 

@@ -40,7 +40,7 @@ class Document:
     ----------
     sketch : Sketch
         Content of the map.
-    drafts : Path or None
+    draft_folder : Path or None
         Folder for drafts; None to save no drafts.
     path : Path, optional
         File of the map.
@@ -72,7 +72,7 @@ class Document:
     def __init__(
         self,
         sketch: Sketch,
-        drafts: Path | None,
+        draft_folder: Path | None,
         path: Path | None = None,
         version: FileVersion | None = None,
         *,
@@ -85,7 +85,7 @@ class Document:
         self.version = version
         self.stem = stem
         self.file_state: FileState = "same"
-        self.autosaver = autosave.Autosaver(drafts, KIND, path, resumed)
+        self.autosaver = autosave.Autosaver(draft_folder, KIND, path, resumed)
         self._checked_at = 0.0
         self._overwrites_changed_file = False
         self._drafted: Sketch | None = None
@@ -94,23 +94,23 @@ class Document:
         self.update_draft()
 
     @classmethod
-    def new(cls, drafts: Path | None, path: Path | None = None) -> Self:
+    def new(cls, draft_folder: Path | None, path: Path | None = None) -> Self:
         """Create a map that contains only the default boundary; its file need not exist yet."""
-        return cls(Sketch(boundary=DEFAULT_BOUNDARY), drafts, path)
+        return cls(Sketch(boundary=DEFAULT_BOUNDARY), draft_folder, path)
 
     @classmethod
-    def open_file(cls, path: Path, drafts: Path | None) -> Self:
+    def open_file(cls, path: Path, draft_folder: Path | None) -> Self:
         """Open a map file. A bundled map is opened as a copy without a file."""
         sketch, version = read_sketch(path)
         if is_bundled(path):
-            return cls(sketch, drafts, stem=path.stem)
-        return cls(sketch, drafts, path.resolve(), version)
+            return cls(sketch, draft_folder, stem=path.stem)
+        return cls(sketch, draft_folder, path.resolve(), version)
 
     @classmethod
-    def recover(cls, draft: MapDraft, drafts: Path | None) -> Self:
+    def recover(cls, draft: MapDraft, draft_folder: Path | None) -> Self:
         """Open the map of a draft, and continue to use the draft."""
         sketch = draft.read_sketch()
-        return cls(sketch, drafts, draft.path, draft.version, resumed=draft.folder, is_saved=False)
+        return cls(sketch, draft_folder, draft.path, draft.version, resumed=draft.folder, is_saved=False)
 
     @property
     def title(self) -> str:

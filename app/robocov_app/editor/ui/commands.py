@@ -97,7 +97,7 @@ class EditorCommandGroup(CommandGroup):
 
 
 def list_commands(
-    editor: Editor, canvas: EditorCanvas, documents: FileCommands, window: EditorWindowActions
+    editor: Editor, canvas: EditorCanvas, file_commands: FileCommands, window: EditorWindowActions
 ) -> list[Command]:
     """Return all commands that do not take a typed value.
 
@@ -107,13 +107,13 @@ def list_commands(
         The editor.
     canvas : EditorCanvas
         The view of the map.
-    documents : FileCommands
+    file_commands : FileCommands
         Commands on files.
     window : EditorWindowActions
         Actions of the window.
     """
     groups = (
-        _build_file_group(editor, documents, window),
+        _build_file_group(editor, file_commands, window),
         _build_edit_group(editor, window),
         _build_arrange_group(editor),
         _build_combine_group(editor),
@@ -130,30 +130,30 @@ def list_commands(
 
 
 def _build_file_group(
-    editor: Editor, documents: FileCommands, window: EditorWindowActions
+    editor: Editor, file_commands: FileCommands, window: EditorWindowActions
 ) -> EditorCommandGroup:
     """Build the group of commands on files, on the image under the map, and on the whole window."""
-    ask_map = partial(documents.ask_path, "Open a map", documents.open, OPEN_SUFFIXES)
+    ask_map = partial(file_commands.ask_path, "Open a map", file_commands.open, OPEN_SUFFIXES)
     ask_picture = partial(
-        documents.ask_path, "Image under the map", documents.open_background, PICTURE_SUFFIXES
+        file_commands.ask_path, "Image under the map", file_commands.open_background, PICTURE_SUFFIXES
     )
 
     def remove_picture() -> None:
         editor.apply(properties.set_background(editor.sketch, None))
 
     group = EditorCommandGroup("File", editor)
-    group.add("new", "New map", documents.new, "ctrl+n")
+    group.add("new", "New map", file_commands.new, "ctrl+n")
     group.add("open", "Open a map", ask_map, "ctrl+o")
-    group.add("recent", "Recent and bundled maps", documents.ask_recent, "ctrl+shift+o")
-    group.add("save", "Save", documents.save, "ctrl+s")
-    group.add("save:as", "Save as", documents.ask_name, "ctrl+shift+s")
-    group.add("export", "Export to another format", documents.ask_export, "ctrl+e")
+    group.add("recent", "Recent and bundled maps", file_commands.ask_recent, "ctrl+shift+o")
+    group.add("save", "Save", file_commands.save, "ctrl+s")
+    group.add("save:as", "Save as", file_commands.ask_name, "ctrl+shift+s")
+    group.add("export", "Export to another format", file_commands.ask_export, "ctrl+e")
     group.add("background", "Image under the map", ask_picture, "ctrl+b")
     group.add("background:none", "Remove the image under the map", remove_picture)
-    group.add("reload", "Reload the file", documents.reload, "ctrl+r")
+    group.add("reload", "Reload the file", file_commands.reload, "ctrl+r")
     group.add("try", "Try the map in the viewer", window.start_play_mode, "f5")
     group.add("screenshot", "Screenshot", window.save_screenshot, "f12")
-    group.add("quit", "Quit", documents.quit, "ctrl+q")
+    group.add("quit", "Quit", file_commands.quit, "ctrl+q")
     return group
 
 

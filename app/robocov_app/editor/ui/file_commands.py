@@ -52,7 +52,7 @@ class FileCommands:
     ----------
     editor : Editor
         The editor.
-    drafts : Path or None
+    draft_folder : Path or None
         Folder for drafts; None to save no drafts.
     fit : callable
         Fits the view to the whole map.
@@ -66,10 +66,10 @@ class FileCommands:
     """
 
     def __init__(
-        self, editor: Editor, drafts: Path | None, fit: Action, *, waits_for_workers: bool = False
+        self, editor: Editor, draft_folder: Path | None, fit: Action, *, waits_for_workers: bool = False
     ) -> None:
         self.editor = editor
-        self.drafts = drafts
+        self.draft_folder = draft_folder
         self.may_close = False
         self._fit = fit
         self._waits_for_workers = waits_for_workers
@@ -124,7 +124,7 @@ class FileCommands:
     def new(self) -> None:
         """Open a new map in place of the current one."""
         message = "new map, 10 m × 10 m. Use Boundary to redraw its outline"
-        self.close_document_then(lambda: self._show(Document.new(self.drafts), message))
+        self.close_document_then(lambda: self._show(Document.new(self.draft_folder), message))
 
     def ask_path(
         self, title: str, action: Callable[[Path], object], suffixes: Sequence[str], text: str = ""
@@ -180,9 +180,9 @@ class FileCommands:
             self.reload()
             return
         self._close_document_to_open()
-        if is_open_elsewhere(self.drafts, path=path):
+        if is_open_elsewhere(self.draft_folder, path=path):
             raise MapError(f"{path.name}: another editor has it open")
-        result = open_or_detect(path, self.drafts)
+        result = open_or_detect(path, self.draft_folder)
         if isinstance(result, Document):
             self._open_when_closed(result, describe_opening(result))
         else:
@@ -197,7 +197,7 @@ class FileCommands:
         def accept(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
             self._close_document_to_open()
-            document = Document(sketch, self.drafts, is_saved=False, stem=path.stem)
+            document = Document(sketch, self.draft_folder, is_saved=False, stem=path.stem)
             self._open_when_closed(document, f"imported: {path.name}, not saved yet")
 
         self.editor.dialogs.ask(ImportDialog(path, importer, self._create_import_worker(), accept))
@@ -212,7 +212,7 @@ class FileCommands:
     def recover(self, draft: MapDraft) -> None:
         """Open the map of a draft that another editor left behind."""
         message = f"recovered: {draft.describe()}"
-        self.close_document_then(lambda: self._show(Document.recover(draft, self.drafts), message))
+        self.close_document_then(lambda: self._show(Document.recover(draft, self.draft_folder), message))
 
     def remember(self, path: Path) -> None:
         """Move a path to the top of the recent maps."""
@@ -366,14 +366,14 @@ def _describe_picture_path(path: Path, map_path: Path | None) -> str:
     return path.as_posix()
 
 
-def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
+def open_or_detect(path: Path, draft_folder: Path | None) -> Document | Importer:
     """Open a map, or detect the format of another file.
 
     Parameters
     ----------
     path : Path
         Path of a map, of a file in another format, or of a new map.
-    drafts : Path or None
+    draft_folder : Path or None
         Folder for drafts; None to save no drafts.
 
     Returns
@@ -389,9 +389,9 @@ def open_or_detect(path: Path, drafts: Path | None) -> Document | Importer:
     require_regular_file(path)
     has_map_suffix = path.suffix.lower() == SUFFIX
     if has_map_suffix and not path.exists():
-        return Document.new(drafts, path)
+        return Document.new(draft_folder, path)
     try:
-        return Document.open_file(path, drafts)
+        return Document.open_file(path, draft_folder)
     except MapError as error:
         map_error = error
     if not path.is_file() or (has_map_suffix and _is_map(path)):

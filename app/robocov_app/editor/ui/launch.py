@@ -105,12 +105,12 @@ class EditorLauncher:
             editor.show_message(settings_message or self._describe_opening(opened))
             window = self._open_window(editor, settings)
             if not isinstance(opened, Document) and self.path is not None:
-                window.documents.ask_import(self.path, opened)
+                window.file_commands.ask_import(self.path, opened)
             is_discarded = False
             try:
                 with save_changed_settings(settings, file, partial(read_settings, window)):
                     yield window
-                is_discarded = window.documents.may_close
+                is_discarded = window.file_commands.may_close
             finally:
                 window.close()
                 # Unsaved changes are kept as a draft, unless the user has decided to save or discard them.
@@ -131,12 +131,12 @@ class EditorLauncher:
 
     def _read_file(self) -> Document | Importer:
         """Open the document to edit, or return the importer for a file in another format."""
-        drafts = self._draft_folder
+        draft_folder = self._draft_folder
         if self.path is None:
-            return Document.new(drafts)
-        if is_open_elsewhere(drafts, path=self.path):
+            return Document.new(draft_folder)
+        if is_open_elsewhere(draft_folder, path=self.path):
             raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
-        return open_or_detect(self.path, drafts)
+        return open_or_detect(self.path, draft_folder)
 
     def _describe_opening(self, opened: Document | Importer) -> str:
         if self.path is not None and isinstance(opened, Document):
@@ -152,18 +152,18 @@ class EditorLauncher:
 
     def _open_window(self, editor: Editor, settings: EditorSettings) -> EditorWindow:
         """Open the window of an editor, and offer to recover drafts."""
-        drafts = self._draft_folder
+        draft_folder = self._draft_folder
         scale = choose_scale(self.scale or settings.scale, has_display=self._has_display)
         size = self._choose_size(settings)
-        window = EditorWindow(editor, size, scale, drafts, waits_for_workers=self.headless)
-        window.guard.log = ExceptionLog(drafts)
+        window = EditorWindow(editor, size, scale, draft_folder, waits_for_workers=self.headless)
+        window.guard.log = ExceptionLog(draft_folder)
         window.guard.is_enabled = not self.headless
         window.panel.show_tab(settings.tab)
         if not self.served:  # In a browser, the page chooses the scale.
             self._report_scale(window)
         if editor.document.path is not None:
-            window.documents.remember(editor.document.path)
-        offer_recovery(window, find_recoverable(drafts))
+            window.file_commands.remember(editor.document.path)
+        offer_recovery(window, find_recoverable(draft_folder))
         return window
 
     def _report_scale(self, window: EditorWindow) -> None:
@@ -198,7 +198,7 @@ def offer_recovery(window: EditorWindow, drafts: Sequence[MapDraft]) -> None:
     question = create_recovery_question(
         f"An editor was closed without saving: {draft.describe()}.",
         other_count=len(others),
-        recover=partial(editor.attempt, partial(window.documents.recover, draft)),
+        recover=partial(editor.attempt, partial(window.file_commands.recover, draft)),
         discard=partial(editor.attempt, discard),
         postpone=lambda: None,
     )

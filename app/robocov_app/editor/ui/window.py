@@ -86,16 +86,18 @@ class EditorWindow(CommandWindow):
         Width and height, px.
     scale : float or None
         Size of text and widgets; None for one that suits the size of the window.
-    drafts : Path or None
+    draft_folder : Path or None
         Folder for drafts; None to save no drafts.
     waits_for_workers : bool
         Whether to wait for everything instead of computing in the background.
 
     Attributes
     ----------
+    editor : Editor
+        The editor.
     canvas : EditorCanvas
         The view of the map.
-    documents : FileCommands
+    file_commands : FileCommands
         Commands on files.
     commands : CommandTable
         All commands.
@@ -113,6 +115,8 @@ class EditorWindow(CommandWindow):
         Shows the team at a start.
     field_focus : FieldFocus
         Puts the text cursor into fields of the panel.
+    map_pictures : MapPictures
+        Draws the map for the pages of phones.
     """
 
     groups = GROUPS
@@ -128,7 +132,7 @@ class EditorWindow(CommandWindow):
         editor: Editor,
         size: tuple[int, int],
         scale: float | None,
-        drafts: Path | None,
+        draft_folder: Path | None,
         *,
         waits_for_workers: bool = False,
     ) -> None:
@@ -136,8 +140,10 @@ class EditorWindow(CommandWindow):
         self.editor = editor
         self.play_mode = PlayMode(editor, self, self._arrange, waits_for_workers=waits_for_workers)
         self.canvas = EditorCanvas(editor)
-        self.documents = FileCommands(editor, drafts, self.canvas.fit, waits_for_workers=waits_for_workers)
-        commands = list_commands(editor, self.canvas, self.documents, self._build_actions())
+        self.file_commands = FileCommands(
+            editor, draft_folder, self.canvas.fit, waits_for_workers=waits_for_workers
+        )
+        commands = list_commands(editor, self.canvas, self.file_commands, self._build_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
         self.panel = EditorPanel(editor, self.commands, self.do, self._show_problem)
         self.top_bar = EditorTopBar(editor, self.commands, self.do)
@@ -155,6 +161,7 @@ class EditorWindow(CommandWindow):
 
     def _build_actions(self) -> EditorWindowActions:
         """Build the actions of the window for the commands that run them."""
+        # Lambdas, because the panel, the pointer and the field focus are created after the commands.
         return EditorWindowActions(
             start_play_mode=self.play_mode.start,
             save_screenshot=lambda: self.display.save_screenshot(self.editor.folder),
@@ -265,18 +272,18 @@ class EditorWindow(CommandWindow):
         if self.play_mode.window is not None:
             self.play_mode.update(seconds)
             return
-        if self.documents.may_close:
+        if self.file_commands.may_close:
             self.closed = True
             return
         editor = self.editor
         editor.pass_time(seconds)
         if not self.pointer.is_busy:
-            self.documents.poll()
+            self.file_commands.poll()
             self.team_preview.update()
         if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
         editor.show_message(editor.document.autosaver.problem, is_error=True)
-        if self.documents.may_close:
+        if self.file_commands.may_close:
             self.closed = True
             return
         self._arrange()
@@ -373,7 +380,7 @@ class EditorWindow(CommandWindow):
 
     def open_file(self, path: Path) -> None:
         """Open or import a file that was dropped on the window."""
-        self.documents.open(path)
+        self.file_commands.open(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
         """Use a key for a text field or for the value typed for the tool; return whether it was used."""

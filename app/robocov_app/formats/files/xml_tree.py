@@ -24,7 +24,10 @@ MAX_NESTING = 100
 """Deepest nesting of elements and of ``use`` references; drawing programs stay below 30."""
 _SVG_NAMESPACE = "http://www.w3.org/2000/svg"
 _MAX_EXPANDED_CHARACTERS = 1_000_000
-"""Number of characters that entities and default attributes may add. Most are names of namespaces."""
+"""Number of characters that entities and default attributes may add.
+
+Drawing programs use entities mainly for the names of namespaces.
+"""
 _MAX_NAMESPACE_CHARACTERS = 1000
 _MAX_DECLARATIONS = 1000
 
@@ -88,7 +91,7 @@ class Element:
             If the attribute is missing, has the wrong count of numbers, or a number is out of range.
         """
         text = self.attributes.get(name, default)
-        expected = f"expected {_describe_count(count)} within 1e7"
+        expected = f"expected {_describe_count(count)} from -1e7 to 1e7"
         if text is None:
             self.raise_error(f"{name}: missing, {expected}")
         values = np.array([parse_number(word) for word in text.replace(",", " ").split()])
@@ -126,8 +129,8 @@ def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] =
     Raises
     ------
     MapError
-        If the file is not XML, has another root or is too large, or if its entities refer to other files, to
-        other entities or to too much text.
+        If the file is not XML, has another root or is too large, or if its entities refer to other files or
+        entities, or expand to too much text.
     """
     source_name = to_one_line(path)
     content = read_content(path, MAX_TEXT_BYTES)
@@ -136,72 +139,77 @@ def read_xml_tree(path: Path, root: str, kind: str, text_tags: Collection[str] =
         raise MapError(f"{source_name}: expected plain {kind}, got {actual}")
     if content.count(b"=") > MAX_ATTRIBUTES:
         raise MapError(f"{source_name}: expected at most {MAX_ATTRIBUTES} attributes, got more")
-    reader = _Reader(source_name, content, kind, text_tags)
+    builder = _TreeBuilder(source_name, content, kind, text_tags)
     try:
-        reader.parser.Parse(content, True)
+        builder.parser.Parse(content, True)
     except expat.ExpatError as error:
         reason = to_one_line(expat.ErrorString(error.code))[:60]
         raise MapError(f"{source_name}:{error.lineno}: not XML: {reason}") from None
     except (ValueError, LookupError) as error:
         raise MapError(f"{source_name}: not XML: {to_one_line(error)[:60]}") from None
-    first = reader.first
-    if first is None or first.tag != root:
-        actual = "other XML" if first is None else f"<{first.tag}>"
+    root_element = builder.root
+    if root_element is None or root_element.tag != root:
+        actual = "other XML" if root_element is None else f"<{root_element.tag}>"
         raise MapError(f"{source_name}: expected <{root}>, got {actual}")
-    return first
+    return root_element
 
 
-class _Reader:
-    """Handlers for expat that build the tree of elements."""
+class _TreeBuilder:
+    """Builds the tree of elements from the events of expat, and rejects what expands without limit."""
 
     def __init__(self, source_name: str, content: bytes, kind: str, text_tags: Collection[str]) -> None:
         """Prepare a parser for `content`, which must be passed to `parser.Parse`."""
         self.source_name = source_name
         self.kind = kind
         self.text_tags = text_tags
+        # Limits that depend on the file: entities may be inserted at each reference.
         self.reference_count = content.count(b"&")
         self.remaining_characters = len(content) + _MAX_EXPANDED_CHARACTERS
         self.parser = expat.ParserCreate(namespace_separator=" ")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start_element
-        self.parser.EndElementHandler = lambda name: self.open.pop()
+        self.parser.EndElementHandler = lambda name: self.open_elements.pop()
         self.parser.CharacterDataHandler = self._add_text
         self.parser.EntityDeclHandler = self._check_entity
         self.parser.AttlistDeclHandler = self._count_declaration
         self.parser.StartNamespaceDeclHandler = self._check_namespace
-        self.open: list[Element | None] = []
-        self.first: Element | None = None
+        self.open_elements: list[Element | None] = []
+        self.root: Element | None = None
         self.element_count = 0
         self.declaration_count = 0
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
-        """Add an element to its parent; None in `open` stands for an element of a foreign namespace."""
+        """Add an element to its parent.
+
+        Elements of foreign namespaces, and all elements in them, are left out: they are None in
+        `open_elements`.
+        """
         self.element_count += 1
         line = self.parser.CurrentLineNumber
         if self.element_count > MAX_ELEMENTS:
             raise MapError(f"{self.source_name}:{line}: expected at most {MAX_ELEMENTS} elements, got more")
-        if len(self.open) >= MAX_NESTING:
+        if len(self.open_elements) >= MAX_NESTING:
             raise MapError(f"{self.source_name}:{line}: elements are nested deeper than {MAX_NESTING}")
         # Expat puts a blank between the namespace and the name.
         namespace, _, tag = name.rpartition(" ")
         plain_attributes = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
         self._count_characters(sum(map(len, plain_attributes)))
         self._count_characters(sum(map(len, plain_attributes.values())))
-        parent = self.open[-1] if self.open else None
-        is_in_foreign_element = bool(self.open) and parent is None
+        parent = self.open_elements[-1] if self.open_elements else None
+        is_in_foreign_element = bool(self.open_elements) and parent is None
         if namespace not in ("", _SVG_NAMESPACE) or is_in_foreign_element:
-            self.open.append(None)
+            self.open_elements.append(None)
             return
         element = Element(tag, plain_attributes, self.source_name, line)
         if parent is None:
-            self.first = element
+            self.root = element
         else:
             parent.children.append(element)
-        self.open.append(element)
+        self.open_elements.append(element)
 
     def _add_text(self, text: str) -> None:
         self._count_characters(len(text))
-        element = self.open[-1]
+        element = self.open_elements[-1]
         if element is not None and element.tag in self.text_tags:
             element.text_pieces.append(text)
 
@@ -211,12 +219,21 @@ class _Reader:
         if self.remaining_characters < 0:
             self._raise_error("entities that expand to too much text")
 
-    def _check_entity(self, name: str, is_parameter: bool, value: str | None, *rest: object) -> None:
+    def _check_entity(
+        self,
+        name: str,
+        is_parameter: bool,
+        value: str | None,
+        base: str | None,
+        system_id: str | None,
+        public_id: str | None,
+        notation: str | None,
+    ) -> None:
         """Check a declared entity: it may be short text, which expat inserts at every reference."""
         self._count_declaration()
         entity = f"an entity {quote(name)}"
         if value is None:
-            self._raise_error(f"{entity} that refers to another file ({quote(rest[1])})")
+            self._raise_error(f"{entity} that refers to another file ({quote(system_id)})")
         if is_parameter or "&" in value or "%" in value:
             self._raise_error(f"{entity} that refers to other entities")
         if len(value) * self.reference_count > _MAX_EXPANDED_CHARACTERS:

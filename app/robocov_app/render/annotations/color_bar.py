@@ -1,4 +1,4 @@
-"""The color scale of the distance map, at the right of the picture."""
+"""The color scale of the distance map, at the right edge of the view."""
 
 import numpy as np
 import pygame
@@ -22,7 +22,8 @@ _TOLERANCE = 1e-9
 
 
 def draw_color_bar(canvas: Canvas, scene: Scene) -> None:
-    """Draw the color scale of the distance map, with labeled ticks, at the right of the view."""
+    """Draw the color scale of the distance map, with labeled ticks, at the right edge of the view."""
+    # The painter calls this only if the layer `color_bar` is visible and the scene has a field.
     if "distances" not in canvas.visible_layers:
         return
     theme = canvas.theme
@@ -59,6 +60,7 @@ def measure_color_bar(canvas: Canvas, scene: Scene) -> float:
         return 0.0
     texts = [text for _, text in _list_labels(scene)]
     label_width = max(canvas.measure_text(text, canvas.theme.small_text) for text in texts)
+    # Gaps to the left of the colors, between colors and labels, and to the right of the labels.
     return (_WIDTH_PX + 3.0 * _GAP_PX) * canvas.scale + label_width
 
 

@@ -41,9 +41,9 @@ _CROSS_SIZE_FACTOR = 1.1
 """Half the size of the cross on a failed robot, as a fraction of its radius."""
 _CROSS_WIDTH_PX = 1.7
 _MAX_CROSS_WIDTH_FRACTION = 0.35
-_SELECTION_GAP_PX = 4.0
+SELECTION_GAP_PX = 4.0
 """Space between the selected robot and its ring."""
-_SELECTION_WIDTH_PX = 2.2
+SELECTION_WIDTH_PX = 2.2
 _BELIEVED_CELL_WIDTH_FACTOR = 1.6
 """Width of the outline of the believed cell, compared with other lines."""
 _BELIEF_INK_FRACTION = 0.2
@@ -307,8 +307,8 @@ def draw_selection(canvas: Canvas, scene: Scene) -> None:
         _draw_believed_cell(canvas, scene, robot)
         _draw_believed_positions(canvas, scene, robot, positions)
     radii = compute_drawn_radii(canvas, scene)
-    ring_radius = radii[robot] + _SELECTION_GAP_PX * canvas.scale
-    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, _SELECTION_WIDTH_PX * canvas.scale)
+    ring_radius = radii[robot] + SELECTION_GAP_PX * canvas.scale
+    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, SELECTION_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, positions[robot])
     inner_radii = radii - _choose_ring_widths(canvas, radii)
     has_number_inside = _choose_numbers(canvas, scene, inner_radii)[robot] > 0

@@ -195,7 +195,8 @@ def _estimate_ratio(runs: Sequence[ReportedRun], ratios: FloatArray) -> Interval
 def _estimate_ratio_over_maps(log_ratios: Sequence[float]) -> Interval:
     """Estimate the geometric mean of the ratios on several maps.
 
-    Few maps have no interval: it would be misleadingly narrow if they happen to agree.
+    With fewer than `MIN_BOOTSTRAP_MAPS` maps there is no interval: it would be misleadingly narrow if they
+    happened to agree.
     """
     if len(log_ratios) < MIN_BOOTSTRAP_MAPS:
         return _exponentiate(Interval(float(np.mean(log_ratios)), float("nan"), float("nan")))
@@ -203,7 +204,8 @@ def _estimate_ratio_over_maps(log_ratios: Sequence[float]) -> Interval:
 
 
 def _exponentiate(effect: Interval) -> Interval:
-    """Convert an interval of log_ratios to an interval of ratios."""
+    """Convert an interval of log ratios to an interval of ratios."""
+    # A limit may be infinite.
     with np.errstate(over="ignore"):
         estimate, low, high = np.exp([effect.estimate, effect.low, effect.high]).tolist()
     return Interval(estimate, low, high)

@@ -24,8 +24,9 @@ _GAP_TO_WIDGET_PX = 5.0
 _TOP_MARGIN_PX = 5.0
 """Distance of the text from the top of the box, and of a drawing from the text."""
 _CORNER_RADIUS_PX = 4.0
-_MARGIN_PX = 7.0
-_HEIGHT_PX = 9.0
+_SIDE_MARGIN_PX = 7.0
+"""Distance of the content from the left and right edges of the box."""
+_EXTRA_HEIGHT_PX = 9.0
 """Height of the box in addition to that of its content."""
 _FILL_STRENGTH = 0.2
 """Fraction of the color of text in the background of tooltips, with the dark theme."""
@@ -129,20 +130,20 @@ def draw_tool_tip(
     gap = round(_GAP_TO_WIDGET_PX * scale)
     top_margin = round(_TOP_MARGIN_PX * scale)
     lines = _list_lines(text, text_size, round(_MAX_WIDTH_PX * scale))
-    width = max(measure_text(line.text, text_size, line.is_title) for line in lines)
+    width = max(measure_text(line.text, text_size, bold=line.is_title) for line in lines)
     height = line_height * len(lines)
     image: Surface | None = None
     if drawing is not None:
         image = drawing(scale)
         width = max(width, image.get_width())
         height += top_margin + image.get_height()
-    box_size = (width + round(2 * _MARGIN_PX * scale), height + round(_HEIGHT_PX * scale))
+    box_size = (width + round(2 * _SIDE_MARGIN_PX * scale), height + round(_EXTRA_HEIGHT_PX * scale))
     box = _place_box(box_size, widget, page, side, gap=gap, window=screen.get_rect())
     _draw_box(screen, box, theme, scale)
-    left = box.left + round(_MARGIN_PX * scale)
+    left = box.left + round(_SIDE_MARGIN_PX * scale)
     top = box.top + top_margin
     for line in lines:
-        screen.blit(render_text(line.text, text_size, TIP_TEXT_COLOR, line.is_title), (left, top))
+        screen.blit(render_text(line.text, text_size, TIP_TEXT_COLOR, bold=line.is_title), (left, top))
         top += line_height
     if image is not None:
         screen.blit(image, (left, top + top_margin), special_flags=BLEND_PREMULTIPLIED)
@@ -186,5 +187,5 @@ def _list_lines(text: str, text_size: int, width: float) -> list[_Line]:
     lines = []
     for number, paragraph in enumerate(paragraphs):
         is_title = number == 0 and len(paragraphs) > 1
-        lines += [_Line(line, is_title) for line in wrap_text(paragraph, text_size, width, is_title)]
+        lines += [_Line(line, is_title) for line in wrap_text(paragraph, text_size, width, bold=is_title)]
     return lines

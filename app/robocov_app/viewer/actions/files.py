@@ -208,22 +208,24 @@ class FileActions:
             self._viewer.show_message(f"map opened: {path}")
 
     def open_session(self, path: Path) -> None:
-        """Open a session file in place of the current session."""
+        """Open a session file in place of the current session.
+
+        Raises
+        ------
+        MapError
+            If the file cannot be read.
+        """
         saved = load_session(path, self._viewer.controllers)
-        seconds = self._viewer.session.playback.seek_seconds
-        workspace = SessionWorkspace(Session.open(saved, seconds), self.draft_folder, path)
+        seek_seconds = self._viewer.session.playback.seek_seconds
+        workspace = SessionWorkspace(Session.open(saved, seek_seconds), self.draft_folder, path)
         keeps_draft = self._replace_workspace(workspace, saved.view)
         self._add_recent(path)
-        hints: list[str] = []
+        hint = explain_pause(self._viewer.view)
         if saved.lesson is not None:
-            hints.append(explain_lesson_start(self._viewer.view))
-        else:
-            hints.append(explain_pause(self._viewer.view))
+            hint = explain_lesson_start(self._viewer.view)
+        message = f"session opened: {path}. {hint}"
         if keeps_draft:
-            hints.append(explain_kept_session(self._viewer.view))
-        message = f"session opened: {path}"
-        if hints:
-            message += f". {' '.join(hints)}"
+            message += f" {explain_kept_session(self._viewer.view)}"
         self._viewer.show_message(message)
 
     def recover(self, draft: Draft | None = None) -> str:
@@ -233,8 +235,8 @@ class FileActions:
             if not drafts:
                 return "no unsaved work was found"
             draft = drafts[0]
-        seconds = self._viewer.session.playback.seek_seconds
-        workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seconds)
+        seek_seconds = self._viewer.session.playback.seek_seconds
+        workspace, view = recover_draft(draft, self._viewer.controllers, self.draft_folder, seek_seconds)
         keeps_draft = self._replace_workspace(workspace, view)
         description = describe_draft(draft)
         recovered = f"recovered: {description[0].lower()}{description[1:]}"
@@ -254,7 +256,7 @@ class FileActions:
         Returns
         -------
         bool
-            Whether the session before it can be recovered from a draft, because it has unsaved edits.
+            Whether the previous session can be recovered from a draft, because it has unsaved edits.
         """
         self.before_opening()
         self.workspace.save_draft(self.view, at_once=True)

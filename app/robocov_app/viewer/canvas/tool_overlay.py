@@ -12,7 +12,7 @@ from robocov.typing import FloatArray
 from robocov_app.look.colors import Color, mix
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.layers.robots import compute_drawn_radii
+from robocov_app.render.layers.robots import SELECTION_GAP_PX, SELECTION_WIDTH_PX, compute_drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.toolkit.overlay import draw_tag
 from robocov_app.viewer.session.past.states import Drag
@@ -22,13 +22,11 @@ from robocov_app.viewer.tools.tool import ViewerToolOverlay
 FAILED_RADIUS_PX = 9.0  # a click within it selects a failed robot, even if the robot is drawn smaller
 _MARK_PX = 3.0  # half the side of the mark of a point
 _HANDLE_PX = 4.0  # half the side of a handle
-_LINE_PX = 1.5
-_SELECTED_LINE_PX = 2.5  # outline of the selected obstacle
-_CLOSING_LINE_PX = 1.0  # from the last point of an outline to its first one
+_LINE_WIDTH_PX = 1.5
+_SELECTED_LINE_WIDTH_PX = 2.5  # outline of the selected obstacle
+_CLOSING_LINE_WIDTH_PX = 1.0  # from the last point of an outline to its first one
 _DRAG_DASH_PX = 3.0
-_SELECTION_RING_PX = 2.2
-_SELECTION_GAP_PX = 4.0  # between a robot and the ring around it
-_HOVER_RING_PX = 1.2
+_HOVER_RING_WIDTH_PX = 1.2
 _HOVER_GAP_PX = 3.5
 _LABEL_OFFSET_PX = (12.0, -14.0)  # of a label from its point
 
@@ -45,7 +43,9 @@ def draw_drag(canvas: Canvas, scene: Scene, drag: Drag | None) -> None:
         return
     position = scene.now.positions[numbers.index(drag.robot)]
     start, end = canvas.camera.to_pixels(np.array([position, drag.target])).tolist()
-    canvas.draw_dashed_line(start, end, canvas.theme.ink, canvas.scale_width(_LINE_PX), dash=_DRAG_DASH_PX)
+    canvas.draw_dashed_line(
+        start, end, canvas.theme.ink, canvas.scale_width(_LINE_WIDTH_PX), dash=_DRAG_DASH_PX
+    )
 
 
 def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) -> None:
@@ -54,8 +54,8 @@ def draw_failed_selection(canvas: Canvas, scene: Scene, selected: int | None) ->
         return
     radius = scene.get_failed_radius(selected) * canvas.camera.zoom
     radius = max(radius, FAILED_RADIUS_PX * canvas.scale)
-    ring_radius = round(radius) + _SELECTION_GAP_PX * canvas.scale
-    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, _SELECTION_RING_PX * canvas.scale)
+    ring_radius = round(radius) + SELECTION_GAP_PX * canvas.scale
+    ring = partial(sprites.render_ring, ring_radius, canvas.theme.ink, SELECTION_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, canvas.camera.to_pixels(np.array(scene.failed[selected])).tolist())
 
 
@@ -70,7 +70,7 @@ def draw_hovered_robot(canvas: Canvas, scene: Scene, number: int) -> None:
         return
     radius = compute_drawn_radii(canvas, scene)[row] + _HOVER_GAP_PX * canvas.scale
     center = canvas.camera.to_pixels(scene.now.positions[row]).tolist()
-    ring = partial(sprites.render_ring, radius, canvas.theme.ink, _HOVER_RING_PX * canvas.scale)
+    ring = partial(sprites.render_ring, radius, canvas.theme.ink, _HOVER_RING_WIDTH_PX * canvas.scale)
     canvas.draw_sprite(ring, center)
 
 
@@ -78,9 +78,9 @@ def draw_tool_overlay(canvas: Canvas, overlay: ViewerToolOverlay) -> None:
     """Draw the overlay of a tool in a pane."""
     if overlay.hovered is not None:
         color = mix(canvas.theme.background, canvas.theme.accent, _HOVER_STRENGTH)
-        _draw_obstacle_outline(canvas, overlay.hovered, color, _LINE_PX)
+        _draw_obstacle_outline(canvas, overlay.hovered, color, _LINE_WIDTH_PX)
     for obstacle in overlay.selected:
-        _draw_obstacle_outline(canvas, obstacle, canvas.theme.accent, _SELECTED_LINE_PX)
+        _draw_obstacle_outline(canvas, obstacle, canvas.theme.accent, _SELECTED_LINE_WIDTH_PX)
     for obstacle in overlay.obstacles:
         _draw_obstacle(canvas, obstacle)
     if overlay.handles:
@@ -109,7 +109,7 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle) -> None:
         page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
         pygame.draw.polygon(page, (*fill, _OBSTACLE_ALPHA), ring)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(_LINE_PX))
+        canvas.draw_outline(corners, canvas.theme.accent, canvas.scale_width(_LINE_WIDTH_PX))
 
 
 def _draw_obstacle_outline(canvas: Canvas, obstacle: Obstacle, color: Color, width: float) -> None:
@@ -123,10 +123,13 @@ def _draw_obstacle_outline(canvas: Canvas, obstacle: Obstacle, color: Color, wid
 def _draw_line(canvas: Canvas, points: FloatArray, *, is_closed: bool) -> None:
     if len(points) < 2:
         return
-    canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(_LINE_PX), is_closed=False)
+    canvas.draw_outline(points, canvas.theme.accent, canvas.scale_width(_LINE_WIDTH_PX), is_closed=False)
     if is_closed:
         canvas.draw_dashed_line(
-            points[-1].tolist(), points[0].tolist(), canvas.theme.accent, canvas.scale_width(_CLOSING_LINE_PX)
+            points[-1].tolist(),
+            points[0].tolist(),
+            canvas.theme.accent,
+            canvas.scale_width(_CLOSING_LINE_WIDTH_PX),
         )
 
 
@@ -135,7 +138,7 @@ def _draw_box(canvas: Canvas, corners: FloatArray) -> None:
     (left, top), (right, bottom) = corners.tolist()
     outline = [(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]
     for start, end in pairwise(outline):
-        canvas.draw_dashed_line(start, end, canvas.theme.accent, canvas.scale_width(_LINE_PX))
+        canvas.draw_dashed_line(start, end, canvas.theme.accent, canvas.scale_width(_LINE_WIDTH_PX))
 
 
 def _draw_marks(canvas: Canvas, points: FloatArray, half_size: float) -> None:
@@ -144,4 +147,4 @@ def _draw_marks(canvas: Canvas, points: FloatArray, half_size: float) -> None:
     for x, y in points.tolist():
         box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
         pygame.draw.rect(canvas.surface, canvas.theme.background, box)
-        pygame.draw.rect(canvas.surface, canvas.theme.accent, box, canvas.scale_width(_LINE_PX))
+        pygame.draw.rect(canvas.surface, canvas.theme.accent, box, canvas.scale_width(_LINE_WIDTH_PX))

@@ -224,7 +224,9 @@ class ViewerPanel(CommandPanel):
     def _show_controller(
         self, ui: Ui, pane: int, labels: Mapping[str, str], label: str, style: CurveStyle
     ) -> None:
-        """Show the row of a pane: a sample of its curve, the menu of controllers, a button to remove it.
+        """Show the row of a pane: a sample of its curve, and the menu of controllers.
+
+        With several panes, it also has a mark for the active pane, and a button that removes the pane.
 
         Parameters
         ----------
@@ -253,6 +255,7 @@ class ViewerPanel(CommandPanel):
         if chosen is not None:
             viewer.attempt(partial(viewer.comparison.set_controller, pane, names[chosen]))
         if not is_single and ui.icon_button("close", "Remove", key=f"close:{pane}", tip="Remove this pane"):
+            # The command removes the active pane.
             viewer.inspection.active_pane = pane
             self._run_command("pane:remove")
 

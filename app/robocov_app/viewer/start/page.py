@@ -239,10 +239,11 @@ class StartPage(BaseWindow):
     # Frames
 
     def update(self, seconds: float) -> None:
-        """Advance the examples; close the page once the viewer can open the user's choice."""
+        """Advance the time of the page; close it once something is chosen and the viewer can be opened."""
         self.model.pass_time(seconds)
         if self.choice is not None and self._can_open_viewer():
             self.closed = True
+        # In every frame, because the size of the window or the theme may have changed.
         self._arrange()
 
     def build_frame_key(self) -> object:

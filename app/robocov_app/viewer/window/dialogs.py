@@ -26,13 +26,11 @@ def build_file_dialog(viewer: Presenter) -> Choice:
     """Return the dialog that opens a session or a map."""
     files = viewer.files
     recent = [Path(name) for name in files.recent if Path(name).exists()]
-    endings = (SUFFIX, ".json")
-    title = "Open a session or a map"
     return create_file_choice(
-        title,
+        "Open a session or a map",
         files.folder,
         files.open_file,
-        suffixes=endings,
+        suffixes=(SUFFIX, ".json"),
         recent=recent,
         hides_folder=viewer.hidden_folder is not None,
     )

@@ -1,3 +1,5 @@
+"""The atlas controller: shared maps, narrow gaps, rest, and reproducible runs."""
+
 from __future__ import annotations
 
 import math
@@ -353,7 +355,7 @@ def test_the_latest_report_about_a_robot_counts() -> None:
 def test_only_with_shared_maps_a_robot_reports_others_to_its_neighbors(
     kind: type[Atlas], expected: list[int]
 ) -> None:
-    """Robot 2, in the middle, hears robots 1 and 3, which do not hear each other."""
+    """Robot 2, in the middle, is in range of robots 1 and 3, which are out of range of each other."""
     team = Team.homogeneous(3, communication_range=5.0)
     simulation = Simulation(HALL, kind(), [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]], team)
     run_until(simulation, 2.5)

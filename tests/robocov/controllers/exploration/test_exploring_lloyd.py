@@ -1,3 +1,5 @@
+"""Lloyd's algorithm with an unknown density: measured squares, viewpoints and messages."""
+
 from __future__ import annotations
 
 from typing import ClassVar
@@ -47,7 +49,7 @@ class SensedDensity(Density):
 
 
 def build_observations(positions: FloatArray, density: Density | None, time: float = 0.0) -> Observations:
-    """Return the observations of robots that do not hear each other."""
+    """Return the observations of robots out of communication range of each other."""
     n = len(positions)
     neighbors = Neighbors.from_ranges(positions, np.zeros(n))
     no_obstacles = np.full((n, 2), np.nan)
@@ -147,8 +149,8 @@ def test_a_known_uniform_density_needs_no_measurements_and_no_messages() -> None
     assert (memory.viewpoints == -1).all()
 
 
-def test_robots_know_in_time_of_others_that_they_have_never_heard() -> None:
-    """Three robots in a row: the outer ones hear only the middle one, which reports them."""
+def test_robots_know_in_time_of_others_that_were_never_in_range() -> None:
+    """Three robots in a row: the outer ones are in range only of the middle one, which reports them."""
     starts = np.array([[2.0, 10.0], [7.0, 10.0], [12.0, 10.0]])
     team = Team.homogeneous(3, communication_range=6.0)
     simulation = Simulation(SQUARE, ExploringLloyd(), starts, team)
@@ -195,7 +197,7 @@ def test_nearby_squares_are_counted_in_a_box() -> None:
         assert counts[square] == np.count_nonzero(is_counted & (offsets < 2.5))
 
 
-def test_messages_about_the_team_do_not_depend_on_unheard_robots() -> None:
+def test_messages_about_the_team_do_not_depend_on_robots_out_of_range() -> None:
     """A robot without neighbors decides the same, wherever the others are."""
     controller = ExploringLloyd()
     memory = controller.begin(SQUARE.region, Team.homogeneous(2, sensing_range=2.0))

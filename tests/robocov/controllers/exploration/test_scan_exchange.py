@@ -97,7 +97,7 @@ def test_lost_messages_are_repaired() -> None:
 
 
 def test_scans_travel_over_several_hops() -> None:
-    """Robots 1 and 3 are out of range of each other; robot 2 hears both of them."""
+    """Robots 1 and 3 are out of range of each other; robot 2 is in range of both."""
     starts = [[2.0, 1.5], [6.0, 1.5], [10.0, 1.5]]
     team = Team.homogeneous(3, communication_range=5.0, sensing_range=2.0)
     simulation = Simulation(HALL, make_controller("greedy-submodular"), starts, team, dt=0.05)
@@ -255,7 +255,7 @@ def test_controllers_exchange_scans(name: str) -> None:
 
 
 def test_reports_are_sent_if_a_neighbor_does_not_hear_all_others() -> None:
-    """Robot 2, in the middle, hears robots 1 and 3, which do not hear each other."""
+    """Robot 2, in the middle, is in range of robots 1 and 3, which are out of range of each other."""
     team = Team.homogeneous(3, communication_range=5.0)
     starts = [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]]
     simulation = Simulation(HALL, make_controller("atlas-shared"), starts, team, dt=0.05)

@@ -1,3 +1,5 @@
+"""Coverage with a map that the robots share: frontiers, candidates and assigned goals."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -46,7 +46,9 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     floors = measure_floors(data)
     if options.level is not None and not floors:
         actual = quote(options.level)
-        raise ParameterError(f"{data.source_name}: level: expected none, got {actual}: no indoor spaces")
+        raise ParameterError(
+            f"{data.source_name}: level: expected no level, got {actual}. The file has no indoor spaces."
+        )
     name = files.get_map_name(path)
     if floors and (options.level is not None or is_indoor(data, floors)):
         floor = choose_floor(floors, options.level, data.source_name)

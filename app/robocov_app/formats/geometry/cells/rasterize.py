@@ -202,9 +202,10 @@ def find_free_cells(environment: Environment, grid: CellGrid) -> BoolArray:
         If no cell is free.
     """
     free = grid.find_covered_cells(environment.free) & ~grid.find_thin_walls(environment.free)
-    # Obstacles smaller than a cell may lie between all lines of centers.
+    # Obstacles smaller than a cell may lie between the lines of cell centers.
     rings = [ring for part in environment.free.geoms for ring in part.interiors]
     holes = np.array([shapely.polygons(ring) for ring in rings])
+    # `reshape` gives zero rows if there are no holes.
     bounds = shapely.bounds(holes).reshape(-1, 4)
     is_small = (bounds[:, 2:] - bounds[:, :2]).max(axis=1, initial=0.0) < grid.cell
     inside = shapely.get_coordinates(shapely.point_on_surface(holes[is_small]))

@@ -30,7 +30,8 @@ class EnclosedArea:
     area : MultiPolygon, m
         Valid area, with the largest part first; empty if the rings enclose nothing.
     invalidity : str or None
-        Why the rings of a polygon with holes were invalid, and where.
+        Why the rings of a polygon with holes were invalid, and where; None if they were valid, if the rule is
+        not "holes", or if the area is empty.
     lost_holes : dict of str to int
         Number of holes that remove no area, by reason.
     """
@@ -50,8 +51,9 @@ def find_enclosed_area(
     rings : sequence of (k, 2) arrays, m
         The rings; their first point may be repeated at the end.
     rule : "holes", "evenodd" or "nonzero"
+        See `Rule`.
     crossings : CrossingCounter or None
-        Counter of the crossings in the file so far.
+        Counter of the crossings in the file so far. By default, only those of these rings are counted.
 
     Returns
     -------
@@ -62,26 +64,30 @@ def find_enclosed_area(
     MapError
         If the file has too many crossings.
     """
-    crossings = CrossingCounter() if crossings is None else crossings
-    has_three = [_has_three_points(ring) for ring in rings]
-    if not any(has_three) or (rule == "holes" and not has_three[0]):
+    if crossings is None:
+        crossings = CrossingCounter()
+    has_three_points = [_has_three_points(ring) for ring in rings]
+    # Without an outline, further rings are holes in nothing.
+    if not any(has_three_points) or (rule == "holes" and not has_three_points[0]):
         return EnclosedArea(MultiPolygon())
     lost: Counter[str] = Counter()
     if rule == "holes":
-        lost["of fewer than three points"] = has_three[1:].count(False)
-    rings = [ring for ring, is_usable in zip(rings, has_three, strict=True) if is_usable]
-    plain = Polygon(rings[0], rings[1:])
-    if (rule == "holes" or len(rings) == 1) and plain.is_valid:
+        lost["with fewer than three different points"] = has_three_points[1:].count(False)
+    usable_rings = [ring for ring, is_usable in zip(rings, has_three_points, strict=True) if is_usable]
+    polygon = Polygon(usable_rings[0], usable_rings[1:])
+    # A valid polygon needs no repair, and a single ring that does not cross itself encloses the same area by
+    # every rule.
+    if (rule == "holes" or len(usable_rings) == 1) and polygon.is_valid:
         # +lost drops the reasons with a count of zero.
-        return EnclosedArea(to_multipolygon(plain), lost_holes=+lost)
-    lines = [shapely.linearrings(ring) for ring in rings]
+        return EnclosedArea(to_multipolygon(polygon), lost_holes=+lost)
+    lines = [shapely.linearrings(ring) for ring in usable_rings]
     crossings.add(lines)
     if rule != "holes":
         return EnclosedArea(_fill(lines, rule))
-    area = _subtract_holes(rings, lost)
+    area = _subtract_holes(usable_rings, lost)
     invalidity: str | None = None
     if not area.is_empty:
-        invalidity = shapely.is_valid_reason(plain)
+        invalidity = shapely.is_valid_reason(polygon)
     return EnclosedArea(area, invalidity, +lost)
 
 

@@ -99,7 +99,7 @@ class _MetadataParser:
 
     def __init__(self, document: dict[str, files.Value], source_name: str) -> None:
         self._document = document
-        self._where = source_name
+        self._source_name = source_name
 
     def get_text(self, key: str, default: str | None = None, *, expected: str = "one value") -> str:
         """Return the text of a key; raise MapError if the key is missing and has no default.
@@ -108,15 +108,15 @@ class _MetadataParser:
         """
         value = self._document.get(key, default)
         if value is None:
-            raise MapError(f"{self._where}: {key}: missing, expected {expected}")
+            raise MapError(f"{self._source_name}: {key}: missing, expected {expected}")
         if not isinstance(value, str):
-            raise MapError(f"{self._where}: {key}: expected {expected}, got {quote(value)}")
+            raise MapError(f"{self._source_name}: {key}: expected {expected}, got {quote(value)}")
         return value
 
     def parse_number(self, key: str, default: str | None = None) -> float:
         """Return the number of a key; raise MapError if it is invalid, or missing without a default."""
         text = self.get_text(key, default, expected="a number")
-        return _parse_number(text, f"{self._where}: {key}")
+        return _parse_number(text, f"{self._source_name}: {key}")
 
     def parse_mode(self) -> Mode:
         """Return the mode of a map."""
@@ -124,42 +124,42 @@ class _MetadataParser:
         for mode in get_args(Mode):
             if name == mode:
                 return cast(Mode, mode)
-        raise MapError(f"{self._where}: mode: expected one of trinary, scale, raw, got {quote(name)}")
+        raise MapError(f"{self._source_name}: mode: expected one of trinary, scale, raw, got {quote(name)}")
 
     def parse_origin(self) -> tuple[float, float, float]:
         """Return the pose of the lower left corner: x and y in m, and the yaw in rad."""
-        source_name = f"{self._where}: origin"
+        place = f"{self._source_name}: origin"
         origin = self._document.get("origin", ["0", "0", "0"])
         if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
-            raise MapError(f"{source_name}: expected [x, y, yaw], got {quote(origin)}")
+            raise MapError(f"{place}: expected [x, y, yaw], got {quote(origin)}")
         texts = [*origin, "0"]  # the yaw may be missing
-        x = _parse_number(texts[0], f"{source_name}[0]")
-        y = _parse_number(texts[1], f"{source_name}[1]")
-        yaw = _parse_number(texts[2], f"{source_name}[2]")
-        files.require_coordinate(x, f"{source_name}[0]")
-        files.require_coordinate(y, f"{source_name}[1]")
+        x = _parse_number(texts[0], f"{place}[0]")
+        y = _parse_number(texts[1], f"{place}[1]")
+        yaw = _parse_number(texts[2], f"{place}[2]")
+        files.require_coordinate(x, f"{place}[0]")
+        files.require_coordinate(y, f"{place}[1]")
         return x, y, yaw
 
     def parse_negate(self) -> bool:
         """Return whether light pixels are occupied."""
         word = self.get_text("negate", "0").lower()
         if word not in _TRUE_WORDS + _FALSE_WORDS:
-            raise MapError(f"{self._where}: negate: expected 0 or 1, got {quote(word)}")
+            raise MapError(f"{self._source_name}: negate: expected 0 or 1, got {quote(word)}")
         return word in _TRUE_WORDS
 
     def parse_thresholds(self) -> tuple[float, float]:
         """Return the thresholds of darkness for occupied cells and for free cells."""
-        occupied, free = (self.parse_number(key, str(default)) for key, default in DEFAULT_THRESHOLDS.items())
+        occupied = self.parse_number("occupied_thresh", str(OCCUPIED_THRESHOLD))
+        free = self.parse_number("free_thresh", str(FREE_THRESHOLD))
         if not 0.0 <= free <= occupied <= 1.0:
-            expected = "expected numbers from 0 to 1, the first not the larger"
-            actual = f"got {free:g}, {occupied:g}"
-            raise MapError(f"{self._where}: free_thresh, occupied_thresh: {expected}, {actual}")
+            expected = "expected 0 <= free_thresh <= occupied_thresh <= 1"
+            raise MapError(f"{self._source_name}: {expected}, got {free:g} and {occupied:g}")
         return occupied, free
 
 
-def _parse_number(text: files.Value, source_name: str) -> float:
-    """Convert text to a finite number; raise MapError for invalid input."""
-    value = files.parse_number(text) if isinstance(text, str) else math.nan
-    if not math.isfinite(value):
-        raise MapError(f"{source_name}: expected a number, got {quote(text)}")
-    return value
+def _parse_number(value: files.Value, place: str) -> float:
+    """Convert a text to a finite number; raise MapError if that is impossible."""
+    number = files.parse_number(value) if isinstance(value, str) else math.nan
+    if not math.isfinite(number):
+        raise MapError(f"{place}: expected a number, got {quote(value)}")
+    return number

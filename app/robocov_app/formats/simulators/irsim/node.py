@@ -81,7 +81,7 @@ class Node:
         """Return the value as a number; raise MapError for invalid input."""
         value = files.parse_number(self.get_text(str(default)))
         if not abs(value) <= MAX_COORDINATE_M:
-            self.raise_error("a number within 1e7")
+            self.raise_error("a number from -1e7 to 1e7")
         return value
 
     def parse_length(self, default: float) -> float:

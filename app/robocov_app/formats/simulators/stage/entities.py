@@ -68,7 +68,7 @@ class Entity:
         values = np.array([*numbers, *default[len(texts) :]])
         if not (np.abs(values) <= MAX_COORDINATE_M).all():
             raise MapError(
-                f"{self.location}: expected numbers within 1e7, got {name} {quote(' '.join(texts))}"
+                f"{self.location}: expected numbers from -1e7 to 1e7, got {name} {quote(' '.join(texts))}"
             )
         return values
 

@@ -102,7 +102,7 @@ def _parse_arguments(text: str, position: int, command: str, pen: "_Pen") -> tup
 class _Bezier(NamedTuple):
     """A cubic Bézier curve, and the index of the vertex at its end."""
 
-    vertex: int
+    end_vertex: int
     start: complex
     first_handle: complex
     second_handle: complex
@@ -112,7 +112,7 @@ class _Bezier(NamedTuple):
 class _Arc(NamedTuple):
     """An elliptic arc, center + u cos(a) + v sin(a), and the index of the vertex at its end."""
 
-    vertex: int
+    end_vertex: int
     center: complex
     u: complex
     v: complex
@@ -121,9 +121,19 @@ class _Arc(NamedTuple):
 
 
 class _FlatCurves(NamedTuple):
-    """The points of n curves, (k, 2), how many belong to each, and the index of the vertex at each end."""
+    """Curves as points.
 
-    vertices: IntArray
+    Attributes
+    ----------
+    end_vertices : (n,) int array
+        Index of the vertex at the end of each curve.
+    points : (k, 2) array
+        Points of all curves, one curve after the other.
+    counts : (n,) int array
+        Number of points of each curve.
+    """
+
+    end_vertices: IntArray
     points: FloatArray
     counts: IntArray
 
@@ -188,12 +198,12 @@ class _Pen:
         # A vertex at the end of a curve is repeated, and then replaced by the points of the curve.
         count = np.ones(len(vertices), dtype=np.intp)
         for flat in curves:
-            count[flat.vertices] = flat.counts
+            count[flat.end_vertices] = flat.counts
         end = np.cumsum(count)
         points = vertices.repeat(count, axis=0)
         for flat in curves:
-            first = end[flat.vertices] - count[flat.vertices]
-            points[concatenate_ranges(first, count[flat.vertices])] = flat.points
+            first = end[flat.end_vertices] - count[flat.end_vertices]
+            points[concatenate_ranges(first, count[flat.end_vertices])] = flat.points
         points[end - 1] = vertices
         if not self._subpath_indices:
             return []
