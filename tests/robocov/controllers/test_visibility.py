@@ -146,7 +146,7 @@ def test_neighbors_behind_walls_do_not_share_the_view() -> None:
     assert is_own.all()
 
 
-def test_a_wall_at_a_low_angle_is_no_occlusion_edge() -> None:
+def test_a_wall_at_a_low_angle_is_not_an_occlusion_edge() -> None:
     """Along a straight wall the distance jumps from ray to ray, but nothing is hidden."""
     directions = compute_ray_directions(180)
     with np.errstate(divide="ignore"):

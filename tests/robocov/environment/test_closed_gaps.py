@@ -93,7 +93,7 @@ def test_paths_lead_around_a_box_near_the_wall() -> None:
     assert Geodesics(hall).compute_distances([left], [right])[0, 0] < 1.3
 
 
-def test_acute_corner_is_no_obstacle_to_the_bar() -> None:
+def test_acute_corner_is_not_an_obstacle_to_the_bar() -> None:
     spike = PolygonObstacle(((5.0, 0.08), (5.4, 6.0), (5.3, 6.0)))
     closed = build_hall(spike).close_gaps(RADIUS_M)
     assert not are_connected(closed, (1.0, 1.0), (9.0, 1.0))

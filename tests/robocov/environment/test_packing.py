@@ -1,4 +1,4 @@
-"""The number of points that fit into separate parts of an area."""
+"""Bounds for the number of points that fit into separate parts of an area."""
 
 from __future__ import annotations
 

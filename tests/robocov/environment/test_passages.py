@@ -75,7 +75,7 @@ def test_an_empty_space_has_no_gap() -> None:
     assert find_narrowest_gap(MultiPolygon()) is None
 
 
-def test_many_vertices_along_a_wall_are_no_passage() -> None:
+def test_many_vertices_along_a_wall_are_not_a_passage() -> None:
     angle = np.linspace(0, 2 * np.pi, 40_001)[:-1]
     round_room = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]).round(9) * 50)
     assert find_narrowest_gap(build_free_space(round_room)) is None

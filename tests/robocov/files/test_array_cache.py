@@ -79,7 +79,7 @@ def test_objects_are_not_unpickled(tmp_path):
     assert cache.load("entry") is None
 
 
-def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
+def test_a_folder_that_cannot_be_written_is_not_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         cache = ArrayCache(folder)

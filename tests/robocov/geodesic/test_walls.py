@@ -56,7 +56,7 @@ def test_corners_are_where_the_free_space_is_not_convex():
     assert count_hiding_walls(room) == 2
 
 
-def test_collinear_vertices_are_no_corners():
+def test_collinear_vertices_are_not_corners():
     pillar = build_walls_around(((3, 3), (4, 3), (5, 3), (5, 5), (3, 5)))
     assert list_corners(pillar) == [(3, 3), (3, 5), (5, 3), (5, 5)]
 

@@ -84,7 +84,7 @@ def test_short_and_thinned_records_are_not_judged() -> None:
     assert len(find_trembling_robots(record.thin(1.0))) == 0
 
 
-def test_contacts_with_one_wall_are_no_zigzag() -> None:
+def test_contacts_with_one_wall_are_not_a_zigzag() -> None:
     record = simulate(HALL, Lloyd(), 0.1, 12.0)
     positions = record.positions.copy()
     positions[:, 0] = [3.0, 0.1]

@@ -196,7 +196,7 @@ def test_notebooks_show_the_first_rows(folder: Path, tmp_path: Path) -> None:
         ("results.csv", b"\xff\xfe", "results.csv: cannot be read: "),
     ],
 )
-def test_errors_name_files_that_are_no_tables(
+def test_errors_name_files_that_are_not_tables(
     tmp_path: Path, name: str, content: bytes, message: str
 ) -> None:
     (tmp_path / name).write_bytes(content)

@@ -62,7 +62,7 @@ def test_a_route_leads_through_the_door_at_a_distance_from_walls(planner):
         assert planner.visibility.find_clear_lines(start, end[None], planner.map_window.is_near_wall)[0]
 
 
-def test_a_door_that_has_not_been_seen_is_no_portal():
+def test_a_door_that_has_not_been_seen_is_not_a_portal():
     known_map = build_map(LOWER_HALF, UPPER_HALF)
     state = known_map.state.copy()
     state[22:27, 39:41] = UNKNOWN

@@ -55,7 +55,7 @@ def test_a_route_leads_through_the_door() -> None:
 @pytest.mark.parametrize(
     ("door", "is_passage"), [(slice(30, 31), False), (slice(30, 32), False), (slice(28, 36), True)]
 )
-def test_a_crack_is_no_passage(door: slice, is_passage: bool) -> None:
+def test_a_crack_is_not_a_passage(door: slice, is_passage: bool) -> None:
     """No robot fits through some holes, for example in a wall that has not been seen completely."""
     map_window = build_map_window(build_wall_with_door(door), max_nodes=600)
     node = NodeVisibility(map_window).find_entry_node(np.array([1.0, 1.0]))

@@ -200,7 +200,7 @@ def test_commands_print_on_terminals_restricted_to_ascii(command: str) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of POSIX")
 @pytest.mark.slow
-def test_a_closed_standard_output_is_no_error(tmp_path: Path) -> None:
+def test_a_closed_standard_output_is_not_an_error(tmp_path: Path) -> None:
     arguments = ["run", "square", *SHORT, "--out", str(tmp_path / "run")]
     process = subprocess.run(
         f"{' '.join([*COMMAND, *arguments])} >&-", shell=True, capture_output=True, check=False
@@ -249,7 +249,7 @@ def test_brackets_in_labels_are_not_interpreted_as_markup(
 
 
 @pytest.mark.slow
-def test_a_reader_that_closes_the_pipe_early_is_no_error() -> None:
+def test_a_reader_that_closes_the_pipe_early_is_not_an_error() -> None:
     process = subprocess.run(
         f"{sys.executable} -m robocov_app schema | head -c 10",
         shell=True,

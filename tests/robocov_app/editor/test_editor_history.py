@@ -89,7 +89,7 @@ def test_a_drag_is_one_step():
     assert history.undo_descriptions == ("circle moved", "circle drawn")
 
 
-def test_a_drag_that_returns_is_no_step():
+def test_a_drag_that_returns_is_not_a_step():
     history = draw_circles(1)
     before = history.sketch
     history.mark_saved()
@@ -101,7 +101,7 @@ def test_a_drag_that_returns_is_no_step():
     assert not history.has_unsaved_changes
 
 
-def test_an_edit_without_effect_is_no_step_and_preserves_redo():
+def test_an_edit_without_effect_is_not_a_step_and_preserves_redo():
     history = draw_circles(2)
     history.undo()
     assert not history.apply(Change(history.sketch, Selection.of(0), "nothing"))

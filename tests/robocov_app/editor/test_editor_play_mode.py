@@ -147,7 +147,7 @@ def test_the_theme_returns_to_the_editor(tmp_path: Path) -> None:
         assert driver.editor.theme == "dark"
 
 
-def test_a_trial_without_changes_is_no_edit() -> None:
+def test_a_trial_without_changes_is_not_an_edit() -> None:
     sketch = build_sheet(PILLAR, PILLAR)
     environment = sketch.build_environment()
     assert build_play_change(sketch, environment, environment) is None

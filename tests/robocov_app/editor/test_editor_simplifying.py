@@ -128,6 +128,7 @@ def test_straightening_is_idempotent(sketch, degrees):
         (lambda s: simplify(s, Selection(boundary=True), math.nan), "a tolerance"),
         (lambda s: simplify(s, Selection(boundary=True), 0.1), "no vertex can be removed"),
         (lambda s: straighten(s, Selection(boundary=True), 90.0), "up to 30 degrees"),
+        (lambda s: straighten(s, Selection(boundary=True), 0.0), "above 0 and up to 30 degrees"),
     ],
 )
 def test_impossible_edits_raise_a_map_error(deed, words):

@@ -166,7 +166,7 @@ def test_a_coarse_grid_snaps_along_one_axis_only(targets):
     )
 
 
-def test_dragged_objects_are_no_targets():
+def test_dragged_objects_are_not_targets():
     sketch, (key,) = Sketch(starts=(("two", PointsStart(((6.0, 1.0), (8.0, 1.0)))),)).with_obstacles([BOX])
     near = (1.02, 1.02)
     assert (

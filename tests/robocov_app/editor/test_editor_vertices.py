@@ -236,7 +236,7 @@ def test_corners_of_rings_are_cut_all_at_once(sketch):
     assert shapely.Polygon(disc.vertices).area == pytest.approx(math.pi * 4.0, abs=0.02)
 
 
-def test_a_straight_vertex_is_no_corner():
+def test_a_straight_vertex_is_not_a_corner():
     ring = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0))
     sketch, (key,) = Sketch().with_obstacles([PolygonObstacle(ring)])
     with pytest.raises(MapError, match="select corners"):

@@ -23,7 +23,7 @@ def read_free_space(folder: Path, body: str, **options: object) -> float:
     return read_shapes(folder, body, **options).free.area
 
 
-def test_paint_that_is_declared_free_is_no_obstacle(tmp_path: Path) -> None:
+def test_paint_that_is_declared_free_is_not_an_obstacle(tmp_path: Path) -> None:
     rug = FLOOR + WALLS + '<rect x="1" y="1" width="3" height="2" fill="#e0e0ff"/>'
     foreign = read_shapes(tmp_path, rug)
     assert foreign.free.area == pytest.approx(ROOM - 6)

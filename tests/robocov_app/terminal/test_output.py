@@ -28,7 +28,7 @@ FORMULAS = ("=1+1", "+1", "-1.json", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1",
 
 
 @given(st.lists(st.one_of(st.text(), st.sampled_from(FORMULAS)), min_size=1))
-def test_texts_are_no_formulas_and_come_back(texts: list[str]) -> None:
+def test_texts_are_not_formulas_and_come_back(texts: list[str]) -> None:
     texts = [text.replace("\0", "") for text in texts]
     (cells,) = csv.reader(io.StringIO(format_csv_line(texts), newline=""))
     assert [unquote_cell(cell) for cell in cells] == texts

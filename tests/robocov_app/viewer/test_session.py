@@ -164,7 +164,7 @@ def test_the_controller_of_one_pane_is_replaced():
     advance_session(session, 20)
 
 
-def test_the_same_controller_and_properties_are_no_edit():
+def test_the_same_controller_and_properties_are_not_an_edit():
     session = advance_session(start_session(RAPF), 10)
     session.show_time(0.0)
     before = describe_state(session)

@@ -171,9 +171,9 @@ def _set_features(
 ) -> Change:
     """Return the change that replaces the features and, unless `base` is None, the floor or background."""
     # This raises an error for other kinds of densities, even if the value is replaced below.
-    present_base = _get_base(sketch.density)
+    current_base = _get_base(sketch.density)
     if base is None:
-        base = present_base
+        base = current_base
     peaks = tuple(feature for feature in features if isinstance(feature, Gaussian))
     areas = tuple(feature for feature in features if isinstance(feature, WeightedArea))
     density: Density

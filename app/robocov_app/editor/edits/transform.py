@@ -477,9 +477,9 @@ def _move_objects(sketch: Sketch, offsets: Mapping[Owner, float], *, along_x: bo
 
 def _transform(sketch: Sketch, selection: Selection, affine: Affine, action: str) -> Change:
     # Undo during a drag may have removed selected objects.
-    present = selection.restrict_to(sketch)
-    require(present, "select something first")
-    return Change(_apply_affine(sketch, present, affine), present, f"{present.describe(sketch)} {action}")
+    existing = selection.restrict_to(sketch)
+    require(existing, "select something first")
+    return Change(_apply_affine(sketch, existing, affine), existing, f"{existing.describe(sketch)} {action}")
 
 
 def _apply_affine(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:

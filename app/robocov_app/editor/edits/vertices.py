@@ -378,8 +378,8 @@ def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
 
 def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN_ANGLE_DEG) -> Change:
     """Make edges horizontal or vertical that are so within an angle; consecutive ones end up on one line."""
-    is_possible = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
-    require(is_possible, f"expected an angle of up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
+    is_in_range = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
+    require(is_in_range, f"expected an angle above 0 and up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
 
     def straighten_rings(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
         return tuple(_straighten_ring(ring, degrees, is_closed) for ring in rings)

@@ -54,7 +54,7 @@ class DensityTool(EditorTool):
     name = "density"
     title = "Density"
     key = "d"
-    hint = "drag from a hot spot's middle outward; drag middles and rims; click a middle, type its weight"
+    hint = "drag from a hot spot's center outward; drag centers and rims; click a center, type its weight"
 
     def __init__(self) -> None:
         super().__init__()

@@ -102,14 +102,14 @@ def _write_y(editor: Editor, text: str) -> None:
     editor.apply(actions.move(editor, 0.0, step, editor.selection))
 
 
-def _parse_step(text: str, present: float) -> float:
+def _parse_step(text: str, current: float) -> float:
     """Return the step, m, to a typed coordinate from the current one; ``+0.5`` is the step itself."""
     text = text.strip()
     if text.startswith(("+", "@")):
         return parse_length(text.lstrip("+@"))
     # The coordinate is parsed as that of a point, so that signs and units have the same meaning as elsewhere.
-    x, _ = parse_point(f"{text} 0", last=(present, 0.0))
-    return x - present
+    x, _ = parse_point(f"{text} 0", last=(current, 0.0))
+    return x - current
 
 
 def _write_width(editor: Editor, text: str) -> None:

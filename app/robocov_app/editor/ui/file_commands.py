@@ -175,8 +175,13 @@ class FileCommands:
             If the file cannot be read, or another editor has it open.
         """
         require_regular_file(path)
-        present = self.editor.document.path
-        if present is not None and present.exists() and path.exists() and path.samefile(present):
+        current_path = self.editor.document.path
+        if (
+            current_path is not None
+            and current_path.exists()
+            and path.exists()
+            and path.samefile(current_path)
+        ):
             self.reload()
             return
         self._close_document_to_open()

@@ -45,7 +45,7 @@ class PlaybackActions:
     ) -> None:
         """Restart at time 0, optionally with another number of robots, start or seed.
 
-        If there is not enough space for that many robots at the present start, they start at random positions
+        If there is not enough space for that many robots at the current start, they start at random positions
         anywhere in the free space.
         """
         session = self._viewer.session

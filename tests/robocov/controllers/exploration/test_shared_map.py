@@ -158,7 +158,7 @@ def test_on_a_complete_map_there_is_no_frontier() -> None:
     assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final
 
 
-def test_single_unknown_cells_are_no_frontier() -> None:
+def test_single_unknown_cells_are_not_a_frontier() -> None:
     state = np.full(RASTER.shape, FREE)
     state[20:60:5, 10:70:4] = UNKNOWN
     assert FrontierMedian().compute_placement(build_situation(state, THREE_ROBOTS)).is_final

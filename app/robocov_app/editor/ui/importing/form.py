@@ -115,15 +115,15 @@ class ImportForm:
     def _show_option(self, ui: Ui, option: ImportOption) -> None:
         """Show the label of an option, and its drop-down list or text field; apply the user's input."""
         name = option.name
-        present = self.texts.get(name, option.default)
+        current_text = self.texts.get(name, option.default)
         style = "bold" if name in self.texts else ""
         ui.label(name.replace("_", " ").capitalize(), tip=option.help, style=style)
         if option.choices:
             choices = option.choices
             if not option.default:
                 choices = (DEFAULT_TEXT, *choices)
-            text = ui.dropdown(name, choices, present or DEFAULT_TEXT, tip=option.help)
+            text = ui.dropdown(name, choices, current_text or DEFAULT_TEXT, tip=option.help)
         else:
-            text = ui.text_field(name, present, placeholder=DEFAULT_TEXT, tip=option.help, live=True)
-        if text is not None and text != present:
+            text = ui.text_field(name, current_text, placeholder=DEFAULT_TEXT, tip=option.help, live=True)
+        if text is not None and text != current_text:
             self.set_text(name, text)
