@@ -12,6 +12,7 @@ from typing import Any, TypeAlias, get_args
 from robocov.controllers.base import Information
 from robocov.controllers.registry import update_gain_names
 from robocov.errors import InputError, format_bound, quote
+from robocov.files.result_folder import require_result
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
 from robocov_app.runs.cost import AREA_TOLERANCE_M2
@@ -203,7 +204,9 @@ def read_result(path: Path) -> dict[str, Any]:
     InputError
         If the file is missing or damaged, is not a result of the benchmark, or belongs to another suite.
     """
-    path = path / RESULT_FILE if path.is_dir() else path
+    if not path.is_file():
+        require_result(path, "the folder or the file of a result of the benchmark", (RESULT_FILE,))
+        path = path / RESULT_FILE
     content = read_bytes(path)
     if path.suffix == ".gz":
         try:

@@ -14,7 +14,7 @@ from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform, prepare_cost
 
-_FIRST_TRIAL_S = 2.0
+_FIRST_TRIAL_S = 1.0
 """Simulation time of the first trial of a controller, which shows how much of a run can be measured."""
 _MAX_TRIAL_SECONDS = 4.0
 """Maximum computing time for the measurement of a controller."""

@@ -453,7 +453,10 @@ def test_finished_runs_are_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ((), "--controller: expected a controller name or FILE.py:CLASS"),
         (("verify",), "DIR: expected one result"),
         (("page", "--alone"), "DIR: expected results"),
-        (("page", "nowhere"), "nowhere: no such file"),
+        (
+            ("page", "nowhere"),
+            "nowhere: expected the folder or the file of a result of the benchmark, got a path that does not",
+        ),
         (("page", "TORN"), "torn.json.gz: cannot be unpacked: Compressed file ended"),
         (("suite", "--quick"), "--quick: not an option of robocov benchmark suite"),
         (("--controller", "rapf", "--out", "FOREIGN"), "expected an empty folder or a benchmark"),

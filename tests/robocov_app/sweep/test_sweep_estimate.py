@@ -68,12 +68,12 @@ def test_only_the_start_of_a_slow_run_is_executed(monkeypatch: pytest.MonkeyPatc
         return perform(task)
 
     monkeypatch.setattr(estimate_module, "perform", record_duration)
-    # The first 2 s of simulation time take 1 s, so 8 s take the 4 s that a trial may take.
+    # The first second of simulation time takes 1 s, so 4 s take the 4 s that a trial may take.
     set_clock(monkeypatch, 1.0, 3.0)
     estimate = estimate_sweep(study, tmp_path, workers=1)
-    assert durations == [2.0, 8.0]
-    assert estimate.controllers["rapf"].seconds_per_run == 5 * 3.0
-    assert estimate.seconds == 3 * 5 * 3.0
+    assert durations == [1.0, 4.0]
+    assert estimate.controllers["rapf"].seconds_per_run == 10 * 3.0
+    assert estimate.seconds == 3 * 10 * 3.0
 
 
 def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
