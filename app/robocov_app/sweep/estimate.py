@@ -12,7 +12,7 @@ from time import perf_counter
 from robocov_app.sweep.ledger import Ledger
 from robocov_app.sweep.study.study import Study
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import perform, prepare_cost
+from robocov_app.sweep.worker import Outcome, perform, prepare_cost
 
 _FIRST_TRIAL_S = 1.0
 """Simulation time of the first trial of a controller, which shows how much of a run can be measured."""
@@ -150,25 +150,33 @@ def _estimate_controller(task: Task, runs: int, left: int, max_seconds: float) -
     """Estimate the runs of a controller from one of its tasks."""
     # Not timed: the coverage cost is prepared only once for all runs on a map.
     prepare_cost(task)
-    # Not used for the estimate: the first steps of a controller may compile kernels.
+    # Its time is not used for the estimate: the first steps of a controller may compile kernels.
     first_duration = min(task.duration, _FIRST_TRIAL_S)
     started = perf_counter()
-    perform(replace(task, duration=first_duration))
+    first_outcome = perform(replace(task, duration=first_duration))
     first_seconds = perf_counter() - started
     duration = min(task.duration, max(first_duration, first_duration * max_seconds / first_seconds))
     started = perf_counter()
     outcome = perform(replace(task, duration=duration))
     seconds = perf_counter() - started
-    size = sum(len(content) for content in outcome.files.values())
-    scale = task.duration / duration
+    size = _measure_files(outcome)
+    if duration > first_duration:
+        # A part of the files grows with the duration, the rest does not.
+        growth = (size - _measure_files(first_outcome)) / (duration - first_duration)
+        size += round(growth * (task.duration - duration))
     return ControllerEstimate(
         runs=runs,
         left=left,
         run=task.name,
         error=outcome.error,
-        seconds_per_run=seconds * scale,
-        bytes_per_run=round(size * scale),
+        seconds_per_run=seconds * task.duration / duration,
+        bytes_per_run=size,
     )
+
+
+def _measure_files(outcome: Outcome) -> int:
+    """Return the size of the files of a run, bytes."""
+    return sum(len(content) for content in outcome.files.values())
 
 
 def count_axes(study: Study) -> dict[str, int]:

@@ -74,6 +74,8 @@ def test_only_the_start_of_a_slow_run_is_executed(monkeypatch: pytest.MonkeyPatc
     assert durations == [1.0, 4.0]
     assert estimate.controllers["rapf"].seconds_per_run == 10 * 3.0
     assert estimate.seconds == 3 * 10 * 3.0
+    size = sum(len(content) for content in perform(next(generate_tasks(study))).files.values())
+    assert estimate.controllers["rapf"].bytes_per_run == pytest.approx(size, rel=0.5)
 
 
 def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
