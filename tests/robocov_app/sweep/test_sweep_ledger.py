@@ -247,7 +247,7 @@ def test_other_folders_are_not_changed(tmp_path: Path) -> None:
     (tmp_path / "study.json").write_text('{"format": "robocov-map"}')
     assert not is_sweep(tmp_path)
     with (
-        pytest.raises(OutputError, match="cannot be written"),
+        pytest.raises(OutputError, match="expected a folder, got a file"),
         open_ledger(tmp_path / "notes.txt", STUDY),
     ):
         pass
