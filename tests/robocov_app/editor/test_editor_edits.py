@@ -86,6 +86,11 @@ def test_boundary_and_starts_are_drawn(sketch):
     assert create.add_uniform_start(sketch).sketch.get_start("start") == UniformStart()
 
 
+def resize_single_position(sketch: Sketch) -> None:
+    change = create.add_points_start(sketch, [(1.0, 1.0)])
+    transform.resize(change.sketch, change.selection, 2.0, None)
+
+
 @pytest.mark.parametrize(
     ("deed", "words"),
     [
@@ -111,6 +116,7 @@ def test_boundary_and_starts_are_drawn(sketch):
         (lambda s: transform.resize(s, Selection.of(0), None, None), "a width or a height"),
         (lambda s: transform.resize(s, Selection.of(0), 0.0, None), "a width from 1 mm"),
         (lambda s: transform.resize(s, Selection.of("all"), 1.0, None), "select something"),
+        (resize_single_position, "the selection has no width that can be scaled"),
         (lambda s: transform.mirror(s, ALL, "z"), "an axis x or y"),
         (lambda s: transform.duplicate(s, Selection(boundary=True)), "obstacles or starts to copy"),
         (lambda s: transform.copy_to_grid(s, ALL, 1, 1, (1.0, 1.0)), "two columns or rows"),
