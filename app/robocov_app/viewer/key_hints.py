@@ -47,11 +47,11 @@ def explain_answering(view: ViewState) -> str:
     return "answer first: press the number of your answer, or click it"
 
 
-def explain_staying(view: ViewState) -> str:
-    """Return a hint on how to continue after a chapter of a lesson that stays."""
+def explain_chapter_end(view: ViewState) -> str:
+    """Return a hint on how to continue after a chapter of a lesson that has ended."""
     if view.is_compact:
-        return "this chapter stays until you tap Next"
-    return "this chapter stays until Space or →"
+        return "this chapter is over: tap Next to continue"
+    return "this chapter is over: press → or click Next to continue"
 
 
 def explain_record_end(view: ViewState) -> str:

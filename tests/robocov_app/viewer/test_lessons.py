@@ -111,19 +111,30 @@ def test_chapters_repeat_edits_ask_questions_and_set_tasks(tmp_path: Path, capsy
         driver.run_frames(2)
         assert lesson.state == "ended"
         assert lesson.lines == ["✗ Not quite. Correct: Much", "So it is.", "Well done."]
-        lesson.advance(player.READING_S)
-        assert lesson.state == "ended"
-        assert not lesson.is_done, "there is something to read"
+        assert viewer.session.playback.is_playing, "robots move on after a task"
         driver.press_key("space")
-        lesson.advance(100.0)
-        assert lesson.state == "ended"
-        assert not viewer.session.playback.is_playing, "it is paused between chapters too"
+        assert not viewer.session.playback.is_playing
         driver.press_key("space")
-        assert not lesson.is_held
+        assert viewer.message == "This chapter is over: press → or click Next to continue"
+        assert not viewer.session.playback.is_playing
         driver.press_key("escape")
         assert driver.window.lesson.player is None
         assert viewer.session is before
         assert before.displayed.numbers == (1, 2)
+
+
+def test_a_chapter_that_has_ended_waits_for_the_user(tmp_path: Path) -> None:
+    """A page that turns by itself is lost to everybody who reads slowly."""
+    with open_viewer(tmp_path) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.window.lesson.start(write_short_lesson(tmp_path))
+        lesson = driver.window.lesson.player
+        driver.run_frames(40)
+        assert lesson.state == "ended"
+        lesson.advance(1000.0)
+        assert (lesson.number, lesson.state) == (0, "ended")
+        click_area(driver, "skip", 1)
+        assert (lesson.number, lesson.state) == (1, "asking")
 
 
 def test_the_keys_of_answers_do_not_leave_the_lesson_without_an_open_question(tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ def test_hints_on_a_phone_name_buttons_instead_of_keys(upright_phone: Driver) ->
     messages.append(phone.viewer.message)
     assert messages == [
         "Answer first: tap your answer",
-        "This chapter stays until you tap Next",
+        "This chapter is over: tap Next to continue",
         "The lesson has ended; Lesson plays it again",
     ]
     phone.viewer.session.timeline.is_settled = True

@@ -8,7 +8,7 @@ import pygame
 from robocov_app.look.theme import Theme
 from robocov_app.toolkit.window.layout import Box, Layout
 from robocov_app.toolkit.window.page_view import LessonAnswers
-from robocov_app.viewer.key_hints import explain_answering
+from robocov_app.viewer.key_hints import explain_answering, explain_chapter_end
 from robocov_app.viewer.lessons.page import ClickArea, draw_caption, draw_lesson_page
 from robocov_app.viewer.lessons.player import FIRST_LESSON, LessonPlayer, LessonState, load_lesson
 from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
@@ -169,8 +169,8 @@ class LessonGuide:
         if player.state is LessonState.ASKING:
             self._viewer.show_message(explain_answering(self._viewer.view))
             return True
-        if player.state is LessonState.ENDED:
-            self._viewer.show_message(player.toggle_hold())
+        if player.state is LessonState.ENDED and not player.session.playback.is_playing:
+            self._viewer.show_message(explain_chapter_end(self._viewer.view))
             return True
         return False
 

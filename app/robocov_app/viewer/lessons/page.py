@@ -123,7 +123,7 @@ _FUTURE_DOT_STRENGTH = 0.25
 _CLOSED_ANSWER_STRENGTH = 0.25
 _BUTTON_EDGE_STRENGTH = 0.28
 
-_PAGE_HINT = "Space: stay · F2: play freely · Esc: end"
+_PAGE_HINT = "Space: pause · F2: play freely · Esc: end"
 _CLOSING_TITLE = "What you found out"
 _NEXT_TITLE = "Try next"
 _MARK_SIGNS = {AnswerMark.NONE: "", AnswerMark.CHOSEN: "●", AnswerMark.RIGHT: "✓", AnswerMark.WRONG: "✗"}

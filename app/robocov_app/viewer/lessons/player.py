@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robocov.errors import Issue, MapError
 from robocov_app.render.layer_catalog import check_layer_names
-from robocov_app.viewer.key_hints import explain_kept_edits, explain_lesson_repetition, explain_staying
+from robocov_app.viewer.key_hints import explain_kept_edits, explain_lesson_repetition
 from robocov_app.viewer.lessons.suspended_session import SuspendedSession
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.maps import find_bundled_name
@@ -24,7 +24,7 @@ from robocov_app.viewer.session.session import Session
 
 FIRST_LESSON = Path(__file__).with_name("assets") / "lesson-1.robocov"  # bundled with robocov
 READING_S = 4.0
-"""Real time after the end of a chapter; in an unattended window, also for a question and the closing page."""
+"""Real time in an unattended window for a question, the end of a chapter, and the closing page."""
 READING_S_PER_WORD = 0.25
 """Real time added for each word of what there is to read."""
 _CHAPTER_CHANGE_S = 0.5  # real time between two chapters, as a margin of the duration
@@ -62,7 +62,7 @@ class LessonState(StrEnum):
     PLAYING = "playing"
     ASKING = "asking"  # waits for an answer before the chapter plays
     TASK = "task"  # waits until the user has done a task
-    ENDED = "ended"
+    ENDED = "ended"  # waits until the user goes to another chapter
     CLOSING = "closing"  # the closing page, after the last chapter
     LEFT = "left"  # the user has taken over
 
@@ -196,8 +196,6 @@ class LessonPlayer:
         Indices of the chapters whose task the user has done.
     is_done : bool
         Whether the lesson has ended.
-    is_held : bool
-        Whether the user has asked to stay at a chapter that has ended.
     """
 
     def __init__(
@@ -220,7 +218,6 @@ class LessonPlayer:
         self.first_answers: dict[int, int] = {}
         self.done_tasks: set[int] = set()
         self.is_done = False
-        self.is_held = False
         self._viewer = viewer
         self._fit_view = fit_view
         self._waited_s = 0.0  # real time since the current state was entered
@@ -331,7 +328,7 @@ class LessonPlayer:
         return (self.number + fraction) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
-        """Advance by real time, s: a chapter may end, and after a while the next one starts."""
+        """Advance by real time, s: a chapter may end; in an unattended window, the next one follows."""
         if self.is_done or self.state is LessonState.LEFT:
             return
         self._waited_s += seconds
@@ -366,7 +363,7 @@ class LessonPlayer:
             self._enter_state(LessonState.ENDED)
 
     def _advance_end(self) -> None:
-        if self._waited_s >= _compute_reading_time(self.lines) and not self.is_held:
+        if self.is_unattended and self._waited_s >= _compute_reading_time(self.lines):
             self.skip(1)
 
     def _advance_closing(self) -> None:
@@ -438,18 +435,9 @@ class LessonPlayer:
         self._fit_view()
         self.is_done = True
 
-    def toggle_hold(self) -> str:
-        """Stay at a chapter that has ended, or let the next one start; return a message."""
-        self.is_held = not self.is_held
-        self.session.playback.is_playing = False
-        if self.is_held:
-            return explain_staying(self._viewer.view)
-        return "on to the next chapter"
-
     def _enter_state(self, state: LessonState) -> None:
         self.state = state
         self._waited_s = 0.0
-        self.is_held = False
         self._viewer.revision += 1
 
     def show_chapter(self, number: int) -> None:
@@ -488,7 +476,7 @@ def _show_start(viewer: Presenter, session: Session, chapter: ChapterModel) -> N
 
 
 def _compute_reading_time(texts: Iterable[str]) -> float:
-    """Return the real time for which texts are shown before the lesson continues, s."""
+    """Return the real time for which an unattended window shows texts before it continues, s."""
     return READING_S + READING_S_PER_WORD * len(" ".join(texts).split())
 
 
