@@ -671,3 +671,16 @@ def test_followed_edits_repeat_bit_for_bit() -> None:
     while twin.timeline.step < end:
         twin.playback.step()
     np.testing.assert_array_equal(twin.timeline.panes[0].simulation.positions, end_positions)
+
+
+def test_texts_of_the_lesson_use_the_words_of_the_chart() -> None:
+    """A reader of *cost* would look for a chart of the cost, and phones have no chart *below*."""
+    assert LESSON is not None
+    for chapter in LESSON.chapters:
+        texts = [chapter.text]
+        if chapter.question is not None:
+            texts += [chapter.question.text, chapter.question.why]
+        if chapter.task is not None:
+            texts += [chapter.task.text, chapter.task.done]
+        assert not re.search(r"\b(cost|below\.)", " ".join(texts)), chapter.title
+    assert "RAPF, the repulsive and attractive potential field" in LESSON.chapters[0].text
