@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
+import pygame
 import pytest
-from driven_window import Driver
+from driven_window import Driver, open_viewer
 from sample_sessions import RPF
 
 from robocov_app.render.canvas import Canvas
@@ -53,12 +56,41 @@ def test_the_area_that_is_cut_off_is_written_next_to_the_number(
     set_cut_off_area(driver, monkeypatch, 2.44)
     drawn_texts.clear()
     driver.window.chart.draw(driver.window.screen)
-    assert "(2.4 m² cut off)" in drawn_texts
+    assert "without 2.4 m² cut off" in " ".join(drawn_texts)
     set_cut_off_area(driver, monkeypatch, 0.9 * MIN_UNCOVERED_AREA_M2)
     drawn_texts.clear()
     driver.window.chart.draw(driver.window.screen)
     assert not any("cut off" in text for text in drawn_texts)
     assert describe_cut_off(driver.viewer, driver.session.timeline.panes[0]) == ""
+
+
+@pytest.mark.parametrize(("scale", "is_phone"), [(1.0, False), (2.31, True)], ids=["computer", "phone"])
+def test_the_whole_note_about_the_cut_off_area_is_in_the_window(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    scale: float,
+    is_phone: bool,
+) -> None:
+    boxes: dict[str, pygame.Rect] = {}
+    draw_text = Canvas.draw_text
+
+    def draw_and_list(canvas: Canvas, text: str, position: tuple[float, float], **kwargs: Any) -> int:
+        width = draw_text(canvas, text, position, **kwargs)
+        boxes[text] = pygame.Rect(round(position[0]), round(position[1]), width, 0)
+        return width
+
+    with open_viewer(tmp_path, size=(900, 1828), scale=scale) as driver:
+        driver.viewer.view.is_compact = is_phone
+        driver.viewer.view.has_panel = not is_phone
+        driver.run_frames(3)
+        set_cut_off_area(driver, monkeypatch, 1234.5)
+        monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
+        driver.window.chart.draw(driver.window.screen)
+        chart = driver.window.layout.chart
+    note_boxes = [box for text, box in boxes.items() if text in "without 1234.5 m² cut off"]
+    assert len(note_boxes) >= 2
+    visible = pygame.Rect(0, 0, chart.width, chart.height)
+    assert all(visible.contains(box) for box in note_boxes)
 
 
 def test_a_branch_is_described_under_the_pointer_only(driver: Driver) -> None:

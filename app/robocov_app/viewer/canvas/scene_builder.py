@@ -16,7 +16,7 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.view import FADE_S
-from robocov_app.viewer.window.status import MIN_UNCOVERED_AREA_M2
+from robocov_app.viewer.window.status import describe_cut_off
 
 MAX_RAYS_PER_SCAN = 120
 MAX_RAYS_PER_PANE = 720
@@ -126,10 +126,9 @@ class SceneBuilder:
             return ""
         name = get_cost_name(displayed.get_setup(pane).environment)
         text = format_cost(name, distances[pane.number], travel_times.get(pane.number))
-        known_cost = self._viewer.costs.known.get(pane.number)
-        if known_cost is not None and known_cost.result.uncovered_area > MIN_UNCOVERED_AREA_M2:
-            # The mean only covers the reachable area, so it decreases when robots are locked out of a room.
-            text += f" ({known_cost.result.uncovered_area:.1f} m² cut off)"
+        cut_off = describe_cut_off(self._viewer, pane)
+        if cut_off:
+            text += f" ({cut_off})"
         if displayed.time - time > MAX_COST_LAG_S:
             return f"{text} at {time:.1f} s"
         return text

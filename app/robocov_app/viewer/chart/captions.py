@@ -7,7 +7,7 @@ import pygame
 from robocov_app.look.labels import spread_labels
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import shorten_to_width
-from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.overlay import create_flat_canvas, wrap_text
 from robocov_app.viewer.chart.curves import map_curve_colors
 from robocov_app.viewer.chart.frame import ChartFrame
 from robocov_app.viewer.chart.scale import ChartScale, has_headline
@@ -24,6 +24,7 @@ HEADLINE_TEXT_PX = 23.0
 _HEADLINE_LEFT_PX = 16
 _HEADLINE_TITLE_UP_PX = 22
 _HEADLINE_NOTE_DOWN_PX = 22
+_HEADLINE_NOTE_LINE_PX = 16
 _MAX_PERCENT_WITH_DECIMAL = 99.95
 
 
@@ -53,8 +54,11 @@ def draw_captions(
     # From top to bottom: the largest value is at the top of the chart.
     panes.sort(key=lambda pane: -values[pane.number])
     spacing = MIN_CAPTION_SPACING_PX * frame.scale
-    if len(panes) > 1 and any(cut_off_notes.values()):
+    if any(cut_off_notes.values()):
         spacing += _NOTE_LINE_PX * frame.scale
+    if len(panes) == 1:
+        _draw_only_caption(canvas, frame, panes[0], value_scale, cut_off_notes[panes[0].number])
+        return
     rows = spread_labels(
         [value_scale.to_row(values[pane.number]) for pane in panes],
         gap=spacing,
@@ -74,9 +78,31 @@ def _draw_headline(canvas: Canvas, frame: ChartFrame, value: float, note: str) -
     canvas.draw_text(frame.quantity.short_title, title, color=theme.faint, size=theme.small_text)
     number = f"{value:.3f} {frame.quantity.unit}"
     canvas.draw_text(number, (left, middle), bold=True, size=HEADLINE_TEXT_PX)
-    if note:
-        position = (left, middle + _HEADLINE_NOTE_DOWN_PX * frame.scale)
-        canvas.draw_text(f"({note})", position, color=theme.error, bold=True, size=theme.text)
+    width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
+    row = middle + _HEADLINE_NOTE_DOWN_PX * frame.scale
+    for line in wrap_text(note, canvas.scale_text_size(theme.text), width, True):
+        canvas.draw_text(line, (left, row), color=theme.error, bold=True, size=theme.text)
+        row += _HEADLINE_NOTE_LINE_PX * frame.scale
+
+
+def _draw_only_caption(
+    canvas: Canvas, frame: ChartFrame, pane: Pane, value_scale: ChartScale, note: str
+) -> None:
+    """Draw the value of the only curve next to its end, with a note below it in lines that fit."""
+    theme = frame.theme
+    _, values = frame.session.displayed.get_costs(frame.quantity.name)
+    value = values[pane.number]
+    left = frame.times.right + _LEFT_PX * frame.scale
+    width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
+    note_lines = wrap_text(note, canvas.scale_text_size(theme.small_text), width)
+    line_height = _NOTE_LINE_PX * frame.scale
+    # The note ends above the numbers of the time axis.
+    row = min(value_scale.to_row(value), value_scale.bottom - line_height * len(note_lines))
+    color = map_curve_colors(frame.timeline.panes, theme)[pane.number]
+    canvas.draw_text(f"{value:.3f}", (left, row), color=color, bold=True, size=theme.small_text)
+    for line in note_lines:
+        row += line_height
+        canvas.draw_text(line, (left, row), color=theme.error, size=theme.small_text)
 
 
 def _draw_caption(
@@ -87,16 +113,16 @@ def _draw_caption(
     colors = map_curve_colors(frame.timeline.panes, frame.theme)
     left = frame.times.right + _LEFT_PX * frame.scale
     value = values[pane.number]
+    width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
     text = f"{value:.3f}"
-    if len(values) > 1:
-        if len(set(values.values())) > 1:
-            text += format_above_best(value, min(values.values()))
-        width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
-        text = _add_name(canvas, pane.controller.label, text, width)
+    if len(set(values.values())) > 1:
+        text += format_above_best(value, min(values.values()))
+    text = _add_name(canvas, pane.controller.label, text, width)
     canvas.draw_text(text, (left, row), color=colors[pane.number], bold=True, size=size)
     if note:
         position = (left, row + _NOTE_LINE_PX * frame.scale)
-        canvas.draw_text(f"({note})", position, color=frame.theme.error, size=size)
+        short_note = shorten_to_width(note, canvas.scale_text_size(size), width)
+        canvas.draw_text(short_note, position, color=frame.theme.error, size=size)
 
 
 def _add_name(canvas: Canvas, name: str, text: str, width: float) -> str:

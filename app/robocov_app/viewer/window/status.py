@@ -62,11 +62,14 @@ def list_facts(
 
 
 def describe_cut_off(viewer: ViewerModel, pane: Pane) -> str:
-    """Describe the area of a pane that no robot can reach; empty if it is negligible."""
+    """Describe the area that a pane's mean distance omits, since no robot can reach it; empty if negligible.
+
+    The mean distance decreases when robots are locked out of a room, which is no improvement.
+    """
     known_cost = viewer.costs.known.get(pane.number)
     if known_cost is None or known_cost.result.uncovered_area <= MIN_UNCOVERED_AREA_M2:
         return ""
-    return f"{known_cost.result.uncovered_area:.1f} m² cut off"
+    return f"without {known_cost.result.uncovered_area:.1f} m² cut off"
 
 
 def _list_cost_facts(known_cost: KnownCost, time: float) -> list[str]:
