@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import ipaddress
-
 from robocov_app.toolkit.window.share_link import ShareLink
-from robocov_app.web.access import find_network_address
 
 
 def build_invitation(link: ShareLink) -> dict[str, str | bool]:
@@ -21,7 +18,7 @@ def build_invitation(link: ShareLink) -> dict[str, str | bool]:
         ``link``; ``qr_code`` as a data URI, which is empty if segno is not installed; and
         ``opens_own_window``. The dictionary is empty if only this computer can reach the server.
     """
-    if _is_loopback(find_network_address(link.host)):
+    if link.is_local:
         return {}
     return {
         "link": link.address,
@@ -38,12 +35,3 @@ def build_qr_code(link: str) -> str:
         return ""
     # Black on white in both themes, with the standard quiet zone, so that every camera can read it.
     return segno.make_qr(link, error="m").svg_data_uri(border=4, dark="#000", light="#fff")
-
-
-def _is_loopback(address: str) -> bool:
-    if address == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:  # a host name
-        return False

@@ -118,7 +118,10 @@ def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     driver.viewer.attempt(lambda: driver.session.place_robot(1, (1.0, 3.0)))
     driver.add_pane()
     message = driver.viewer.message
-    assert "Not repeated: robot 2 failed, robot 1 was moved. Undo returns to the run before." in message
+    assert message == (
+        "Both controllers start again at 0 s, without these edits: robot 2 failed, robot 1 was moved. "
+        "Undo returns to the run before."
+    )
     driver.press_key("ctrl+z")
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
 
@@ -170,7 +173,7 @@ def test_controllers_that_are_shown_are_offered_last(driver: Driver) -> None:
 
 def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
     driver.add_pane()
-    assert driver.viewer.message == "All controllers start again at 0 s. Undo returns to the run before."
+    assert driver.viewer.message == "Both controllers start again at 0 s. Undo returns to the run before."
 
 
 def test_a_curve_in_a_file_has_its_beginning() -> None:

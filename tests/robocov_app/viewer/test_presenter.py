@@ -163,6 +163,18 @@ def test_a_user_map_is_offered_after_the_bundled_maps() -> None:
     assert viewer.files.list_maps() == list(list_bundled_maps())
 
 
+def test_messages_about_saved_files_have_their_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    viewer = build_presenter(folder=Path())
+    run_command(viewer, "save:session")
+    assert viewer.message == f"Session saved: {tmp_path / 'hall-1.robocov'}"
+    viewer.hidden_folder = Path()
+    run_command(viewer, "save:map")
+    assert viewer.message == "Map saved: hall-1.json. Download copies it to your device."
+
+
 def test_a_saved_map_contains_drawn_obstacles(tmp_path: Path) -> None:
     viewer = build_presenter(folder=tmp_path)
     draw_circle(viewer, (1.0, 3.0), (1.3, 3.0))

@@ -254,10 +254,30 @@ class FakeRemote:
 def test_a_browser_gets_a_link_and_downloads_the_copy(driver: Driver) -> None:
     remote = FakeRemote()
     actions = ShareActions(driver.viewer, lambda: remote)
-    actions.copy_link()
+    message = actions.copy_link()
+    assert message.startswith("Link copied, but it opens on this computer only.")
+    assert "--serve --host 0.0.0.0" in message
     assert Clipboard().get() == "http://127.0.0.1:8765/?token=watch"
     actions.save_copy()
     assert remote.offered == ["hall-copy-1.robocov"]
+
+
+def test_a_link_into_the_network_says_who_can_use_it(driver: Driver) -> None:
+    remote = FakeRemote()
+    remote.share_link = ShareLink("http://192.0.2.1:8765/?token=watch", "0.0.0.0")
+    message = ShareActions(driver.viewer, lambda: remote).copy_link()
+    assert message == "Link copied. Whoever opens it watches this window, and can ask for control."
+
+
+def test_the_message_about_a_copy_ends_with_a_command_that_opens_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with open_viewer(Path()) as driver:
+        message = ShareActions(driver.viewer, lambda: None).save_copy()
+    command = message.splitlines()[-1]
+    assert shlex.split(command) == ["robocov", "demo", str(tmp_path / "hall-copy-1.robocov")]
+    assert load_session(Path(shlex.split(command)[-1])).head.description == "started"
 
 
 @pytest.mark.parametrize("value", [2.0, 0.1, 0.1 + 0.2, 1e-7, 123456789.125, np.inf])

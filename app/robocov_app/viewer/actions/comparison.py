@@ -14,6 +14,7 @@ from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 _KINDS_NOT_REPEATED = frozenset({"hand", "robot", "failure"})
 """Kinds of events that are lost when a run restarts; edited maps, controllers and limits are kept."""
 _MAX_LISTED_EVENTS = 3
+_PAIR = 2
 
 
 class ComparisonActions:
@@ -48,13 +49,12 @@ class ComparisonActions:
         dropped = [event.text for event in events if event.kind in _KINDS_NOT_REPEATED]
         session.add_pane(ControllerChoice(name))
         viewer.inspection.active_pane = len(session.timeline.panes) - 1
-        message = "all controllers start again at 0 s."
+        pane_count = len(session.timeline.panes)
+        controllers = f"all {pane_count} controllers" if pane_count > _PAIR else "both controllers"
+        message = f"{controllers} start again at 0 s"
         if dropped:
-            listed = ", ".join(dropped[:_MAX_LISTED_EVENTS])
-            if len(dropped) > _MAX_LISTED_EVENTS:
-                listed += f" and {len(dropped) - _MAX_LISTED_EVENTS} more"
-            message += f" Not repeated: {listed}."
-        viewer.show_message(f"{message} Undo returns to the run before.")
+            message += f", without {_list_edits(dropped)}"
+        viewer.show_message(f"{message}. Undo returns to the run before.")
 
     def remove_pane(self) -> None:
         """Remove the active pane."""
@@ -106,3 +106,18 @@ class ComparisonActions:
             viewer.session.set_properties(replace_limit(setup.properties, name, value))
         else:
             viewer.session.set_controller(viewer.pane, setup.controller.with_gain(name, value))
+
+
+def _list_edits(edits: list[str]) -> str:
+    """Return the text of one or more edits, of which only the first are listed.
+
+    Examples
+    --------
+    >>> _list_edits(["robot 5 failed"])
+    'this edit: robot 5 failed'
+    """
+    listed = ", ".join(edits[:_MAX_LISTED_EVENTS])
+    if len(edits) > _MAX_LISTED_EVENTS:
+        listed += f" and {len(edits) - _MAX_LISTED_EVENTS} more"
+    demonstrative = "this edit" if len(edits) == 1 else "these edits"
+    return f"{demonstrative}: {listed}"

@@ -154,7 +154,14 @@ class FileActions:
         target = find_free_path(self.folder, Path(self.map_name).stem or "map", ".json")
         save_map(self._viewer.session.displayed.environment, target)
         self.map_name = str(target)
-        self._viewer.show_message(f"map saved: {target}")
+        self._viewer.show_message(self._describe_saved("map", target))
+
+    def _describe_saved(self, kind: str, path: Path) -> str:
+        """Return a message with the folder of a saved file; in a browser, on how to download the file."""
+        message = f"{kind} saved: {path.absolute()}"
+        if self._viewer.hidden_folder is None:
+            return message
+        return f"{message}. Download copies it to your device."
 
     def list_sessions(self) -> list[str]:
         """Return the paths of the session files in the folder."""
@@ -164,7 +171,7 @@ class FileActions:
         """Save the session to a file, by default to its own or to a new one."""
         saved = self.workspace.save(self.folder, self.view, path)
         self._add_recent(saved)
-        self._viewer.show_message(f"session saved: {saved}")
+        self._viewer.show_message(self._describe_saved("session", saved))
 
     def save_copy(self) -> Path:
         """Save a copy of the session to a new file, and return its path; the session keeps its own file.

@@ -1,5 +1,6 @@
 """Actions of the share menu: they copy the run as text or as a link, and save a copy of the session."""
 
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -64,7 +65,8 @@ class ShareActions:
         path = self._viewer.files.save_copy()
         remote = self._get_remote()
         if remote is None:
-            return f"Copy saved: {path}. Open it with robocov demo {path.name}."
+            # The command has a line of its own, so that it can be told from the sentence.
+            return f"Copy saved. To open it, run:\nrobocov demo {shlex.quote(str(path.absolute()))}"
         remote.offer_file(path.name)
         return f"Copy saved: {path.name}. It is in your downloads."
 
@@ -80,6 +82,11 @@ class ShareActions:
         if remote is None:
             raise ParameterError("this window has no link; robocov demo --serve opens one that has")
         self.clipboard.put(remote.share_link.address)
+        if remote.share_link.is_local:
+            return (
+                "Link copied, but it opens on this computer only. "
+                "To share it in your network, start robocov with --serve --host 0.0.0.0."
+            )
         if remote.share_link.opens_own_window:
             return "Link copied. Whoever opens it gets a window of their own."
         return "Link copied. Whoever opens it watches this window, and can ask for control."
