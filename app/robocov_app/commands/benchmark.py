@@ -67,7 +67,7 @@ class Arguments(JsonOption):
     paths: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[DIR ...]")] = ()
     """Results, for verify and page."""
     controller: str | None = None
-    """Name of a controller, FILE.py:CLASS, oracle or learned; with verify only for one in a file."""
+    """Name of a controller, FILE.py:CLASS, oracle or learned; verify needs it only for FILE.py:CLASS."""
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
     """Gains that differ from their defaults."""
     track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()
@@ -77,7 +77,7 @@ class Arguments(JsonOption):
     quick: bool = False
     """Two tracks, with the first map of each family and one seed."""
     out: Path | None = None
-    """Folder of the result, by default benchmark; file of the page, or of the references."""
+    """Folder of the result (default: benchmark); with page or references, the file to write."""
     workers: int | None = None
     """Number of processes on this machine; by default one per processor."""
     scheduler: str | None = None

@@ -18,7 +18,7 @@ from robocov_app.terminal.output import BOLD, RIGHT, list_files, print_answer, p
 class Arguments(RunOptions):
     """Compare controllers that start from the same positions, under the same limits.
 
-    The folder contains a run's folder for each controller, figures of the trajectories and costs side by side
+    The folder contains a run folder for each controller, figures of the trajectories and costs side by side
     as PNG and SVG, comparison.csv and comparison.json, and with --frames or --video frames or a video.
 
     --set k_rep=1 applies to every controller with such a gain, --set rapf.k_rep=1 to one. Controllers in

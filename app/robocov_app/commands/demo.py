@@ -48,7 +48,7 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     """
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[MAP]")] = ""
-    """Path of a map or session file, or the name of a bundled map (with other options: rooms)."""
+    """Path of a map or session file, or the name of a bundled map (default with other options: rooms)."""
     controllers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("rapf",)
     """Up to four controllers side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()

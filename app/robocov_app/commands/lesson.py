@@ -17,9 +17,10 @@ _NEVER_ENDS = 2
 class Arguments(JsonOption):
     """Check a lesson: a session file with chapters, played by `robocov demo --lesson FILE`.
 
-    Play what the chapters should show in the window, save the session (Ctrl+S), and add "lesson" to the file:
-    a title and chapters. Each chapter has a title, a text, the index of its last edit and the condition at
-    which it ends; a question or a task may be added (see robocov schema session). All chapters are simulated.
+    In the window, play what the chapters should show, save the session (Ctrl+S), and add "lesson" to the
+    file: a title and chapters. Each chapter has a title, a text, the index of its last edit and the condition
+    at which it ends; a question or a task may be added (see robocov schema session). All chapters are
+    simulated.
 
     Example: robocov lesson check mine.robocov
     """

@@ -95,7 +95,7 @@ class WebOptions:
     """The window in a browser."""
 
     serve: bool = False
-    """Show the window in browsers instead of on this screen; prints the link."""
+    """Show the window in browsers instead of on this screen; prints the links."""
     host: str = "127.0.0.1"
     """Address to listen on with --serve; 0.0.0.0 for all addresses of this machine (not encrypted)."""
     port: int = 8765
@@ -161,7 +161,7 @@ class ConditionOptions:
     fail: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROBOT@S ...")] = ()
     """Robots that fail, with their times: --fail 3@20 5@40. They stop, and become obstacles."""
     join: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROBOT@S[:X,Y] ...")] = ()
-    """Robots that join late, with their times, and positions if not their starts: --join 6@30:2.5,1."""
+    """Robots that join late, with their times and, optionally, positions: --join 6@30:2.5,1."""
     density: Literal["known", "sensed"] = "known"
     """Whether robots know the density, or can only measure it within their sensing range."""
 

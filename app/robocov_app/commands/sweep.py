@@ -66,12 +66,11 @@ class Arguments(JsonOption):
     parquet: bool = False
     """Write the table as results.parquet, too (pip install "robocov[parquet]")."""
     retry_failed: bool = False
-    """Run failed runs again."""
+    """Repeat failed runs."""
     keep_versions: bool = False
     """Reuse runs of other versions of robocov, numpy, scipy, shapely or pymunk."""
     dry_run: bool = False
-    """Count the runs, time one run of each controller, estimate the time and disk space of all runs, and
-    write nothing."""
+    """Count the runs, time one of each controller, estimate time and disk space, and write nothing."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:

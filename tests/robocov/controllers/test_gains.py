@@ -29,7 +29,7 @@ def test_gains_are_validated_by_name_and_range() -> None:
         k_rep=1.0, attraction_limit=None
     )
     assert isinstance(make_controller("rapf", {"k_rep": 1}).k_rep, float)
-    with pytest.raises(ParameterError, match=r"rapf.k_rep: expected a number from 0 to 1e\+06 N m³, got -1"):
+    with pytest.raises(ParameterError, match=r"rapf.k_rep: expected a number from 0 to 1000000 N m³, got -1"):
         make_controller("rapf", {"k_rep": -1})
     with pytest.raises(ParameterError, match=r"rapf: unknown gain 'krep': did you mean 'k_rep'\?"):
         make_controller("rapf", {"krep": 1})

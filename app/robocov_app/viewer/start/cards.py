@@ -87,7 +87,7 @@ START_CARDS = (
         "Draw a map, then let robots cover it.",
     ),
     StartCard(
-        StartChoice("Lesson: what holds robots back", Target.LESSON),
+        StartChoice("Lesson: an unknown building", Target.LESSON),
         "Eleven short chapters with questions to answer.",
         ("lesson",),
     ),

@@ -102,7 +102,7 @@ class ConditionModel(_Model):
     step: Step | None = Field(None, description="A step of the simulation")
     settled: Literal[True] | None = Field(None, description="The team has settled")
     robot: RobotNumber | None = Field(
-        None, description="The robot that is to be in `inside`, or out of `outside`"
+        None, description="Robot that must be inside the box `inside`, or outside the box `outside`"
     )
     inside: _Box | None = Field(None, description="Box [x_min, y_min, x_max, y_max] in meters")
     outside: _Box | None = Field(None, description="Box [x_min, y_min, x_max, y_max] in meters")
@@ -195,7 +195,7 @@ class SessionModel(_Model, title="robocov session"):
     head: Annotated[int, Field(ge=0, description="Number of the edit whose time span contains the present")]
     step: Step = Field(description="Displayed step")
     view: dict[str, Any] = Field({}, description="Displayed layers and theme")
-    lesson: LessonModel | None = Field(None, description="The lesson, if the session is one")
+    lesson: LessonModel | None = Field(None, description="Lesson, if the session contains one")
 
 
 def build_session_schema() -> dict[str, Any]:
