@@ -22,7 +22,7 @@ def explain_kept_edits(view: ViewState) -> str:
 
 def _explain_recovery(view: ViewState) -> str:
     if view.is_compact:
-        return "More, Commands, Recover a session opens it."
+        return "More → Commands → Recover a session opens it."
     return "Ctrl+Shift+O opens it."
 
 

@@ -296,7 +296,7 @@ def test_an_own_lesson_can_be_played_again(tmp_path: Path) -> None:
         advance_session(driver.session, 10)
         driver.window.lesson.start(path)
         driver.window.lesson.end()
-        assert driver.viewer.message == "The lesson has ended; your session from before is back"
+        assert driver.viewer.message == "The lesson has ended; your previous session is back"
         driver.press_key("f2")
         lesson = driver.window.lesson.player
         assert lesson is not None
@@ -310,7 +310,7 @@ def test_a_session_before_a_lesson_is_set_aside(tmp_path: Path) -> None:
         driver.press_key("f2")
         assert driver.viewer.message == "Your session is set aside. It returns when the lesson ends."
         driver.press_key("escape")
-        assert driver.viewer.message == "The lesson has ended; your session from before is back"
+        assert driver.viewer.message == "The lesson has ended; your previous session is back"
         assert driver.session is session
 
 

@@ -428,7 +428,7 @@ class LessonPlayer:
         self._suspended.restore()
         message = f"the lesson has ended; {explain_lesson_repetition(viewer.view)}"
         if self._suspended.has_work:
-            message = "the lesson has ended; your session from before is back"
+            message = "the lesson has ended; your previous session is back"
         if keeps_draft:
             message += f". {explain_kept_edits(self._viewer.view)}"
         viewer.show_message(message)
