@@ -16,6 +16,7 @@ from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, create_file_choice
 from robocov_app.toolkit.widgets.page import Widget
+from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.widgets.ui import Ui
 
 KEYS = {
@@ -193,6 +194,28 @@ class TestTextField:
         page.type("日本")
         page.press_keys("return")
         assert page.name == "日本"
+
+
+def draw_empty_field(screen: pygame.Surface, placeholder: str) -> bytes:
+    """Return the pixels of the cursor in an empty field that is being edited."""
+    ui = Ui(lambda page: page.text_field("name", "", placeholder=placeholder), LIGHT)
+    ui.box = screen.get_rect()
+    ui.focus = "name"
+    ui.edit = TextEdit.append_to("")
+    screen.fill(LIGHT.panel)
+    ui.run()
+    ui.draw(screen)
+    (field,) = ui.widgets.values()
+    cursor = pygame.Rect(field.rect.topleft, (_CURSOR_PART_PX, field.rect.height))
+    return pygame.image.tobytes(screen.subsurface(cursor), "RGB")
+
+
+_CURSOR_PART_PX = 8
+"""Width of the part of a field up to its cursor."""
+
+
+def test_the_cursor_of_an_empty_field_does_not_cover_its_placeholder(screen: pygame.Surface) -> None:
+    assert draw_empty_field(screen, "type to find") == draw_empty_field(screen, "")
 
 
 class TestDropdown:

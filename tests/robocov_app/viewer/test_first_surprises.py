@@ -171,6 +171,14 @@ def test_controllers_that_are_shown_are_offered_last(driver: Driver) -> None:
     assert (options[-1].text, options[-1].note) == ("RAPF", "already shown")
 
 
+def test_controllers_to_compare_with_are_described(driver: Driver) -> None:
+    driver.push_button("pane:add")
+    options = {option.text: option for option in driver.window.dialogs.current.options("")}
+    assert options["Lloyd"].description.startswith("Lloyd's algorithm: every robot moves")
+    for name, option in options.items():
+        assert option.description or name == "RAPF"
+
+
 def test_a_comparison_of_an_unchanged_run_has_nothing_to_say(driver: Driver) -> None:
     driver.add_pane()
     assert driver.viewer.message == "Both controllers start again at 0 s. Undo returns to the run before."

@@ -187,6 +187,24 @@ def test_hints_of_tools_on_a_phone_mention_neither_keys_nor_clicks(upright_phone
         assert not re.search(r"click|Enter|Alt|Shift|wheel|\[", upright_phone.viewer.message), name
 
 
+def test_a_list_has_a_button_that_closes_it(phone: Driver) -> None:
+    """Phones have no Escape key."""
+    phone.window.set_appearance(
+        PageAppearance(scale=RATIO, theme="light", shows_panel=False, is_compact=True, is_motion_reduced=True)
+    )
+    run_page_command(phone, "pane:add")
+    phone.run_frames(2)
+    box = phone.window.dialogs.box
+    button = phone.window.dialogs.ui.find("button", "close")
+    assert box is not None
+    assert button is not None
+    assert box.contains(button.rect)
+    assert phone.window.screen.get_rect().contains(box)
+    phone.click(*button.rect.center)
+    assert not phone.window.dialogs.is_open
+    assert len(phone.session.timeline.panes) == 1
+
+
 def test_options_of_a_list_are_large_enough_for_fingers(phone: Driver) -> None:
     phone.window.set_appearance(
         PageAppearance(scale=RATIO, theme="light", shows_panel=False, is_compact=True, is_motion_reduced=True)

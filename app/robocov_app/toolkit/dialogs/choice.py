@@ -1,12 +1,14 @@
 """Lists that are filtered by typing."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import pygame
 from pygame import Rect
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.toolkit.dialogs.dialog import Dialog
+from robocov_app.toolkit.widgets.appearance import draw_box, shade
 from robocov_app.toolkit.widgets.text_edit import TextEdit
 from robocov_app.toolkit.widgets.ui import Ui
 from robocov_app.toolkit.window.input import ENTER_KEYS
@@ -22,8 +24,17 @@ _TOP_PX = 64
 _TITLE_GAP_PX = 4
 _OPTION_PX = 26
 _FINGER_OPTION_PX = 44
+_DESCRIBED_OPTION_PX = 38
+_FINGER_DESCRIBED_OPTION_PX = 48
 _OPTION_GAP_PX = 1
-_OTHER_HEIGHT_PX = 160
+_BAR_WIDTH_PX = 4
+_BAR_RIGHT_PX = 8
+"""Distance of the scroll bar from the right end of the options."""
+_BAR_SHADE = 0.3
+_CLOSE_ABOVE_PX = 8
+_CLOSE_HEIGHT_PX = 32
+_CLOSE_WIDTH_PX = 96
+_OTHER_HEIGHT_PX = 190
 """Height of everything except for the options, and of the margins above and below the list."""
 
 
@@ -42,6 +53,8 @@ class Option:
         Why it cannot be chosen; empty if it can.
     value : object
         Data for the function that handles the choice.
+    description : str
+        Faint text below `text`.
     """
 
     text: str
@@ -49,6 +62,7 @@ class Option:
     completion: str = ""
     disabled_reason: str = ""
     value: object = None
+    description: str = ""
 
 
 @dataclass
@@ -93,6 +107,7 @@ class Choice(Dialog):
     highlighted: int = 0
     top: int = 0
     error: str = ""
+    _has_descriptions: bool = field(default=False, init=False)
 
     def show_content(self, ui: Ui) -> None:
         """Show the field and the list."""
@@ -108,16 +123,25 @@ class Choice(Dialog):
         options = list(self.options(self.text))
         self.highlighted = min(self.highlighted, max(len(options) - 1, 0))
         self._show_options(ui, options)
-        ui.row(height=22, below=0)
         facts: list[str] = []
         if len(options) > self._visible_count:
             facts.append(f"{len(options)} in all")
         if self.has_key_hints:
             facts.append(self.hint)
-        ui.label(" · ".join(facts), style="unit", align="center")
+            ui.row(height=22, below=0)
+            ui.label(" · ".join(facts), style="unit", align="center")
+            return
+        # A phone has no Escape key.
+        ui.space(_CLOSE_ABOVE_PX)
+        ui.row(ui.width - _CLOSE_WIDTH_PX, _CLOSE_WIDTH_PX, height=_CLOSE_HEIGHT_PX, gap=0, below=0)
+        ui.label(" · ".join(facts), style="unit")
+        if ui.button("Close", key="close"):
+            self.is_done = True
+            self.handle_cancel()
 
     def _show_options(self, ui: Ui, options: Sequence[Option]) -> None:
         """Show the visible lines of the list, and accept the one that is clicked."""
+        self._has_descriptions = any(option.description for option in options)
         ui.row(height=self._option_height, below=_OPTION_GAP_PX)
         if not options:
             ui.label(self.empty_text, style="unit")
@@ -127,21 +151,37 @@ class Choice(Dialog):
                 option.text,
                 option.note,
                 key=f"option:{number}",
+                description=option.description,
                 highlighted=number == self.highlighted,
                 disabled_reason=option.disabled_reason,
             )
             if is_clicked:
                 self._accept(option, ui)
+        self._draw_scroll_bar(ui, len(options))
+
+    def _draw_scroll_bar(self, ui: Ui, count: int) -> None:
+        """Draw which of the options are visible, over their right ends; nothing if all of them are."""
+        boxes = [widget.rect for widget in ui.widgets.values() if widget.kind == "option"]
+        if ui.surface is None or count <= len(boxes):
+            return
+        area = boxes[0].unionall(boxes[1:])
+        height = round(area.height * len(boxes) / count)
+        top = area.top + round(area.height * self.top / count)
+        left = area.right - ui.px(_BAR_RIGHT_PX)
+        bar = pygame.Rect(left, top, ui.px(_BAR_WIDTH_PX), height)
+        draw_box(ui, bar, shade(ui, _BAR_SHADE), radius=_BAR_WIDTH_PX / 2)
 
     @property
     def _option_height(self) -> int:
         """Height of an option at scale 1, px; enough for a finger on a phone."""
+        if self._has_descriptions:
+            return _DESCRIBED_OPTION_PX if self.has_key_hints else _FINGER_DESCRIBED_OPTION_PX
         return _OPTION_PX if self.has_key_hints else _FINGER_OPTION_PX
 
     @property
     def _visible_count(self) -> int:
         """Maximum number of options that are visible at once."""
-        if self.has_key_hints:
+        if self.has_key_hints and not self._has_descriptions:
             return MAX_VISIBLE_OPTIONS
         free_height = self.window_height - _OTHER_HEIGHT_PX
         count = min(free_height / (self._option_height + _OPTION_GAP_PX), MAX_VISIBLE_OPTIONS)

@@ -31,6 +31,9 @@ _LINE_PX = TEXT_PX + 5
 _BUTTON_MARGIN_PX = 1
 _OPTION_MARGIN_PX = 8
 _NOTE_GAP_PX = 12
+_DESCRIBED_TEXT_UP_PX = 8
+"""Distance by which the text of an option is above its middle, if there is a description below it."""
+_DESCRIPTION_DOWN_PX = 9
 _TABS_GAP_PX = 8
 _CHECK_BOX_PX = 16
 _CHECK_BOX_RADIUS_PX = 3.0
@@ -97,7 +100,14 @@ def show_button(
 
 
 def show_option(
-    page: Page, text: str, note: str = "", *, key: str, highlighted: bool = False, disabled_reason: str = ""
+    page: Page,
+    text: str,
+    note: str = "",
+    *,
+    key: str,
+    description: str = "",
+    highlighted: bool = False,
+    disabled_reason: str = "",
 ) -> bool:
     """Show a line of a list that can be clicked.
 
@@ -109,6 +119,8 @@ def show_option(
     note : str
         Faint text at the right end.
     key : str
+    description : str
+        Faint text below a text of one line.
     highlighted : bool
         Whether it is highlighted.
     disabled_reason : str
@@ -128,6 +140,10 @@ def show_option(
     elif page.is_hovered(rect):
         draw_box(page, rect, mix(page.theme.panel, page.theme.accent, _HOVERED_TINT))
     inner = rect.inflate(-page.px(2 * _OPTION_MARGIN_PX), 0)
+    if description:
+        below = inner.move(0, page.px(_DESCRIPTION_DOWN_PX))
+        draw_text(page, description, below, page.theme.faint, SMALL_TEXT_PX)
+        inner.top -= page.px(_DESCRIBED_TEXT_UP_PX)
     draw_text(page, note, inner, page.theme.faint, SMALL_TEXT_PX, align="right")
     if note:
         # The text must not run into the note.

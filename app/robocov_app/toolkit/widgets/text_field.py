@@ -25,6 +25,7 @@ from robocov_app.toolkit.window.input import ENTER_KEYS
 _MARGIN_PX = 6
 _CURSOR_HEIGHT_PX = 17
 _CURSOR_WIDTH_PX = 1
+_PLACEHOLDER_SHIFT_PX = 3
 _INNER_MARGIN_PX = 2
 """Margin of the text above and below it; also the space for the cursor at both ends of the text."""
 _EDITED_EDGE_WIDTH_PX = 1.25
@@ -164,7 +165,9 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     # Composed text is shown at the caret and underlined, although it is not part of the text yet.
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
     image = render_text(text or placeholder, size, _get_text_color(page, text))
-    screen.blit(image, image.get_rect(midleft=(left, rect.centery)))
+    # The cursor must not cover the first letter of the placeholder.
+    text_left = left if text else left + page.px(_PLACEHOLDER_SHIFT_PX)
+    screen.blit(image, image.get_rect(midleft=(text_left, rect.centery)))
     x = left + measure_text(edit.text[: edit.caret], size)
     line_width = max(1, page.px(_CURSOR_WIDTH_PX))
     if edit.composed:

@@ -494,6 +494,29 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
     return labels
 
 
+def describe_controllers(names: Iterable[str], shown: Iterable[str]) -> dict[str, str]:
+    """Return a line about each controller, by name; empty for those in use, as in `label_controllers`.
+
+    Examples
+    --------
+    >>> describe_controllers(["lloyd", "rapf"], ["rapf"])["lloyd"]
+    "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
+    """
+    shown_names = set(shown)
+    descriptions: dict[str, str] = {}
+    for name in names:
+        summary = "" if name in shown_names else _load_summary(name)
+        descriptions[name] = to_sentence_case(summary)
+    return descriptions
+
+
+def _load_summary(name: str) -> str:
+    try:
+        return str(getattr(load_controller_class(name), "summary", ""))
+    except ParameterError:  # its file has been changed in the meantime
+        return ""
+
+
 def _load_label(name: str) -> str:
     try:
         return str(load_controller_class(name).label)

@@ -15,7 +15,7 @@ from robocov_app.toolkit.dialogs import (
     create_list_choice,
     create_recovery_question,
 )
-from robocov_app.viewer.panel.panel import label_controllers
+from robocov_app.viewer.panel.panel import describe_controllers, label_controllers
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
 from robocov_app.viewer.session.files.workspace import describe_draft
@@ -68,10 +68,11 @@ def build_comparison_dialog(viewer: Presenter) -> Choice:
     choices = [viewer.session.displayed.get_setup(pane).controller for pane in panes]
     shown_labels = {choice.name: choice.label for choice in choices}
     labels = label_controllers(viewer.controllers, shown_labels)
+    descriptions = describe_controllers(viewer.controllers, shown_labels)
     options: list[Option] = []
     for name in viewer.comparison.list_candidates():
         note = "already shown" if name in shown_labels else ""
-        options.append(Option(labels[name], note, value=name))
+        options.append(Option(labels[name], note, value=name, description=descriptions[name]))
 
     def add(option: Option) -> None:
         viewer.comparison.add_pane(str(option.value))
