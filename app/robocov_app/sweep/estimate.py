@@ -39,7 +39,7 @@ class ControllerEstimate:
     seconds_per_run : float, s
         Computing time of a run. If a run takes longer than the time for a trial, only its start is measured.
     bytes_per_run : int
-        Size of the files of a run.
+        Size of the files of a run, for the mean number of robots.
     """
 
     runs: int
@@ -109,8 +109,16 @@ def estimate_sweep(
     trials = _select_middle_tasks(generate_tasks(study), counts)
     trials |= _select_middle_tasks(compress(generate_tasks(study), survey.must_execute), left_counts)
     max_seconds = min(_MAX_TRIAL_SECONDS, _MAX_TOTAL_SECONDS / len(trials))
+    # Every controller has runs with each number of robots.
+    mean_robots = sum(study.robots) / len(study.robots)
     controllers = {
-        controller: _estimate_controller(task, counts[controller], left_counts[controller], max_seconds)
+        controller: _estimate_controller(
+            task,
+            runs=counts[controller],
+            left=left_counts[controller],
+            mean_robots=mean_robots,
+            max_seconds=max_seconds,
+        )
         for controller, task in trials.items()
     }
     left = left_counts.total()
@@ -146,7 +154,9 @@ def _select_middle_tasks(tasks: Iterable[Task], counts: Counter[str]) -> dict[st
     return middle_tasks
 
 
-def _estimate_controller(task: Task, runs: int, left: int, max_seconds: float) -> ControllerEstimate:
+def _estimate_controller(
+    task: Task, *, runs: int, left: int, mean_robots: float, max_seconds: float
+) -> ControllerEstimate:
     """Estimate the runs of a controller from one of its tasks."""
     # Not timed: the coverage cost is prepared only once for all runs on a map.
     prepare_cost(task)
@@ -164,6 +174,8 @@ def _estimate_controller(task: Task, runs: int, left: int, max_seconds: float) -
         # A part of the files grows with the duration, the rest does not.
         growth = (size - _measure_files(first_outcome)) / (duration - first_duration)
         size += round(growth * (task.duration - duration))
+    # The files consist mainly of the trajectories of the robots.
+    size = round(size * mean_robots / task.robots)
     return ControllerEstimate(
         runs=runs,
         left=left,

@@ -78,6 +78,13 @@ def test_only_the_start_of_a_slow_run_is_executed(monkeypatch: pytest.MonkeyPatc
     assert estimate.controllers["rapf"].bytes_per_run == pytest.approx(size, rel=0.5)
 
 
+def test_the_size_is_that_of_the_mean_number_of_robots(tmp_path: Path) -> None:
+    study = build_small_study(robots=(2, 4), duration=10.0)
+    estimate = estimate_sweep(study, tmp_path, workers=1)
+    sizes = [sum(len(content) for content in perform(task).files.values()) for task in generate_tasks(study)]
+    assert estimate.total_bytes == pytest.approx(sum(sizes), rel=0.2)
+
+
 def test_finished_runs_are_not_counted(tmp_path: Path) -> None:
     study = build_small_study(seeds=range(3))
     tasks = list(generate_tasks(study))
