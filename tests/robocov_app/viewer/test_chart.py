@@ -33,6 +33,23 @@ def play(driver: Driver, frames: int = 60) -> None:
     driver.run_frames(8)
 
 
+def test_a_paused_window_is_not_called_live(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn_texts: list[str] = []
+    draw_text = Canvas.draw_text
+
+    def draw_and_list(canvas: Canvas, text: str, *args: Any, **kwargs: Any) -> int:
+        drawn_texts.append(text)
+        return draw_text(canvas, text, *args, **kwargs)
+
+    monkeypatch.setattr(Canvas, "draw_text", draw_and_list)
+    for is_playing, expected, other in ((True, "Live", "Paused"), (False, "Paused", "Live")):
+        driver.session.playback.is_playing = is_playing
+        drawn_texts.clear()
+        driver.window.chart.draw(driver.window.screen)
+        assert expected in drawn_texts
+        assert other not in drawn_texts
+
+
 @pytest.mark.parametrize("width", [480, 900])
 def test_times_do_not_overlap_in_a_narrow_chart(
     tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch

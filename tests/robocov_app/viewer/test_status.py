@@ -32,6 +32,8 @@ def test_the_status_line_contains_time_cost_and_speed(viewer: Presenter) -> None
     assert facts[1].startswith("cost ")
     assert facts[1].endswith(" m³")
     assert facts[-3:] == ["1×", "60 steps/s", "60 fps"]
+    viewer.session.playback.is_playing = False
+    assert list_facts(viewer, 60.0, 60.0, None)[-2:] == ["1×", "60 fps"], "no step is made while it is paused"
 
 
 def test_the_cost_in_the_status_line_names_its_controller_if_there_are_several(viewer: Presenter) -> None:

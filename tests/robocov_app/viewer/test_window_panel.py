@@ -30,6 +30,17 @@ def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     assert driver.session.timeline.panes[0].controller.name == "lloyd"
 
 
+def test_parameters_in_a_comparison_name_their_controller(driver: Driver) -> None:
+    section = driver.find_widget("section", "section:gains")
+    assert section is not None
+    assert section.text == "RAPF"
+    driver.add_pane()
+    driver.settle()
+    section = driver.find_widget("section", "section:gains")
+    assert section is not None
+    assert section.text == "Parameters of RPF"
+
+
 def test_the_menu_shows_the_controller_of_a_branch_that_takes_long_to_reach(
     driver: Driver, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -687,7 +687,7 @@ def test_a_finger_that_moves_to_the_side_moves_a_slider_of_the_panel(touch):
 
 
 def test_the_buttons_of_a_phone_are_large(shared_phone):
-    assert list_bar_buttons(shared_phone) == ["Play", "Undo", "Tools", "Panel", "Lesson", "More"]
+    assert list_bar_buttons(shared_phone) == ["Play", "Undo", "Tools", "Settings", "Lesson", "More"]
     assert are_large(shared_phone.find_all("#touch button"))
     shared_phone.find("#to-more").click()
     assert are_large(shared_phone.find_all("#more button"))
@@ -703,7 +703,9 @@ def test_the_bar_of_a_phone_plays_and_pauses(phone):
 def test_the_bar_of_a_phone_shows_the_chosen_tool(phone):
     phone.find("#to-tools").click()
     phone.find("[data-command='tool:failure']").click()
-    phone.wait_until(lambda: phone.find("#to-tools").text == "Fail robot")
+    button = phone.find("#to-tools")
+    phone.wait_until(lambda: button.get_attribute("aria-label") == "Tools: Fail robot")
+    assert button.text == "Tools", "users find it again"
 
 
 def test_the_bar_of_a_phone_undoes_an_edit(phone):
@@ -746,11 +748,12 @@ class PhoneEditor:
         """Choose a tool, which the button of the tools then shows."""
         self.browser.find("#to-tools").click()
         self.browser.find(f"[data-command='tool:{name}']").click()
-        self.browser.wait_until(lambda: self.browser.find("#to-tools").text == label)
+        button = self.browser.find("#to-tools")
+        self.browser.wait_until(lambda: button.get_attribute("aria-label") == label)
 
     def draw_wall(self):
         """Draw a wall across the screen."""
-        self.choose_tool("wall", "Wall")
+        self.choose_tool("wall", "Tools: Wall")
         self.touch((110, 400))
         self.touch((250, 400))
         self.browser.wait_until(lambda: self.browser.find("#try").text == "Finish")

@@ -217,6 +217,7 @@ class Chart:
             self.viewer.costs.state,
             None if timeline.is_live else frame.session.displayed.time,
             timeline.past_version,
+            frame.session.playback.is_playing,
         )
         is_old = self.viewer.now - self._page_time >= REFRESH_INTERVAL_S
         has_grown = is_old and samples != self._page_samples

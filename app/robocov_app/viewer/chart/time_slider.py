@@ -51,19 +51,21 @@ def draw_empty_slider(canvas: Canvas, frame: ChartFrame, times: TimeScale) -> No
 
 
 def _draw_state(canvas: Canvas, frame: ChartFrame, left: float, middle: float) -> None:
-    """Draw a label: whether the past is shown, or the present, and whether the past was thinned."""
+    """Draw a label: whether the past is shown, or the present, which may be paused or have a thinned past."""
     theme = frame.theme
     size = theme.small_text
     if not frame.timeline.is_live:
         canvas.draw_text("Past", (left, middle), color=theme.accent, bold=True, size=size)
         return
+    state = "Live" if frame.session.playback.is_playing else "Paused"
+    color = theme.start if frame.session.playback.is_playing else theme.faint
     if not frame.timeline.history.thinned:
-        canvas.draw_text("Live", (left, middle), color=theme.start, bold=True, size=size)
+        canvas.draw_text(state, (left, middle), color=color, bold=True, size=size)
         return
-    text = "Live (older history is coarser)"
+    text = f"{state} (older history is coarser)"
     if left + canvas.measure_text(text, size=size) > frame.layout.time_slider.width:
-        text = "Live (coarser)"
-    canvas.draw_text(text, (left, middle), color=theme.start, size=size)
+        text = f"{state} (coarser)"
+    canvas.draw_text(text, (left, middle), color=color, size=size)
 
 
 def draw_slider_state(screen: pygame.Surface, frame: ChartFrame) -> None:

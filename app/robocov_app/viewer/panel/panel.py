@@ -267,8 +267,11 @@ class ViewerPanel(CommandPanel):
         advanced = [parameter for parameter in parameters if parameter.is_advanced]
         gains = [parameter for parameter in basic if not parameter.name.startswith("team.")]
         limits = [parameter for parameter in basic if parameter.name.startswith("team.")]
+        heading = controller.label
+        if len(self.viewer.session.timeline.panes) > 1:
+            heading = f"Parameters of {controller.label}"
         with ui.scroll(f"parameters:{controller.name}"):
-            if ui.section(controller.label, key="gains"):
+            if ui.section(heading, key="gains"):
                 self._show_parameter_group(ui, gains)
             if ui.section("Robots", key="robots"):
                 self._show_parameter_group(ui, limits)

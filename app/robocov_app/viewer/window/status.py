@@ -56,7 +56,8 @@ def list_facts(
         facts.append(f"● video {video_duration:.0f} s")
     facts.append(_describe_speed(viewer, step_rate))
     facts.append(describe_cursor(viewer))
-    facts.append(f"{step_rate:.0f} steps/s")
+    if session.playback.is_playing:
+        facts.append(f"{step_rate:.0f} steps/s")
     facts.append(f"{frame_rate:.0f} fps")
     return [fact for fact in facts if fact]
 
