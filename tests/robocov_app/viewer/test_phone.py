@@ -311,6 +311,18 @@ def test_menus_have_rows_for_fingers_and_no_keys(phone: Driver) -> None:
         assert window.contains(option.rect)
 
 
+def test_the_share_menu_opens_near_the_buttons_of_a_phone(upright_phone: Driver) -> None:
+    run_page_command(upright_phone, "share")
+    upright_phone.run_frames(2)
+    box = upright_phone.window.dialogs.box
+    width, height = upright_phone.window.layout.size
+    assert box is not None
+    assert box.bottom > 0.95 * height
+    assert box.left > 0
+    assert box.right < width
+    assert box.bottom < height
+
+
 def test_a_button_of_the_page_closes_what_covers_the_window(upright_phone: Driver) -> None:
     run_page_command(upright_phone, "share")
     assert upright_phone.window.dialogs.is_open

@@ -16,6 +16,8 @@ _ROW_PX = 24
 _FINGER_ROW_PX = 48
 _SEPARATOR_PX = 7
 _TEXT_MARGINS_PX = 50
+_WINDOW_GAP_PX = 4
+"""Minimum distance of a menu from the edges of the window."""
 
 _KEY_STEPS = {"up": -1, "down": 1}
 
@@ -27,8 +29,9 @@ class Menu(Dialog):
     ----------
     rows : sequence of Command or None
         None leaves space between groups.
-    position : (x, y), px
-        Upper left corner; the menu moves if it does not fit there.
+    position : (x, y) or None, px
+        Upper left corner; the menu moves if it does not fit there. If None, it opens in the middle of the
+        lower edge, as the sheets of a phone do.
     run : callable
         Runs a command by its name.
     is_for_fingers : bool
@@ -49,7 +52,7 @@ class Menu(Dialog):
     def __init__(
         self,
         rows: Sequence[Command | None],
-        position: tuple[int, int],
+        position: tuple[int, int] | None,
         run: Callable[[str], object],
         *,
         is_for_fingers: bool = False,
@@ -141,9 +144,15 @@ class Menu(Dialog):
         separator_count = len(self.rows) - command_count
         _, margin = self.margin
         height = command_count * self._row_height + separator_count * _SEPARATOR_PX + 2 * margin
-        size = (round(_TEXT_MARGINS_PX * scale) + max(widths), min(round(height * scale), screen.height))
-        box.update(self._position, size)
-        box.clamp_ip(screen)
+        gap = round(_WINDOW_GAP_PX * scale)
+        free_area = screen.inflate(-2 * gap, -2 * gap)
+        box.width = round(_TEXT_MARGINS_PX * scale) + max(widths)
+        box.height = min(round(height * scale), free_area.height)
+        if self._position is None:
+            box.midbottom = free_area.midbottom
+        else:
+            box.topleft = self._position
+        box.clamp_ip(free_area)
 
 
 def _is_enabled(command: Command | None) -> bool:

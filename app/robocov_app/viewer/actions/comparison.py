@@ -54,7 +54,8 @@ class ComparisonActions:
         message = f"{controllers} start again at 0 s"
         if dropped:
             message += f", without {_list_edits(dropped)}"
-        viewer.show_message(f"{message}. Undo returns to the run before.")
+        # The list of controllers has already said that undo returns to the run before.
+        viewer.show_message(f"{message}.")
 
     def remove_pane(self) -> None:
         """Remove the active pane."""

@@ -55,8 +55,11 @@ class WindowMenus:
         """Open the context menu of the selection at a pixel."""
         self._open_menu(list_context_commands(self._viewer), pixel)
 
-    def open_share_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the menu of what can be shared at a pixel; links need a served window."""
+    def open_share_menu(self, pixel: tuple[int, int] | None) -> None:
+        """Open the menu of what can be shared at a pixel or, without one, at the lower edge of the window.
+
+        Links need a served window.
+        """
         names = list(SHARE_COMMANDS)
         if self._share.has_link:
             names.insert(0, LINK_COMMAND)
@@ -66,7 +69,7 @@ class WindowMenus:
         """Open the menu of the presets of layers at a pixel."""
         self._open_menu([f"preset:{preset.name}" for preset in LAYER_PRESETS], pixel)
 
-    def _open_menu(self, names: Sequence[str], pixel: tuple[int, int]) -> None:
+    def _open_menu(self, names: Sequence[str], pixel: tuple[int, int] | None) -> None:
         """Open a menu of commands; an empty name separates two groups."""
         rows = [self._get_command(name) if name else None for name in names]
         is_on_phone = self._viewer.view.is_compact

@@ -106,11 +106,11 @@ class TopBar(CommandBar):
             return [share, *cells]
         return [share, self.build_wide_button(ui, "lesson", "Lesson", command="tour"), *cells]
 
-    def find_menu_position(self, command: str) -> tuple[int, int]:
-        """Return the pixel below the button of a command, where its menu opens."""
+    def find_menu_position(self, command: str) -> tuple[int, int] | None:
+        """Return the pixel below the button of a command, where its menu opens; None without a button."""
         button = self.ui.find("button", command)
-        if button is None:
-            return self.ui.box.bottomleft
+        if button is None or self.hidden:
+            return None
         return button.rect.bottomleft
 
     # Cells
