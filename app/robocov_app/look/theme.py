@@ -118,6 +118,16 @@ class Theme:
         return mix(self.background, self.ink, 0.3)
 
     @property
+    def failed_trajectory(self) -> Color:
+        """Color of trajectories of failed robots, which is visible on all cells."""
+        return mix(self.background, self.ink, 0.55)
+
+    @property
+    def legend_cell(self) -> Color:
+        """Color of a cell in legends: that with the strongest tint."""
+        return self.get_cell_color(self.tints.index(max(self.tints)))
+
+    @property
     def geodesic_border(self) -> Color:
         """Color of the borders of geodesic cells on a distance map."""
         return mix(self.ink, self.background, 0.1)

@@ -152,6 +152,17 @@ class TestColorsOfThePaper:
         assert theme.get_controller_color("somebody's own") == theme.others[0]
 
 
+@pytest.mark.parametrize("theme", THEMES.values(), ids=lambda theme: theme.name)
+def test_trajectories_of_failed_robots_are_visible_on_every_cell(theme):
+    contrasts = [compute_contrast(theme.failed_trajectory, color) for color in list_cell_colors(theme)]
+    assert min(contrasts) > 1.6
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=lambda theme: theme.name)
+def test_the_cell_in_a_legend_is_visible(theme):
+    assert compute_contrast(theme.legend_cell, theme.panel) > 1.5
+
+
 def test_controllers_differ_in_dashes_and_marks():
     names = ["rapf", "rpf", "lloyd", "first", "second", "third", "fourth", "fifth"]
     styles = choose_controller_styles(names).values()

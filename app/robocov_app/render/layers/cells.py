@@ -94,7 +94,7 @@ def build_cells_legend(scene: Scene) -> list[LegendEntry]:
     """Build the legend of the cells, with a symbol that is filled only if the cells are."""
 
     def draw_symbol(canvas: Canvas, x: float, y: float) -> None:
-        fill = None if _is_colored_by_distance(canvas, scene) else canvas.theme.get_cell_color(0)
+        fill = None if _is_colored_by_distance(canvas, scene) else canvas.theme.legend_cell
         canvas.draw_swatch(x, y, fill, canvas.theme.cell_edge)
 
     return [LegendEntry("Voronoi cell", draw_symbol)]

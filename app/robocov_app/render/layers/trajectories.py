@@ -218,7 +218,7 @@ class TrajectoriesLayer:
         working = self._colors.get(
             None, (theme.name, hues), lambda: choose_trail_colors(theme, hues, self._color_scheme)
         )
-        return working + [theme.failed_robot] * (n_robots - len(working))
+        return working + [theme.failed_trajectory] * (n_robots - len(working))
 
     def build_legend(self, scene: Scene) -> list[LegendEntry]:
         """Build the legend, whose symbol is a wave in the color of the first robot."""
