@@ -26,6 +26,14 @@ def test_centroids_are_plus_signs() -> None:
             assert measure_min_error(frame, center + offset, LIGHT.ink) < 60
 
 
+def test_goals_that_are_centroids_are_plus_signs_too() -> None:
+    """An x over the plus sign of the centroid would look like a star."""
+    frame, painter = render_layers(build_scene(TWO, goals=CENTROIDS), "goals")
+    for center in painter.camera.to_pixels(CENTROIDS):
+        for offset in PLUS_SIGN_PX:
+            assert measure_min_error(frame, center + offset, LIGHT.ink) < 60
+
+
 @pytest.mark.parametrize("layer", ["centroids", "goals"])
 def test_other_goals_are_times_signs(layer: str) -> None:
     goals = CENTROIDS + (0.0, 2.0 * CENTROID_TOLERANCE_M)

@@ -158,7 +158,7 @@ build_contacts_legend = build_legend(legend.CONTACT, _draw_contact_symbol)
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
-    """Draw an x at each goal, connected with its robot by a dashed line."""
+    """Draw the mark of each goal, connected with its robot by a dashed line."""
     if scene.now.decision.goals is None:
         return
     goals = canvas.camera.to_pixels(scene.now.decision.goals)
@@ -166,7 +166,17 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
     has_goal = np.isfinite(goals).all(axis=1)
     for center, goal in zip(centers[has_goal].tolist(), goals[has_goal].tolist(), strict=True):
         canvas.draw_dashed_line(center, goal, canvas.theme.faint)
-    canvas.draw_sprites([_build_cross(canvas, legend.GOAL, _GOAL_ARM_PX * canvas.scale)], goals)
+    mark = _choose_goal_mark(scene)
+    canvas.draw_sprites([_build_cross(canvas, mark, _GOAL_ARM_PX * canvas.scale)], goals)
+
+
+def _choose_goal_mark(scene: Scene) -> str:
+    """Return the name of the mark of goals: that of centroids if they are centroids.
+
+    Both layers may be shown. An x over a plus sign would look like a star.
+    """
+    name, _ = _choose_targets(scene)
+    return name or legend.GOAL
 
 
 def _build_cross(canvas: Canvas, name: str, arm: float) -> Sprite:
@@ -196,6 +206,8 @@ def _build_cross_glyph(name: str) -> Glyph:
     return draw_symbol
 
 
-build_goals_legend = build_legend(
-    legend.GOAL, _build_cross_glyph(legend.GOAL), lambda scene: scene.now.decision.goals is not None
-)
+def build_goals_legend(scene: Scene) -> list[LegendEntry]:
+    """Build the legend of goals, with the mark that is drawn."""
+    if scene.now.decision.goals is None:
+        return []
+    return [LegendEntry(legend.GOAL, _build_cross_glyph(_choose_goal_mark(scene)))]
