@@ -21,7 +21,7 @@ from robocov.typing import FloatArray
 
 DEFAULT_PERIOD_S = 1.0 / 60.0
 REFINEMENTS = (1, 2, 4, 8)
-"""Numbers by which the control period is divided in the rows of the table."""
+"""Numbers by which `DEFAULT_PERIOD_S` is divided, one for each row of the table."""
 REFERENCE_REFINEMENT = 32
 """Number by which it is divided in the run that stands for the solution."""
 ROBOTS = 6
@@ -37,7 +37,7 @@ class Run(NamedTuple):
     """A run with one control period."""
 
     positions: FloatArray
-    """(T, n, 2) m, after each of the longest control periods."""
+    """(T, n, 2) m, at multiples of `DEFAULT_PERIOD_S`, so that runs can be compared."""
     mean_distance: float
     """Mean distance at the end, m."""
 
@@ -52,7 +52,7 @@ class Setting(NamedTuple):
 
 
 def simulate(setting: Setting, refinement: int, duration: float) -> Run:
-    """Simulate a setting with a fraction of the longest control period."""
+    """Simulate a setting with a control period of `DEFAULT_PERIOD_S` / `refinement`."""
     environment = load_map(setting.map)
     limits: dict[str, float] = {}
     if not setting.has_limits:

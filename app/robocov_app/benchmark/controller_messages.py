@@ -159,7 +159,7 @@ class _PlainUnpickler(pickle.Unpickler):
     """Unpickles plain values only."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Reject everything that has a class of its own."""
+        """Reject every class and function, because plain values need none."""
         raise pickle.UnpicklingError(f"{module}.{name}: expected plain values")
 
 

@@ -24,7 +24,7 @@ ORACLE = "oracle"
 LEARNED = "learned"
 """Name of the controller with a trained network; see `robocov_app.benchmark.learned`."""
 STAND_IN = "rapf"
-"""Controller with which a study of the benchmark is built if the code of its own must not be executed."""
+"""Controller that replaces the controller of a user in studies that must not execute the user's code."""
 _FILES = {ORACLE: "oracle.py:Oracle", LEARNED: "learned.py:Learned"}
 """Controllers that only the benchmark has, and their files in this folder."""
 
@@ -120,7 +120,7 @@ class RatedController:
         return self.controller in CONTROLLERS or self.controller in _FILES
 
     def replace_user_code(self) -> "RatedController":
-        """Return a controller that can stand for this one in studies without executing the code of a user."""
+        """Return this controller if it is built in, otherwise `STAND_IN`, so that no user's code runs."""
         return self if self.is_built_in else RatedController(STAND_IN, {})
 
     def read_code(self) -> ControllerCode:
@@ -151,10 +151,11 @@ class RatedController:
     def _check_controller(self) -> None:
         """Raise ParameterError if the controller or one of its gains is unknown or invalid.
 
-        This is done before the maps are built, which takes seconds.
+        Called before the maps are built, because building them takes seconds.
         """
         name, folder = self._locate_controller()
         if self.controller in _FILES:
+            # `make_controller` takes no folder, so a relative path would refer to the current one.
             name = str(folder / name)
         try:
             make_controller(name, dict(self.gains))

@@ -85,7 +85,7 @@ def _list_words(hint: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class ReadOptions(Options):
-    """Options for reading a map, in addition to its file; the format has its own defaults."""
+    """Options for reading a map, in addition to its file. None stands for the default of the format."""
 
     cell: float | None = None
     """Side of a cell, pixel or tile, m (default: 1 for MovingAI, Tiled and CoverageControl)."""
@@ -198,20 +198,20 @@ class ReadOptions(Options):
 
 @dataclass(frozen=True)
 class WriteOptions(Options):
-    """Options for writing a map; the format has its own defaults."""
+    """Options for writing a map. None stands for the default of the format."""
 
     cell: float | None = None
-    """Side of a cell or pixel, m (default: 0.05); thinner walls stay connected."""
+    """Side of a cell or pixel, m (default: 0.05). Walls thinner than a cell are written without gaps."""
     mode: Literal["trinary", "scale", "raw"] | None = None
     """Encoding of occupancy in a ROS map (default: trinary)."""
     image: Literal["pgm", "png"] | None = None
     """Image format of a ROS map (default: pgm)."""
     scale: float | None = None
-    """Size of a millimeter of an SVG, m (default: 0.001, true to scale)."""
+    """Length on the map of one millimeter in an SVG file, m (default: 0.001, true to scale)."""
     digits: int | None = None
-    """Number of decimals of coordinates (default: those of a micrometer)."""
+    """Number of decimals of coordinates (default: enough for micrometers)."""
     origin: tuple[float, float] | None = field(default=None, metadata={"metavar": "LON LAT"})
-    """Longitude and latitude of [0, 0] m, for GeoJSON in degrees; needs robocov[geo]."""
+    """Longitude and latitude of the map's point [0, 0], for GeoJSON in degrees; needs robocov[geo]."""
 
     def __post_init__(self) -> None:
         self.require_ranges(cell=_LENGTH_RANGE, scale=_LENGTH_RANGE, digits=(0, 12, ""))

@@ -30,6 +30,8 @@ from robocov_app.render.surface_cache import LatestValue
 
 _UNIT_WIDTH_PX = 1024
 _UNIT_HEIGHT_PX = 576
+_REGION_MARGIN_PX = 2
+"""Space around the region when the camera shows all of it, at scale 1."""
 _SCALE_STEP = 0.125
 _MIN_SCALE = 0.875
 _MAX_SCALE = 6.0
@@ -130,19 +132,20 @@ class Painter:
 
     @property
     def camera(self) -> Camera:
-        """The camera; set it to zoom and pan.
+        """The camera; set it to zoom and pan. By default, it shows the whole region.
 
-        Its view is the picture without the strips above and below and without the color scale.
+        Its view is the picture without the strips above and below it, and without the color scale.
         """
         view = self._compute_view()
         if self._camera is not None:
             return self._camera.with_view(view)
         left, top, width, height = view
-        side = MARGIN_PX * self.scale
+        margin = MARGIN_PX * self.scale
         # The color scale takes the place of the right margin.
-        sides = 1 if self._margins.color_bar_width else 2
-        inner = (left + side, top, max(width - sides * side, 1.0), height)
-        fitted = Camera.fit(self.environment.region.bounds, inner, margin=2 * self.scale)
+        margin_count = 1 if self._margins.color_bar_width else 2
+        inner_width = max(width - margin_count * margin, 1.0)
+        inner_view = (left + margin, top, inner_width, height)
+        fitted = Camera.fit(self.environment.region.bounds, inner_view, margin=_REGION_MARGIN_PX * self.scale)
         return fitted.with_view(view)
 
     @camera.setter

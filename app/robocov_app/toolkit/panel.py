@@ -118,6 +118,8 @@ class CommandPanel(CommandPart):
 
     def show_buttons(self, ui: Ui, row: tuple[PanelButton, ...]) -> None:
         """Show a row of small buttons of equal width."""
-        ui.row(*[0.0] * len(row), below=4)
+        # Columns of width 0 share the space equally.
+        equal_widths = [0.0 for _ in row]
+        ui.row(*equal_widths, below=4)
         for button in row:
             self.show_button(ui, button.label, button.command, small=True)

@@ -95,4 +95,4 @@ class Presenter(ViewerModel):
         if self.tool is self.toolbox.hand and self.selection.has_wall:
             self.show_message(self.selection.scale_wall_width(factor))
             return
-        self.show_message(self.toolbox.resizable.resize(self.session, factor))
+        self.show_message(self.toolbox.resizable_tool.resize(self.session, factor))

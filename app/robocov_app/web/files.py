@@ -95,7 +95,7 @@ class Upload:
             ) from error
         except OutputError as error:
             # The message of the error contains a path of the server, which the user of the page must not see.
-            # Its cause has the reason alone.
+            # The message of its cause contains only the reason.
             cause = error.__cause__
             reason = describe_error(cause) if isinstance(cause, OSError) else str(error)
             raise TransferError(f"{self.name}: cannot be saved on the server: {reason}") from error

@@ -87,8 +87,8 @@ class WebDisplay:
     folder : Path
         Folder for saved and uploaded files.
     visitor_link : ShareLink or None
-        Link of the server of all visitors, through which pages are connected, so that the links of this
-        server are of no use; None if pages are connected directly.
+        Link of the visitor server, which gives each visitor a window, if this window is one of them. Pages
+        then connect through that server, and this link is the `share_link`. None if pages connect directly.
 
     Attributes
     ----------

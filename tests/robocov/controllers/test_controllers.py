@@ -123,7 +123,7 @@ def extract_row(decision: Decision, i: int) -> list[np.ndarray]:
 @settings(max_examples=count_examples(20))
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 60), reach=st.floats(0.5, 6.0))
 def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: int, reach: float) -> None:
-    """Changing anything that robot i neither senses nor receives changes nothing in row i, not one bit."""
+    """Row i of a decision stays the same, bit for bit, if anything that robot i does not know is changed."""
     rng = np.random.default_rng(seed)
     n = min(n, MAX_ROBOTS.get(controller.name, n))
     positions = rng.uniform((3, 1), (10, 7), size=(n, 2))
@@ -131,7 +131,7 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
     i = int(rng.integers(n))
     memory = controller.begin(REGION, team)
     changed_memory = controller.begin(REGION, team)
-    # Nor may the memory contain anything else, therefore several steps.
+    # After the first step, a robot could use forbidden information only through its memory.
     for step in range(3):
         seen = sample_observations(positions, reach, seed + step)
         seen = replace(seen, time=step * 0.2, scans=sample_scans(controller, n, rng))

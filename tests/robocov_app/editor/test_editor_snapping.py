@@ -171,26 +171,26 @@ def test_dragged_objects_are_not_targets():
     near = (1.02, 1.02)
     assert (
         snap_point(
-            near, collect_snap_targets(sketch, without=[key]), build_settings("vertex", "edge", "grid")
+            near, collect_snap_targets(sketch, ignored=[key]), build_settings("vertex", "edge", "grid")
         )
         .guides[0]
         .kind
         == "grid"
     )
-    one = collect_snap_targets(sketch, without=[Vertex(key, 0, 0)])
+    one = collect_snap_targets(sketch, ignored=[Vertex(key, 0, 0)])
     assert snap_point(near, one, build_settings("vertex", "edge", "midpoint")).guides == ()
     assert snap_point((4.02, 2.97), one, build_settings("vertex")).point == (4.0, 3.0)
     # The edges of the ignored vertex are ignored too, but not the other edges.
     assert snap_point((2.2, 1.02), one, build_settings("edge", "midpoint")).guides == ()
     assert snap_point((2.2, 2.98), one, build_settings("edge")).point == pytest.approx((2.2, 3.0))
     # The same holds for the positions of a start.
-    without_first = collect_snap_targets(sketch, without=[Vertex("two", 0, 0)])
+    without_first = collect_snap_targets(sketch, ignored=[Vertex("two", 0, 0)])
     assert snap_point((6.02, 1.0), without_first, build_settings("center")).guides == ()
     assert snap_point((8.02, 1.0), without_first, build_settings("center")).point == (8.0, 1.0)
-    without_start = collect_snap_targets(sketch, without=["two"])
+    without_start = collect_snap_targets(sketch, ignored=["two"])
     assert snap_point((6.02, 1.0), without_start, build_settings("center")).guides == ()
     # Points that were drawn so far are targets, too.
-    with_drawn_point = collect_snap_targets(sketch, more=[(9.0, 5.0)])
+    with_drawn_point = collect_snap_targets(sketch, extra_points=[(9.0, 5.0)])
     assert snap_point((9.02, 5.0), with_drawn_point, build_settings("vertex")).point == (9.0, 5.0)
 
 

@@ -130,19 +130,22 @@ def test_boundaries_of_files_have_each_corner_once(tmp_path: Path) -> None:
     assert len(environment.boundary) == 4
 
 
-HALF = "[[[[0,0],[5,0],[5,6],[0,6],[0,0]]],[[[{0},0],[10,0],[10,6],[{0},6],[{0},0]]]]"
+HALVES = "[[[[0,0],[5,0],[5,6],[0,6],[0,0]]],[[[{0},0],[10,0],[10,6],[{0},6],[{0},0]]]]"
 TABLE = '{"type":"Polygon","coordinates":[[[2,2],[3,2],[3,3],[2,3],[2,2]]]}'
 
 
 @pytest.mark.parametrize("start", [5, 5.00001, 5.005])
 def test_a_boundary_of_two_parts_keeps_its_obstacle(tmp_path: Path, start: float) -> None:
-    halves = f'{{"type":"MultiPolygon","coordinates":{HALF.format(start)}}}'
+    """The two halves of a hall of 10 m by 6 m touch, or are up to 5 mm apart."""
+    halves = f'{{"type":"MultiPolygon","coordinates":{HALVES.format(start)}}}'
     text = f'{{"type":"GeometryCollection","geometries":[{halves},{TABLE}]}}'
     (tmp_path / "hall.geojson").write_text(text)
     for outlines in (None, "solid"):
         options = ReadOptions(units="meters", outlines=outlines)
         environment, _, _ = import_map(tmp_path / "hall.geojson", options=options)
+        # The table covers 1 m².
         assert environment.free_area == pytest.approx(59.0, abs=1e-3)
+    # This file has no table.
     wkt = f"GEOMETRYCOLLECTION(MULTIPOLYGON(((0 0,5 0,5 6,0 6,0 0)),(({start} 0,10 0,10 6,{start} 6,{start} 0))))"  # noqa: E501
     (tmp_path / "hall.wkt").write_text(wkt)
     assert import_map(tmp_path / "hall.wkt")[0].free_area == pytest.approx(60.0, abs=1e-3)

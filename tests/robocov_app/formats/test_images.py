@@ -142,9 +142,9 @@ def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
 COLORS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
 
 
-def save_picture(image: Image.Image, kind: str, **options: object) -> bytes:
+def encode_image(image: Image.Image, image_format: str, **options: object) -> bytes:
     stream = io.BytesIO()
-    image.save(stream, kind, **options)
+    image.save(stream, image_format, **options)
     return stream.getvalue()
 
 
@@ -156,7 +156,7 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
         image = Image.fromarray(np.asarray(image).astype(np.uint16) * 257)
     if (kind, mode) in {("BMP", "I;16"), ("BMP", "CMYK"), ("PPM", "CMYK"), ("PNG", "CMYK"), ("PPM", "P")}:
         pytest.skip("is never saved so")
-    data = save_picture(image, kind)
+    data = encode_image(image, kind)
     assert is_picture(data)
     picture = read(tmp_path, data)
     plain = image.convert("I") if mode == "I;16" else image.convert("RGB")
@@ -169,7 +169,7 @@ def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: s
 @pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
 def test_compressed_tiff_is_read(tmp_path: Path, compression: str) -> None:
     image = Image.fromarray(np.array(GRAY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
-    picture = read(tmp_path, save_picture(image, "TIFF", compression=compression))
+    picture = read(tmp_path, encode_image(image, "TIFF", compression=compression))
     np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
 
 
@@ -202,7 +202,7 @@ def test_tiff_of_16_bits_is_read(tmp_path: Path, kind: str, white_is_zero: bool)
 
 
 def encode_floats(values: list[list[float]]) -> bytes:
-    return save_picture(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
+    return encode_image(Image.fromarray(np.array(values, dtype=np.float32)), "TIFF")
 
 
 def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
@@ -225,7 +225,7 @@ def test_a_tiff_of_floats_from_0_to_1_is_read(tmp_path: Path) -> None:
             encode_floats([[math.nan, math.inf]]),
             "samples from 0 (black) to 1 (white), got none that is a number",
         ),
-        (save_picture(Image.new("I", (3, 3)), "TIFF"), "unsigned samples of up to 16 bits"),
+        (encode_image(Image.new("I", (3, 3)), "TIFF"), "unsigned samples of up to 16 bits"),
     ],
     ids=["heights", "bytes", "nan", "whole"],
 )
@@ -248,7 +248,7 @@ def test_pictures_are_oriented_by_their_exif_data(tmp_path: Path, kind: str, tur
     upright |= {7: image.transpose(Image.Transpose.TRANSVERSE), 8: image.rotate(90, expand=True)}
     exif = Image.Exif()
     exif[274] = turn
-    picture = read(tmp_path, save_picture(image, kind, exif=exif))
+    picture = read(tmp_path, encode_image(image, kind, exif=exif))
     np.testing.assert_array_equal(picture.level, np.asarray(upright[turn]))
 
 
@@ -256,7 +256,7 @@ def test_pictures_are_oriented_by_their_exif_data(tmp_path: Path, kind: str, tur
 def test_jpeg_is_read(tmp_path: Path, mode: str) -> None:
     image = Image.new("RGB", (32, 16), (250, 240, 230))
     image.paste((20, 0, 10), (8, 0, 24, 16))
-    picture = read(tmp_path, save_picture(image.convert(mode), "JPEG", quality=95))
+    picture = read(tmp_path, encode_image(image.convert(mode), "JPEG", quality=95))
     assert picture.lossy and picture.level.shape == (16, 32)
     np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
 

@@ -181,8 +181,8 @@ def build_many_files() -> bytes:
     [
         (build_bomb(), "expected at most 50 MB when unpacked, got more"),
         (build_many_files(), "expected an archive of at most 1000 files, got more"),
-        (build_bomb()[:50_000], "expected a whole zip archive, got a broken one: File is not a zip file"),
-        (build_many_files()[:300] + build_bomb()[300:], "expected a whole zip archive, got a broken one"),
+        (build_bomb()[:50_000], "expected a complete zip archive, got a broken one: File is not a zip file"),
+        (build_many_files()[:300] + build_bomb()[300:], "expected a complete zip archive, got a broken one"),
     ],
     ids=["bomb", "many", "cut", "mixed"],
 )
@@ -226,7 +226,7 @@ def test_other_folders_and_archives_are_not_imdf(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="zip archive"):
         detect_format(other)
     half = write_zip(tmp_path / "half.zip", {"unit": build_venue()["unit"]})
-    with pytest.raises(MapError, match=r"expected level\.geojson in it"):
+    with pytest.raises(MapError, match=r"expected a file level\.geojson"):
         read(half)
 
 

@@ -66,7 +66,7 @@ class RandomUser:
         ]
 
     def act(self) -> None:
-        """Do anything, which may be rejected."""
+        """Perform a random action, which the session may reject."""
         self.session.playback.is_playing = True
         with suppress(RobocovError):
             self.random.choice(self.actions)()

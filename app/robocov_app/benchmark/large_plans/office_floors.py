@@ -263,7 +263,7 @@ def _draw_open_space(
     end = depth - 0.9
     for number in range(benches):
         x = first_x + number * pitch
-        # Chosen even where it is not used, because the random numbers that follow depend on it.
+        # Sampled even if it is not used, so that the random numbers that follow do not depend on the recess.
         is_short = rng.random() < _SHORT_BENCH_PROBABILITY
         space = part.to_plan(build_box(x - 1.1, 0.0, x + 1.1, depth))
         if not recess.is_empty and shapely.Polygon(space).distance(recess) < _RECESS_MARGIN_M:

@@ -86,6 +86,7 @@ class DraggedObstacles:
         scene.surface.blit(image, (dx, dy), special_flags=_PREMULTIPLIED)
 
     def _render_image(self, scene: EditorScene, selection: Selection) -> Surface:
+        """Render the selected objects onto a transparent surface, at their positions before the drag."""
         theme = scene.view.theme
         canvas = scene.view.build_transparent_canvas()
         items = [item for item in scene.committed_sketch.obstacles if item.key in selection.items]

@@ -36,9 +36,9 @@ MIN_COARSE_GRID_PX = 55.0  # between the coarse lines
 REDRAW_MARGIN_PX = 6  # around changed objects
 FLAT_LINE_WIDTH_PX = 1.5  # of parts of obstacles that have no area
 NAME_MARGIN_PX = 4.0  # free space to the left and right of a name, both together
-LINE_REACH_PX = 2  # at any scale: lines are drawn up to this distance from their ends
-MIN_NAMED_HEIGHT_MARGIN_PX = 4.0  # at any scale: an obstacle with a name is higher than its text by this
-MIN_SPACE_HEIGHT_MARGIN_PX = 2.0  # at any scale: so is the space in which the name is written, by this
+LINE_REACH_PX = 2  # at any scale; distance beyond its ends to which a line may be drawn
+MIN_NAMED_HEIGHT_MARGIN_PX = 4.0  # at any scale; by which an obstacle must be higher than its name
+MIN_SPACE_HEIGHT_MARGIN_PX = 2.0  # at any scale; by which the free space must be higher than the name
 
 PIXEL_BIAS = 1e-4  # small shift of the camera, because round coordinates would lie exactly between two pixels
 MAX_SCROLL_ERROR_PX = 0.02  # maximum deviation of a camera motion from whole pixels for scrolling
@@ -46,7 +46,7 @@ MAX_REDRAWN_FRACTION = 0.5  # of the image; if more has changed, all of it is re
 MAX_BOXES = 40  # more boxes are merged into one
 LINE_HEIGHT_FACTOR = 1.25  # distance of the lines of a name, relative to the size of the text
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
-MIN_NAMED_WIDTH_FACTOR = 3.0  # an obstacle with a name is wider than the height of its text by this factor
+MIN_NAMED_WIDTH_FACTOR = 3.0  # minimum width of an obstacle with a name, relative to the height of the text
 OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
 _TRANSPARENT = (0, 0, 0, 0)
 

@@ -35,14 +35,15 @@ class Measurement:
     components : tuple of float, m²
         Areas of the connected components of the free space, the largest first.
     reached : tuple of float, m²
-        Area of each part of the free space that a robot can cover without leaving it, the largest first.
+        For each part of the free space in which a robot can move, the area that it can sweep there, the
+        largest first.
     gap : Gap or None
         The narrowest passage.
     impassable : MultiPolygon
         Areas to mark as impassable: in each passage that is too narrow, the largest disc that fits through
         it; and the space that no robot can touch; see `compute_reach`.
     cut_off : MultiPolygon
-        Free space in which robots fit, but which they cannot reach from the largest part.
+        Parts of the free space in which robots fit, but which they cannot reach from the largest part.
     vertices : int
         Number of vertices of the boundary, walls, polygons and their holes.
     problems : tuple of Problem

@@ -18,12 +18,8 @@ from robocov_app.editor.model.background import MARKS, Background, read_marks, w
 from robocov_app.editor.model.geometry import Box, to_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
-_COMMON_FIELDS = (
-    "name",
-    "description",
-    "schema",
-    "density",
-)  # fields that sketches and environments have in common
+_COPIED_FIELDS = ("name", "description", "schema", "density")
+"""Fields with the same values in a sketch and in its environment. The other fields must be converted."""
 BOUNDARY: Final = -1  # key of the boundary, which no obstacle has
 Owner: TypeAlias = int | str
 """Identifies an object with vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
@@ -138,13 +134,14 @@ class Sketch:
         """Build a sketch of a map; the keys of its obstacles are 0, 1, ..."""
         shapes = environment.obstacles
         marks, background, extra = read_marks(dict(environment.extra), [shape.name for shape in shapes])
+        copied_values = {name: getattr(environment, name) for name in _COPIED_FIELDS}
         return cls(
             boundary=environment.boundary,
             obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
-            **{name: getattr(environment, name) for name in _COMMON_FIELDS},
+            **copied_values,
         )
 
     def build_environment(self, source_name: str = "map") -> env.Environment:
@@ -158,12 +155,13 @@ class Sketch:
         for k, item in enumerate(self.obstacles):
             values = {name: getattr(item, name) for name in MARKS}
             marks[k] = {name: value for name, value in values.items() if value}
+        copied_values = {name: getattr(self, name) for name in _COPIED_FIELDS}
         return env.Environment(
             boundary=self.boundary or (),
             obstacles=tuple(shapes),
             starts=dict(self.starts),
             extra=write_marks(self.extra, marks, [shape.name for shape in shapes], self.background),
-            **{name: getattr(self, name) for name in _COMMON_FIELDS},
+            **copied_values,
         )
 
     def get_item(self, key: int) -> Item:

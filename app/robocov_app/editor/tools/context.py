@@ -82,8 +82,8 @@ class EditorContext(WindowModel):
         unsnapped: Point,
         reach: float,
         origin: Point | None = None,
-        more: Ring = (),
-        without: Dragged = (),
+        extra_points: Ring = (),
+        ignored: Dragged = (),
     ) -> Snap:
         """Snap a position of the pointer to the map.
 
@@ -95,9 +95,9 @@ class EditorContext(WindowModel):
             Distance within which the pointer picks objects, m.
         origin : Point, optional
             Point at which angles are measured, m.
-        more : sequence of Point
+        extra_points : sequence of Point
             Additional points to snap to, m.
-        without : iterable of Owner or Vertex
+        ignored : iterable of Owner or Vertex
             Objects and vertices to ignore, because they are being dragged.
 
         Returns
@@ -105,7 +105,7 @@ class EditorContext(WindowModel):
         Snap
             The snapped point, or the unsnapped one while the targets of a large map are being computed.
         """
-        targets = self.snapper.find_targets(self.sketch, without, more)
+        targets = self.snapper.find_targets(self.sketch, ignored, extra_points)
         if targets is None:
             return Snap(unsnapped)
         return snap_point(unsnapped, targets, self.build_snap_settings(reach), origin)

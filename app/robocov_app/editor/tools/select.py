@@ -191,7 +191,7 @@ class SelectTool(EditorTool):
         drag.end()
 
     def cancel(self, context: EditorContext) -> bool:
-        """Cancel the drag, or else select the owners of selected vertices, or else clear the selection."""
+        """Cancel the drag; without one, replace selected vertices by their owners, or clear the selection."""
         had_something = bool(self.drag or context.selection)
         if self.drag is not None:
             self._stop()
@@ -245,7 +245,7 @@ class PanTool(EditorTool):
     name = "pan"
     title = "Pan"
     key = "g"
-    hint = "drag the sheet; the right button does so with every tool, and Space while it is held down"
+    hint = "drag the sheet; with every tool, drag with the right button, or hold Space"
     snaps = False
     accepts_text = False
 

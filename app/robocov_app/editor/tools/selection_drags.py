@@ -87,7 +87,7 @@ class Drag:
         snap = Snap(position)
         if not event.ctrl:
             dragged = self.selection.vertices or self.selection.owners
-            snap = self.context.snap(position, event.reach, origin, without=dragged)
+            snap = self.context.snap(position, event.reach, origin, ignored=dragged)
         self.guides = snap.guides
         return snap.point
 

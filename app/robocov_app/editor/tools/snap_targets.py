@@ -16,7 +16,7 @@ from robocov_app.render.surface_cache import LatestValue
 from robocov_app.toolkit.tools.snap_targets import Edges, SnapTargets, list_outline_edges
 
 Dragged: TypeAlias = Iterable[Owner | Vertex]
-MANY_VERTICES = 1500  # the window does not wait for the targets of larger maps
+MANY_VERTICES = 1500  # in maps with fewer vertices, the window waits for the targets
 
 
 class _TargetCollector:
@@ -65,27 +65,29 @@ class _TargetCollector:
                 self.edges.append((points[k], points[following]))
 
 
-def collect_snap_targets(sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> SnapTargets:
+def collect_snap_targets(
+    sketch: Sketch, ignored: Dragged = (), extra_points: Sequence[Point] = ()
+) -> SnapTargets:
     """Collect the snap targets of a map: vertices, centers, edges, and outlines of walls and circles.
 
     Parameters
     ----------
     sketch : Sketch
         The map. Hidden obstacles are ignored.
-    without : iterable of Owner or Vertex
+    ignored : iterable of Owner or Vertex
         Objects and vertices to ignore, because they are being dragged.
-    more : sequence of Point
+    extra_points : sequence of Point
         Additional points, m.
     """
     dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
     skipped: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
-    for target in without:
+    for target in ignored:
         if isinstance(target, Vertex):
             dragged[target.owner, target.ring].add(target.index)
         else:
             skipped.add(target)
     collector = _TargetCollector(dragged)
-    collector.rim_points += more
+    collector.rim_points += extra_points
     for owner in sketch.owners:
         if owner not in skipped:
             collector.add(sketch, owner)
@@ -107,11 +109,12 @@ class Snapper:
         self._pool = ThreadPoolExecutor(1, "targets")
 
     def find_targets(
-        self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()
+        self, sketch: Sketch, ignored: Dragged = (), extra_points: Sequence[Point] = ()
     ) -> SnapTargets | None:
-        """Return the result of `collect_snap_targets`; None while that of a large map is being computed."""
-        dragged = frozenset(without)
-        points = tuple(more)
+        """Return the targets from `collect_snap_targets`; None while those of a large map are computed."""
+        # The key of the cache must be hashable.
+        dragged = frozenset(ignored)
+        points = tuple(extra_points)
         future = self._latest.get(
             sketch,
             (dragged, points),

@@ -130,7 +130,7 @@ def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
 
 
 def cancel(editor: Editor) -> None:
-    """Clear the typed value, or else cancel the tool's action, or else choose the selection tool."""
+    """Clear the typed value; without one, cancel the tool's action, or choose the selection tool."""
     if editor.typed:
         editor.typed = ""
         return

@@ -37,18 +37,18 @@ def list_map_facts(editor: Editor) -> list[Fact]:
     measurement = editor.measurement
     return [
         Fact("Size", _describe_size(sketch), "Width and height of the boundary"),
-        Fact("Free", _describe_free_area(measurement), "Area inside the boundary where robots can be"),
+        Fact("Free", _describe_free_area(measurement), "Area inside the boundary that no obstacle covers"),
         Fact(
             "Parts",
             _describe_parts(measurement),
-            "Connected parts of the free space, and those that a robot can sweep",
+            "Connected parts of the free space and, if different, parts in which a robot can move",
         ),
         Fact("Passage", _describe_gap(measurement), "The narrowest passage, and a robot's diameter"),
         Fact("Content", _describe_content(sketch, measurement), "Obstacles and their vertices"),
         Fact(
             "Density",
             density.describe_density(sketch.density),
-            "Weights of the positions: the tool Density; floor 0.5 and density none are commands",
+            "Weight of each position: drawn with the tool Density; typed commands: floor 0.5, density none",
         ),
     ]
 

@@ -434,7 +434,7 @@ class EditorPanel(CommandPanel):
         """Draw the list of all objects, the topmost obstacle first; a click selects an object."""
         editor = self.editor
         sketch = editor.sketch
-        rows: list[tuple[Owner, str]] = []  # object, and text about its marks
+        rows: list[tuple[Owner, str]] = []  # each object with the text about its marks
         rows += [(item.key, _describe_marks(item)) for item in reversed(sketch.obstacles)]
         rows += [(name, "") for name, _ in sketch.starts]
         if sketch.boundary is not None:

@@ -89,7 +89,7 @@ class EditorWindow(CommandWindow):
     draft_folder : Path or None
         Folder for drafts; None to save no drafts.
     waits_for_workers : bool
-        Whether to wait for everything instead of computing in the background.
+        Whether to wait for computations instead of running them in the background.
 
     Attributes
     ----------

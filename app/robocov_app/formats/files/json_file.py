@@ -86,8 +86,14 @@ class JsonFile:
                 raise self.build_error((*location, k), point, "a point [x, y] of finite numbers")
         dimensions = max(map(len, value))
         if min(map(len, value)) < dimensions:
-            value = [[*point, *[np.nan] * (dimensions - len(point))] for point in value]
+            value = [_pad_point(point, dimensions) for point in value]
         return np.array(value, dtype=float)
+
+
+def _pad_point(point: list[float], dimensions: int) -> list[float]:
+    """Return the coordinates of a point, followed by nan for each missing one."""
+    missing_count = dimensions - len(point)
+    return point + [float("nan")] * missing_count
 
 
 def get_member(value: object, name: str) -> Any:

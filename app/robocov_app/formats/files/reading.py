@@ -36,7 +36,8 @@ def read_head(path: Path, maximum: int = HEAD_BYTES) -> bytes:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
             raise MapError(f"{source_name}: expected a file, got a folder")
-        if not stat.S_ISREG(mode):  # opening a pipe would wait for ever
+        if not stat.S_ISREG(mode):
+            # Opening a pipe would block until another program writes to it.
             raise MapError(f"{source_name}: expected a file, got a pipe or a device")
         with path.open("rb") as file:
             return file.read(maximum)

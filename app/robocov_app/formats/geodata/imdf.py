@@ -71,7 +71,9 @@ class _Archive:
         texts = _read_folder(path) if path.is_dir() else _read_zip(path)
         for name in _REQUIRED_FILES:
             if name not in texts:
-                raise MapError(f"{self.source_name}: expected {name}.geojson in it, as IMDF has, got none")
+                raise MapError(
+                    f"{self.source_name}: expected a file {name}.geojson, which IMDF requires, got none"
+                )
         if sum(text.count(b"{") for text in texts.values()) > MAX_OBJECTS:
             raise MapError(
                 f"{self.source_name}: expected at most {MAX_OBJECTS} objects in its files, got more"
@@ -194,9 +196,12 @@ def _read_zip(path: Path) -> dict[str, bytes]:
             return _unpack(archive, source_name)
     except MapError:
         raise
-    except Exception as error:  # zipfile and its decompressors raise many kinds
+    except Exception as error:
+        # On broken archives, zipfile and its decompressors raise exceptions of many classes.
         reason = to_one_line(error)[:80]
-        raise MapError(f"{source_name}: expected a whole zip archive, got a broken one: {reason}") from None
+        raise MapError(
+            f"{source_name}: expected a complete zip archive, got a broken one: {reason}"
+        ) from None
 
 
 def _unpack(archive: zipfile.ZipFile, source_name: str) -> dict[str, bytes]:

@@ -154,6 +154,7 @@ def _get_left(layout: ImportPage) -> float:
 
 
 def _write_title(layout: ImportPage, environment: Environment, report: ImportReport) -> None:
+    """Write the name of the map, and below it its size and the format of the file."""
     page = layout.page
     left = _get_left(layout)
     max_width = page.size[0] - left - page.margin

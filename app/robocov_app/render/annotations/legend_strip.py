@@ -34,7 +34,7 @@ class LegendLayer:
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         """Draw the legend at the top of the surface."""
-        # All that the strip depends on; symbols have the color of the first robot.
+        # Everything on which the strip depends. Symbols have the color of the first robot.
         key = (
             tuple(entry.key for entry in canvas.legend),
             canvas.surface.get_width(),

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from robocov.typing import IntArray
+from robocov.typing import FloatArray, IntArray
 from robocov_app.figures.statistics import (
     Interval,
     bootstrap,
@@ -101,12 +101,16 @@ def _build_goal(name: str, text: str, criterion: Criterion, explanation: str, ou
 
 
 def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> list[Claim]:
-    """Judge the gap in the median, on every map, and compared with the paper's strongest contenders."""
+    """Judge the median gap of all runs and of each map, and compare with the paper's strongest contenders."""
     key = own.key
     label = own.label
     finished = outcomes.select_finite("gap", key)
     gaps = finished.get_values(key, "gap")
-    highest = estimate_maximum_over_maps(lambda rows: np.median(gaps[rows], axis=-1), finished.maps)
+
+    def compute_median_gaps(rows: IntArray) -> FloatArray:
+        return np.asarray(np.median(gaps[rows], axis=-1))
+
+    highest = estimate_maximum_over_maps(compute_median_gaps, finished.maps)
     goals = [
         _build_goal(
             "gap",

@@ -38,6 +38,9 @@ COLUMNS = {
 }
 """Columns of a sweep's table by measure; "time" is only available for robots of different speeds."""
 
+_COMPUTED_MEASURES = ("early", "first_minute", "gap", "blocked")
+"""Measures of a run that are not in the table of its sweep; see `Outcomes`."""
+
 _ControllerKey: TypeAlias = tuple[Any, ...]
 """A controller and the values of all its gains."""
 
@@ -63,9 +66,10 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         contender.key: _identify_controller(contender.controller, contender.all_gains)
         for contender in contest.contenders
     }
+    # The values of failed runs, and of measures that are unknown, stay nan.
     values = {}
     for key in controller_keys:
-        for measure in (*COLUMNS, "early", "first_minute", "gap", "blocked"):
+        for measure in (*COLUMNS, *_COMPUTED_MEASURES):
             values[key, measure] = np.full(len(instances), np.nan)
         values[key, "placement"] = np.full((len(instances), ROBOTS, 2), np.nan)
     for instance_index, row in _read_rows(folder, instances):
@@ -78,7 +82,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
         for key in matching_keys:
             for measure, value in measured.items():
                 values[key, measure][instance_index] = value
-    # Side of the square whose area is the share of one robot, a length by which distances are divided.
+    # Distances on a map are judged relative to the side of a square with the free area per robot.
     share_sides = {}
     for study_map in contest.study.maps:
         area_per_robot = study_map.environment.free_area / ROBOTS
@@ -87,7 +91,7 @@ def read_outcomes(folder: Path, contest: Contest, references: References) -> Out
 
 
 def _measure_run(row: Mapping[str, Any], results: Results, references: References) -> dict[str, Any]:
-    """Return the known measures of a run: those in its row, and those that its files and its map give."""
+    """Return the known measures of a run: those in its row, and those computed from its record and costs."""
     measured: dict[str, Any] = {
         measure: row[column] for measure, column in COLUMNS.items() if row.get(column) is not None
     }

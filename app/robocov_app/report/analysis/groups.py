@@ -135,7 +135,7 @@ def choose_group_styles(result: ReportedResult) -> dict[str, CurveStyle]:
         styles[run.label] = controller_styles[run.controller]
     for variant in list_variants(result):
         styles[variant.label] = controller_styles[variant.controller]
-    # Groups come first in `controllers`, so the styles of failed controllers are left over.
+    # `controllers` lists the groups first. The styles of controllers whose runs all failed are not used.
     for group, style in zip(groups, choose_curve_styles(controllers), strict=False):
         styles[group.label] = style
     return styles

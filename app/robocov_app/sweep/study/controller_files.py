@@ -61,7 +61,7 @@ def read_controller_source(name: str, folder: Path) -> ControllerSource | None:
     source = _read_source(name, folder)
     if source is None:
         return None
-    # As when Python executes the file, its folder is searched last. Afterwards, no module may come from it.
+    # As when the controller is loaded, its folder is searched last. Later imports must not search it.
     search_path = list(sys.path)
     sys.path.append(str(Path(source.path).parent))
     try:

@@ -301,6 +301,7 @@ def _measure_top(hint_lines: Sequence[str]) -> float:
 
 
 def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
+    """Draw the title, and the hint: below it in lines, or to its right if it has no lines."""
     scale = columns.scale
     left = columns.box.left + round(_MARGIN_PX * scale)
     top = columns.box.top

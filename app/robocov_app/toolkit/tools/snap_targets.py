@@ -11,7 +11,7 @@ from robocov.typing import FloatArray
 from robocov_app.toolkit.tools.geometry import Point, find_nearest_on_edges
 
 PointKind: TypeAlias = Literal["vertex", "center", "midpoint"]
-MAX_EDGES = 8  # nearest edges that are considered; where there are more, they are too close to distinguish
+MAX_EDGES = 8  # nearest edges that are considered; if more are near, they are too close to distinguish
 
 
 class Edges(NamedTuple):
@@ -62,8 +62,8 @@ class SnapTargets:
         high = np.maximum(self._starts, self._ends)
         boxes = shapely.box(xmin=low[:, 0], ymin=low[:, 1], xmax=high[:, 0], ymax=high[:, 1])
         self._edges = shapely.STRtree(boxes)
-        # The pointer aligns with vertices and centers. Sorting by each coordinate allows a binary search.
-        # It is stable, so that among equally good points the choice does not depend on the sorting algorithm.
+        # The pointer aligns with vertices and centers. Sorting by each coordinate allows a binary search. The
+        # sort is stable, so that the choice among equally good points does not depend on the algorithm.
         alignment_points = np.concatenate([vertices, centers])
         self._sorted_alignment_points = tuple(
             alignment_points[np.argsort(alignment_points[:, axis], kind="stable")] for axis in (0, 1)

@@ -18,7 +18,7 @@ SnapKind: TypeAlias = Literal[
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
 
-MAX_ALIGNMENT_REACHES = 60.0  # maximum distance of aligned marks, in reaches: about the width of a window
+MAX_ALIGNMENT_REACHES = 60.0  # maximum distance of aligned points, relative to the reach
 MAX_MOVED_POINTS = 16  # points of a dragged object that are tried
 MAX_EDGE_LINES = 4  # edges near a point that are combined with other lines
 _PARALLEL = 1e-9

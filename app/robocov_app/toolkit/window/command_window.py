@@ -64,7 +64,7 @@ class CommandWindow(BaseWindow):
     scale : float or None
         Size of texts and widgets; None for one that suits the size of the window.
     display : WindowDisplay, optional
-        Display of another window, which this one replaces for a time; by default a new window is opened.
+        Display of another window, which this one temporarily replaces; by default a new window is opened.
 
     Attributes
     ----------

@@ -68,7 +68,7 @@ class BaseWindow:
     ----------
     size : (width, height), px
     display : WindowDisplay, optional
-        Display of another window, which this one replaces for a time; by default a new window is opened.
+        Display of another window, which this one temporarily replaces; by default a new window is opened.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ class FittedChips(NamedTuple):
 def fit_chips(
     chips: Sequence[Chip],
     presets: Sequence[Chip],
-    more: Chip,
+    presets_button: Chip,
     standard_commands: set[str],
     fits: Callable[[Sequence[Chip]], bool],
 ) -> FittedChips:
@@ -29,14 +29,14 @@ def fit_chips(
 
     Symbols that need no explanation are left out first, then a button replaces the presets. Then the chips of
     standard layers lose their texts and are left out, from the last one, so that symbols that are new to the
-    user keep their texts. Texts that fit into the space that is left return. Everything that is left out is
-    also in the menu of layers, and chips without text have a tooltip.
+    user keep their texts. Finally, texts return where the remaining space allows it. What is left out is also
+    in the menu of layers, and chips without text have a tooltip.
 
     Parameters
     ----------
     chips, presets : sequence of Chip
         All chips of layers, and of presets.
-    more : Chip
+    presets_button : Chip
         Button that opens the menu of the presets.
     standard_commands : set of str
         Commands of the chips of layers that are visible by default.
@@ -47,7 +47,7 @@ def fit_chips(
     -------
     FittedChips
     """
-    button = [more] if presets else []
+    button = [presets_button] if presets else []
     for shown_presets in (list(presets), button):
         for remaining in _drop_known_symbols(chips):
             if fits([*remaining, *shown_presets]):

@@ -200,6 +200,7 @@ def _choose_fill(canvas: Canvas, chip: Chip, *, is_hovered: bool) -> Color:
 
 
 def _draw_check_box(canvas: Canvas, box: Rect, *, is_on: bool) -> None:
+    """Draw a check box: empty, or filled with the accent color and a check mark."""
     theme = canvas.theme
     radius = round(3 * canvas.scale)
     if not is_on:

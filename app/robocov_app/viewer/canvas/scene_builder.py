@@ -74,7 +74,8 @@ class SceneBuilder:
     def _find_contacts(self, setup: PaneSetup, scene: Scene) -> Contacts | None:
         """Return the contacts of a scene; None until a contact has been displayed in the session.
 
-        From then on, the layer bar has a chip for contacts. It would be restless if it came and went.
+        From then on, the layer bar has a chip for contacts. If it disappeared after each contact, the other
+        chips would move back and forth.
         """
         session = self._viewer.session
         contacts = self._contact_finder.find_contacts(setup.environment, scene)

@@ -119,6 +119,7 @@ def _list_team_lines(scenario: SessionScenario) -> list[str]:
 
 
 def _format_conditions(conditions: Conditions) -> str:
+    """Return the call that builds the conditions, with the arguments that differ from ideal conditions."""
     arguments: list[str] = []
     for name in PARAMETERS:
         value = getattr(conditions, name)

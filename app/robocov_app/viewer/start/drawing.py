@@ -13,6 +13,7 @@ from robocov_app.toolkit.overlay import draw_rounded_box
 
 # Lengths in pixels at scale 1.
 _RADIUS_PX = 8
+_EDGE_STRENGTH = 0.18  # fraction of ink in the edges of items without the focus
 
 
 @dataclass(frozen=True)
@@ -41,14 +42,14 @@ class StartDrawing:
     def write(
         self, text: str, position: tuple[float, float], size: float, color: Color, *, bold: bool = False
     ) -> None:
-        """Write a text of a size at scale 1, px, with its upper left corner at a pixel."""
+        """Write a text with its upper left corner at a pixel; `size` is in px at scale 1."""
         image = render_text(text, self.px(size), color, bold)
         self.screen.blit(image, (round(position[0]), round(position[1])))
 
     def draw_frame(self, box: Rect, *, is_focused: bool) -> None:
-        """Draw the background of an item; with a thick edge if it is highlighted."""
+        """Draw the background and the edge of an item; the edge is thick and colored if it has the focus."""
         theme = self.theme
-        edge = theme.accent if is_focused else mix(theme.panel, theme.ink, 0.18)
+        edge = theme.accent if is_focused else mix(theme.panel, theme.ink, _EDGE_STRENGTH)
         width = max(self.px(2 if is_focused else 1), 1)
         draw_rounded_box(
             self.screen, box, theme.background, edge=edge, radius=self.px(_RADIUS_PX), width=width

@@ -224,6 +224,7 @@ class StartPage(BaseWindow):
         command = self._commands.take_command(event)
         if command is not None:
             self._commands.run(command.name)
+        # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
         self.dialogs.ignore_letter(event.unicode)
 
     def _click(self, pixel: tuple[int, int]) -> None:
@@ -317,6 +318,7 @@ class StartPage(BaseWindow):
         self.display.show()
 
     def _draw_message(self) -> None:
+        """Draw the status message or, while the viewer starts, which choice is being opened."""
         message = self.model.message
         is_error = self.model.has_error_message
         if self.choice is not None:

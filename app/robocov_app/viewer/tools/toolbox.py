@@ -46,8 +46,8 @@ class ViewerToolbox(Toolbox[ViewerTool]):
         super().__init__(tools)
 
     @property
-    def resizable(self) -> ViewerTool:
-        """The tool whose size the keys [ and ] change: the one in use if it has a size, else the wall."""
+    def resizable_tool(self) -> ViewerTool:
+        """The tool whose size the keys [ and ] change: the current one if resizable, otherwise the wall."""
         if self.current.is_resizable:
             return self.current
         return self.wall

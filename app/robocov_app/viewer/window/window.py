@@ -67,7 +67,7 @@ class ViewerWindow(CommandWindow):
         Whether there is no user. Then videos wait for their encoder instead of dropping frames, and lessons
         answer their own questions.
     display : WindowDisplay, optional
-        Display of another window, which this one replaces for a time; by default a new window is opened.
+        Display of another window, which this one temporarily replaces; by default a new window is opened.
 
     Attributes
     ----------

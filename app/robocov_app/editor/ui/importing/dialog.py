@@ -266,11 +266,14 @@ class ImportDialog(Dialog):
             self.click_action = action
 
     def _draw_color_buttons(self, ui: Ui, sheet: ColorSheet) -> None:
-        colors = list(dict.fromkeys([*list_declared_colors(self.form.texts), *sheet.colors]))
+        """Draw as many buttons for colors as fit: first colors with a role, then others in the file."""
+        declared_colors = list_declared_colors(self.form.texts)
+        colors = list(dict.fromkeys([*declared_colors, *sheet.colors]))
         columns = int((ui.width + COLOR_BUTTON_GAP_PX) // (COLOR_BUTTON_WIDTH_PX + COLOR_BUTTON_GAP_PX))
-        colors = colors[: max(columns, 1)]
-        ui.row(*[COLOR_BUTTON_WIDTH_PX] * len(colors), 0, height=SMALL_BUTTON_HEIGHT_PX, below=8)
-        for color in colors:
+        shown_colors = colors[: max(columns, 1)]
+        button_widths = [COLOR_BUTTON_WIDTH_PX for _ in shown_colors]
+        ui.row(*button_widths, 0, height=SMALL_BUTTON_HEIGHT_PX, below=8)
+        for color in shown_colors:
             self._draw_color_button(ui, color)
         ui.end_row()
 
@@ -280,7 +283,7 @@ class ImportDialog(Dialog):
         name = name_color(color)
         key = f"color:{name}"
         text = f"     {_ROLE_LABELS[role]}"
-        tip = f"{name}: click to change it"
+        tip = f"{name}: click to change its role"
         if ui.button(text, key=key, selected=role is not None, small=True, tip=tip):
             self.form.cycle_color(color)
         button = ui.find("button", key)

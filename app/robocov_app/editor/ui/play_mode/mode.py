@@ -22,11 +22,11 @@ class PlayMode:
     editor : Editor
         The editor.
     host : CommandWindow
-        The window of the editor, which the viewer replaces for a time.
+        The window of the editor, which the viewer temporarily replaces.
     arrange : callable
         Lays out the window of the editor again; its size and theme may have changed in play mode.
     waits_for_workers : bool
-        Whether to wait for everything instead of computing in the background.
+        Whether to wait for computations instead of running them in the background.
 
     Attributes
     ----------

@@ -125,7 +125,7 @@ def open_play_window(
     scale : float or None
         Size of text and widgets; None for one that suits the size of the window.
     waits_for_workers : bool
-        Whether to wait for everything instead of computing in the background.
+        Whether to wait for computations instead of running them in the background.
 
     Raises
     ------

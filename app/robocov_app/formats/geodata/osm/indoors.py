@@ -145,7 +145,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
     lost_doors = len(doors) - len(door_lines)
     if lost_doors:
         shapes.count_omission("door", "in no wall of this level", lost_doors)
-    # All together, so that they get the same origin.
+    # Geometries and doors are converted in one call, so that they get the same origin.
     projected = convert_to_meters([*geometries, *door_lines], shapes, DEGREES)
     shapes_in_meters = projected[: len(geometries)]
     doors_in_meters = projected[len(geometries) :]
@@ -209,9 +209,11 @@ def _build_opening(door: SourceGeometry) -> SourceGeometry:
     """
     before, middle, after = door.rings[0]
     direction = after - before
-    if not direction.any():  # the wall returns to where it came from
+    if not direction.any():
+        # The wall turns back at the door, so its two neighbors coincide.
         direction = after - middle
     length = float(np.hypot(*direction))
     width = door.width or DEFAULT_DOOR_WIDTH_M
     half: FloatArray = direction * (width / 2 / max(length, _MIN_LENGTH_M))
-    return SourceGeometry("line", (np.array([middle - half, middle + half]),), door.labels, door.location)
+    ends = np.array([middle - half, middle + half])
+    return SourceGeometry("line", (ends,), door.labels, door.location)

@@ -357,7 +357,7 @@ class Shapes:
         return find_surrounding(self._build_drawing(None))
 
     def _build_drawing(self, world: MultiPolygon | None) -> Drawing:
-        """Collect the shapes as input of an interpretation; for `world`; see `build_foreign_map`."""
+        """Collect the shapes as input of an interpretation; for `world`, see `build_foreign_map`."""
         return Drawing(
             source_name=self.source_name,
             outlines=self.outlines,

@@ -67,7 +67,7 @@ def find_enclosed_area(
     if crossings is None:
         crossings = CrossingCounter()
     has_three_points = [_has_three_points(ring) for ring in rings]
-    # Without an outline, further rings are holes in nothing.
+    # Without an outline, there is nothing that the other rings could be holes of.
     if not any(has_three_points) or (rule == "holes" and not has_three_points[0]):
         return EnclosedArea(MultiPolygon())
     lost: Counter[str] = Counter()

@@ -19,6 +19,8 @@ from robocov_app.formats.geometry.shapes.painting import (
 )
 from robocov_app.formats.reports import format_area
 
+_LOWEST_ORDER = -1
+"""Drawing order below that of all paint in a file."""
 _MIN_BACKGROUND_SHARE = 0.98
 """Minimum fraction of the page that a background covers."""
 
@@ -99,7 +101,7 @@ def find_nested_areas(
     odd, even = split_alternating(areas)
     if boundary is not None:
         report.notes.append("areas in an odd number of outlines within the boundary are solid")
-        return NestedAreas(boundary, PaintLayer(odd, -1))  # order -1: below all other paint
+        return NestedAreas(boundary, PaintLayer(odd, _LOWEST_ORDER))
     if odd.area >= even.area:
         number = "an odd number"
         free = odd
@@ -111,7 +113,7 @@ def find_nested_areas(
     whole = to_multipolygon(unite([Polygon(part.exterior) for part in (*odd.geoms, *even.geoms)]))
     size = format_area(free.area, 3)
     report.notes.append(f"areas in {number} of outlines are free, {size}, as the larger area")
-    return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, -1))
+    return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, _LOWEST_ORDER))
 
 
 def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:

@@ -159,7 +159,7 @@ class ModelPlacer:
         return build_frame(x * meters, y * meters, heading * self._radians_per_unit)
 
     def _add_model(self, entity: Entity, frame: FloatArray, labels: tuple[str, ...]) -> None:
-        """Add the outlines of a model: those in its bitmap, or else its blocks, or else its box."""
+        """Add the outlines of a model: those in its bitmap; without one, its blocks or its box."""
         size = entity.parse_numbers("size", (_DEFAULT_SIDE, _DEFAULT_SIDE)) * self._meters_per_unit
         for length in size.tolist():
             files.require_length(length, f"{entity.location}: size")
