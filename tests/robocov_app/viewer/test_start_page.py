@@ -17,12 +17,14 @@ from driven_window import build_key_event
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.commands import demo
 from robocov_app.commands.demo import Arguments
+from robocov_app.look.theme import DARK
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.window.display import REDUCED_MOTION_VARIABLE, open_display
 from robocov_app.viewer.start.cards import START_CARDS, StartChoice, Target, choose_map, choose_session
 from robocov_app.viewer.start.page import ANIMATION_S, StartPage
 from robocov_app.viewer.start.previews import load_previews
 from robocov_app.viewer.start.recording import RECORDED_RUNS, record_outline
+from robocov_app.viewer.start.sketch import DRAWING_S, draw_sketch
 from robocov_app.viewer.window.window import ViewerWindow
 
 SIZES = ((900, 600), (1280, 720), (1920, 1080))
@@ -280,3 +282,20 @@ def test_the_page_loads_neither_the_simulation_nor_the_compiler() -> None:
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+MAX_COLOR_DIFFERENCE = 20
+
+
+def count_pencil_pixels(seconds: float) -> int:
+    """Return the number of pixels in the color of the pencil while the preview of the editor is drawn."""
+    screen = pygame.Surface((190, 120), 0, 32)
+    screen.fill(DARK.background)
+    draw_sketch(screen, screen.get_rect(), DARK, 1.0, seconds=seconds)
+    differences = np.abs(pygame.surfarray.array3d(screen).astype(int) - DARK.accent).max(axis=2)
+    return int((differences < MAX_COLOR_DIFFERENCE).sum())
+
+
+def test_the_pencil_is_never_cut_off() -> None:
+    counts = [count_pencil_pixels(seconds) for seconds in np.linspace(0.0, 0.98 * DRAWING_S, 30)]
+    assert min(counts) > 0.85 * max(counts)

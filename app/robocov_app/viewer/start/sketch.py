@@ -49,13 +49,16 @@ def draw_sketch(screen: Surface, box: Rect, theme: Theme, scale: float, *, secon
     seconds : float
         Time since the drawing was started; it repeats.
     """
-    paper = box.inflate(-round(8 * scale), 0)
+    # The pencil is to the upper right of its tip, and must fit into the box, too.
+    pencil_size = round(_PENCIL_PX * scale)
+    paper = Rect(box.left, box.top + pencil_size, box.width - pencil_size, box.height - pencil_size)
+    center = paper.center
     paper.width = min(paper.width, round(1.5 * paper.height))
-    paper.center = box.center
+    paper.center = center
     screen.fill(theme.background, paper)
     _draw_grid(screen, paper, theme)
     fraction = min((seconds % (DRAWING_S + _PAUSE_S)) / DRAWING_S, 1.0)
-    sketch = Sketch(paper)
+    sketch = Sketch(box)
     walls = [_to_pixels(wall, paper) for wall in _WALLS]
     remaining = fraction * sum(_measure(wall) for wall in walls)
     tip = walls[0][0]
