@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygame
@@ -22,7 +23,7 @@ from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.window.display import REDUCED_MOTION_VARIABLE, open_display
 from robocov_app.viewer.start.cards import START_CARDS, StartChoice, Target, choose_map, choose_session
 from robocov_app.viewer.start.page import ANIMATION_S, StartPage
-from robocov_app.viewer.start.previews import load_previews
+from robocov_app.viewer.start.previews import RunPreview, fit_outline, load_previews
 from robocov_app.viewer.start.recording import RECORDED_RUNS, record_outline
 from robocov_app.viewer.start.sketch import DRAWING_S, draw_sketch
 from robocov_app.viewer.window.window import ViewerWindow
@@ -299,3 +300,27 @@ def count_pencil_pixels(seconds: float) -> int:
 def test_the_pencil_is_never_cut_off() -> None:
     counts = [count_pencil_pixels(seconds) for seconds in np.linspace(0.0, 0.98 * DRAWING_S, 30)]
     assert min(counts) > 0.85 * max(counts)
+
+
+BADGE_REACH_PX = 28
+"""Distance of the lower right corner of a badge from the corner of its card."""
+
+
+def test_badges_cover_no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes: list[pygame.Rect] = []
+
+    def list_box(
+        screen: pygame.Surface, run: RunPreview, box: pygame.Rect, *args: Any, **kwargs: Any
+    ) -> None:
+        boxes.append(fit_outline(run.outline, box))
+
+    monkeypatch.setattr("robocov_app.viewer.start.card_section.draw_run", list_box)
+    with open_page(size=(900, 600)) as page:
+        page.run_frame(0.0)
+        corners = [
+            pygame.Rect(item.box.left, item.box.top, BADGE_REACH_PX, BADGE_REACH_PX)
+            for item in page.focus.items
+            if item.name.startswith("card:")
+        ]
+    assert boxes
+    assert not any(box.collidelist(corners) >= 0 for box in boxes)

@@ -69,6 +69,12 @@ class CardSection:
         text_height = drawing.px(_TITLE_LINE_PX + _MAX_TEXT_LINES * _TEXT_LINE_PX + _TEXT_MARGIN_PX)
         inner = box.inflate(-2 * padding, -2 * padding)
         picture = Rect(inner.left, inner.top, inner.width, inner.height - text_height)
+        if len(card.previews) > 1:
+            # Several runs fill the whole width, where the first one would be below the badge.
+            badge_width = drawing.px(_BADGE_PX + _GAP_PX)
+            picture = Rect(
+                picture.left + badge_width, picture.top, picture.width - badge_width, picture.height
+            )
         self._draw_preview(card, picture, drawing)
         _draw_badge(number, inner, drawing, is_focused=is_focused)
         y = picture.bottom + drawing.px(_GAP_PX)
