@@ -159,7 +159,7 @@ def collect_run(rng: np.random.Generator, network: Network | None) -> tuple[Floa
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A reflection in the x axis if `is_mirrored`, followed by `turns` quarter turns counterclockwise."""
+    """A reflection in the x axis if `is_mirrored`, followed by `turns` quarter turns counter-clockwise."""
 
     turns: int
     is_mirrored: bool

@@ -40,7 +40,7 @@ def is_strictly_on(a: Node, b: Node, c: Node) -> bool:
 
 
 def is_inside_turn(v: Node, first: Node, d: Node, second: Node) -> bool:
-    """Return whether v → d is strictly in the counterclockwise turn from v → first to v → second."""
+    """Return whether v → d is strictly in the counter-clockwise turn from v → first to v → second."""
     turn = orient(v, first, second)
     is_after_first = orient(v, first, d) > 0
     if turn > 0:

@@ -50,7 +50,7 @@ def build_block(x: float, y: float, width: float, height: float) -> Obstacle:
 
 
 def build_rotated_block(center: FloatArray, width: float, height: float, angle: float) -> Obstacle:
-    """Build a rectangle around a center, rotated counterclockwise by an angle, rad."""
+    """Build a rectangle around a center, rotated counter-clockwise by an angle, rad."""
     corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
     along = np.array([np.cos(angle), np.sin(angle)])
     across = [-along[1], along[0]]

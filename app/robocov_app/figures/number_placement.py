@@ -72,7 +72,7 @@ def place_numbers(
 
     Notes
     -----
-    A number is in the first position that is clear of everything: nearest to its mark, counterclockwise from
+    A number is in the first position that is clear of everything: nearest to its mark, counter-clockwise from
     +x. If there is none, it is in the position that is farthest from everything.
 
     Examples

@@ -267,7 +267,7 @@ def render_nose(radius: float, fill: Color, edge: Color, direction: int, shift: 
         Radius of the disc.
     fill, edge : Color
     direction : int
-        Heading, counterclockwise from the right, in steps of 2 pi / `N_NOSE_DIRECTIONS`.
+        Heading, counter-clockwise from the right, in steps of 2 pi / `N_NOSE_DIRECTIONS`.
     shift : Shift
 
     Returns

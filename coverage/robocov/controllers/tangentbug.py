@@ -52,7 +52,7 @@ COUNTERCLOCKWISE = 1
 CLOCKWISE = -1
 """Direction in which a robot turns away from an obstacle.
 
-After a counterclockwise turn, the obstacle is on the robot's right.
+After a counter-clockwise turn, the obstacle is on the robot's right.
 """
 
 Squares: TypeAlias = frozenset[tuple[int, int]]

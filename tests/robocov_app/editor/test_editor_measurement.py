@@ -33,7 +33,7 @@ def build_hall_with_doors(*widths: float) -> Sketch:
 
 
 def rasterize_reach(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the possible centers of a robot on a raster, labelled by part, and the cells that it sweeps."""
+    """Return the possible centers of a robot on a raster, labeled by part, and the cells that it sweeps."""
     xs = np.arange(cell / 2, 12.0, cell)
     ys = np.arange(cell / 2, 8.0, cell)
     x, y = np.meshgrid(xs, ys)

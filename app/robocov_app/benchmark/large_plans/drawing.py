@@ -46,7 +46,7 @@ class Drawing:
         x, y : float, m
             Origin of the part, in the coordinates of this drawing.
         quarter_turns : int
-            Number of counterclockwise quarter turns from the axes of this drawing to those of the part.
+            Number of counter-clockwise quarter turns from the axes of this drawing to those of the part.
         mirrored : bool
             Whether the y axis of the part is reversed before it is turned.
         """
@@ -132,7 +132,7 @@ def build_octagon(x: float, y: float, radius: float) -> Ring:
 
 
 def build_outline(parts: Iterable[shapely.Geometry]) -> Ring:
-    """Return the outer ring of the union of connected shapes, counterclockwise."""
+    """Return the outer ring of the union of connected shapes, counter-clockwise."""
     union = shapely.union_all(list(parts))
     if not isinstance(union, shapely.Polygon):
         raise ValueError(f"parts: expected connected shapes, got a {union.geom_type}")

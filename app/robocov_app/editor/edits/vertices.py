@@ -377,7 +377,7 @@ def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
 
 
 def straighten(sketch: Sketch, selection: Selection, degrees: float = STRAIGHTEN_ANGLE_DEG) -> Change:
-    """Make edges horizontal or vertical that are so within an angle; consecutive ones end up on one line."""
+    """Make nearly horizontal or vertical edges exactly so; consecutive ones end up on the same line."""
     is_in_range = 0.0 < degrees <= MAX_STRAIGHTEN_ANGLE_DEG
     require(is_in_range, f"expected an angle above 0 and up to {MAX_STRAIGHTEN_ANGLE_DEG:g} degrees")
 

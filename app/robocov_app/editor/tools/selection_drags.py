@@ -328,7 +328,7 @@ class BoxDrag(Drag):
         self._end = event.unsnapped_point
 
     def find_selection(self) -> Selection:
-        """Return the objects in the box or, if it contains only some of the shown vertices, those."""
+        """Return the objects in the box, or the vertices in it if it contains only some of the shown ones."""
         sketch = self.context.sketch
         owners = self.context.vertex_owners
         inside = find_in_box(sketch, self._start, self._end, includes_partial=self._selects_partial)

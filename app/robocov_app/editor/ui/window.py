@@ -201,7 +201,7 @@ class EditorWindow(CommandWindow):
             try:
                 editor.tool.cancel(editor)
             except Exception:
-                # If the tool cannot be cancelled, the selection tool replaces it.
+                # If the tool cannot be canceled, the selection tool replaces it.
                 editor.toolbox.current = editor.toolbox.selector
                 raise
             finally:

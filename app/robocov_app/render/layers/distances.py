@@ -88,7 +88,7 @@ def _cover_outside(canvas: Canvas, vertices: FloatArray) -> None:
     length = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = length * (end - start) / max(float(np.hypot(*(end - start))), _MIN_LENGTH_PX)
-        # Pixels run downwards, so that the outside is to the left of a counterclockwise outline.
+        # Pixels run downwards, so that the outside is to the left of a counter-clockwise outline.
         outward = np.array([-along[1], along[0]])
         ring = [start - along, end + along, end + along + outward, start - along + outward]
         canvas.fill_polygon(np.array(ring), canvas.theme.background)

@@ -49,7 +49,7 @@ def compute_cos_sin(degrees: float) -> tuple[float, float]:
 
 
 def compute_bearing(a: Point, b: Point) -> float:
-    """Return the direction from point a to point b, in degrees counterclockwise from the x axis."""
+    """Return the direction from point a to point b, in degrees counter-clockwise from the x axis."""
     return math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
 
 

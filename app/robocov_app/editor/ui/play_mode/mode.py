@@ -55,7 +55,7 @@ class PlayMode:
         editor = self._editor
         host = self._host
         if editor.toolbox.selector.is_busy:
-            # A drag is cancelled, but an unfinished drawing is kept.
+            # A drag is canceled, but an unfinished drawing is kept.
             editor.toolbox.selector.cancel(editor)
         window = open_play_window(editor, host.display, host.scale, waits_for_workers=self._waits_for_workers)
         view = window.viewer.view

@@ -152,7 +152,7 @@ def _move_to_stairs(simplified: RingVertices, lines: _StairLines) -> FloatArray:
 
 
 def _find_cut_corners(simplified: RingVertices, lines: _StairLines, tolerance: FloatArray) -> _CutCorners:
-    """Find short sides between two long ones whose lines meet nearby; sides that represent stairs are not."""
+    """Find short sides between two long ones whose lines meet nearby, without those for stairs."""
     points = simplified.points
     after = simplified.after
     before = simplified.before

@@ -65,7 +65,7 @@ def _flatten_bulge(
     if not max_points - point_count > 0.0:  # The estimate may be nan.
         raise ValueError(f"expected at most {MAX_POINTS} points, got more")
     arc = ezdxf_math.ConstructionArc(center, radius, *np.degrees([start_angle, end_angle]))
-    # ezdxf's points run counterclockwise, which is from the start to the end only for positive bulges.
+    # ezdxf's points run counter-clockwise, which is from the start to the end only for positive bulges.
     points = to_plane(list(arc.flattening(min(tolerance, radius / 8))))
     if bulge <= 0.0:
         points = points[::-1]
