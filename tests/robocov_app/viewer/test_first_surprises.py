@@ -268,7 +268,7 @@ def test_the_command_starts_more_robots_than_fit_uniformly(capsys: pytest.Captur
 
 def test_the_trajectory_of_a_failed_robot_stays_visible(tmp_path: Path) -> None:
     with open_viewer(tmp_path, shown={"trajectories"}, size=(1200, 800)) as driver:
-        color = np.array(driver.window.theme.failed_robot)
+        color = np.array(driver.window.theme.failed_trajectory)
 
         def count_pixels() -> int:
             left, top, width, height = driver.window.layout.arena
