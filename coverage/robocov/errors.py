@@ -8,8 +8,8 @@
     ├── ControllerEndedError  a user's controller tried to end Python (exit status 1)
     └── OutputError           a result cannot be written (exit status 2)
 
-Every message is one line that names the source (a file or an argument), the place in it, the expected value
-and the actual value.
+Every message is one line that names the source (a file or an argument), the location in it, the expected
+value and the actual value.
 """
 
 from __future__ import annotations

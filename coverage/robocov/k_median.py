@@ -404,7 +404,7 @@ def _apply_lloyd_step(table: FloatArray, sources: IntArray, is_fixed: BoolArray)
 
 @kernel
 def _find_smallest(sums: FloatArray, is_taken: BoolArray) -> int:
-    """Return the column with the smallest sum that is not taken."""
+    """Return the column with the smallest sum among those that are not taken; -1 if all are taken."""
     best = -1
     min_sum = np.inf
     for column in range(len(sums)):

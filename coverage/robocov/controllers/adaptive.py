@@ -131,7 +131,7 @@ class Adaptive(BaseController):
     def begin(self, region: Region, team: Team) -> AdaptiveMemory:
         """Return the initial memory, without any measurements."""
         robot_count = len(team)
-        # Gains are floats, even where they are whole numbers.
+        # Gains are floats, even those that have to be whole numbers.
         functions_per_side = int(self.basis)
         lattice = Lattice.build(region, functions_per_side, self.correlation)
         sample_count, function_count = lattice.functions.shape

@@ -206,7 +206,10 @@ class Barrier(BaseController):
         )
 
     def _build_obstacle_planes(self, seen: Observations, team: Team, points: FloatArray) -> HalfPlanes:
-        """Return the half planes that keep robots away from obstacle points, (n, k, 2) m; nan for none."""
+        """Return the half planes that keep robots away from obstacle points, (n, k, 2) m.
+
+        Points may be nan. Their half planes constrain nothing.
+        """
         offset = seen.positions[:, None] - points
         distance = np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
         normal = offset / np.where(distance > 0.0, distance, np.nan)[..., None]

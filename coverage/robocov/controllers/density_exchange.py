@@ -34,7 +34,7 @@ MAX_SENT_MEASUREMENTS = 50
 """Maximum number of measurements that a robot sends in one learning period."""
 
 MessageLists: TypeAlias = Sequence[Sequence[Message]]
-"""The messages that each robot sends in a step; empty if no robot sends any."""
+"""The messages that each robot sends in a step; may be empty if no robot sends any."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +114,7 @@ class ParameterExchange:
         exchange : ParameterExchange
             The exchange after these messages have been sent.
         messages : sequence of sequence of Message
-            The messages of each robot; empty if no robot sends any.
+            The messages of each robot; may be empty if no robot sends any.
         """
         if not self.is_unsent.any():
             return self, ()
@@ -137,7 +137,7 @@ class Measurements(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementExchange:
-    """When robots last sent each measurement, and how many measurements each may still send. Immutable.
+    """Measurements that robots have sent, and the number that each may still send. Immutable.
 
     Attributes
     ----------
@@ -172,7 +172,8 @@ class MeasurementExchange:
     def send(self, seen: Observations, measurements: FloatArray) -> tuple[MeasurementExchange, MessageLists]:
         """Return the exchange after sending, and messages with measurements.
 
-        Each robot sends as many measurements as its allowance and the communication permit.
+        Each robot sends as many measurements as its allowance and the communication permit: first those that
+        it has never sent, then those that it sent longest ago.
 
         Parameters
         ----------
@@ -185,7 +186,7 @@ class MeasurementExchange:
         exchange : MeasurementExchange
             The exchange after these messages have been sent.
         messages : sequence of sequence of Message
-            The messages of each robot; empty if no robot sends any.
+            The messages of each robot; may be empty if no robot sends any.
         """
         if not self.allowances.any():
             return self, ()
@@ -196,6 +197,7 @@ class MeasurementExchange:
         for robot in np.flatnonzero(is_sender).tolist():
             count = self._count_measurements_to_send(seen, robot)
             known = np.flatnonzero(~np.isnan(measurements[robot]))
+            # The time of a measurement that was never sent is -inf, so that it comes first.
             order = np.argsort(sent_times[robot, known], kind="stable")
             squares = known[order[:count]]
             content = Measurements(squares, measurements[robot, squares])

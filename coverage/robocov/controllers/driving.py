@@ -63,7 +63,7 @@ def compute_approach_velocities(offsets: FloatArray, gain: float, max_speed: Flo
     Parameters
     ----------
     offsets : (n, 2) array, m
-        From the robots to their goals.
+        Vectors from the robots to their goals.
     gain : float, 1/s
         Speed per meter of distance; infinite for full speed.
     max_speed : (n,) array, m/s
@@ -158,7 +158,7 @@ def collect_obstacle_points(seen: Observations, returns: FloatArray | None) -> F
     Returns
     -------
     (n, k, 2) array, m
-        nan for none.
+        Rows of nan stand for no point.
     """
     nearest = seen.obstacle_points[:, None]
     if returns is None:
@@ -177,7 +177,7 @@ def avoid_collisions(
     seen : Observations
     team : Team
     obstacle_points : (n, k, 2) array, m
-        nan for none, as `collect_obstacle_points` returns them.
+        As returned by `collect_obstacle_points`; rows of nan stand for no point.
     margins : Margins
 
     Returns
@@ -221,7 +221,7 @@ def limit_approach_speed(
     ----------
     velocities : (n, 2) array, m/s
     offsets : (n, k, 2) array, m
-        From each object to the robot; nan for none.
+        Vectors from each object to the robot; rows of nan stand for no object.
     clearance : (n, k) array, m
         Minimum distance of the robot from the object.
     rate : float, 1/s
@@ -311,8 +311,10 @@ def find_nearest_allowed_points(
             if low > high + slack:
                 is_feasible[i] = False
                 break
-            # The point of the edge that is nearest to the desired one, moved into the interval.
-            t = min(max(points[i, 1] * nx - points[i, 0] * ny, min(low, high)), high)
+            # The point of the edge that is nearest to the desired one, moved into the interval. Because of
+            # the slack, `low` may be slightly above `high`.
+            desired_t = points[i, 1] * nx - points[i, 0] * ny
+            t = min(max(desired_t, min(low, high)), high)
             x = offset * nx - t * ny
             y = offset * ny + t * nx
         nearest[i, 0] = x

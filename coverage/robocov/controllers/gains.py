@@ -357,8 +357,8 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     checked_values = {}
     for given_name, value in values.items():
         if not gains:
-            place = f"{controller_name}.{given_name}"
-            raise ParameterError(f"{place}: controller {controller_name!r} has no gains")
+            path = f"{controller_name}.{given_name}"
+            raise ParameterError(f"{path}: controller {controller_name!r} has no gains")
         name = update_name(given_name, gains)
         if name not in gains:
             raise ParameterError(f"{controller_name}: {describe_unknown_name('gain', name, gains)}")

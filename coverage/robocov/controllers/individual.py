@@ -354,7 +354,10 @@ def require_controller(value: Any) -> Controller:
 
 
 def unwrap_controller(controller: Controller) -> Controller | IndividualController:
-    """Return the individual controller in an adapter, which has the gains; return any other one unchanged."""
+    """Return the individual controller in an adapter, or any other controller unchanged.
+
+    The gains are attributes of the individual controller, not of its adapter.
+    """
     if isinstance(controller, IndividualControllerAdapter):
         return controller.controller
     return controller

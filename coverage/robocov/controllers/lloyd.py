@@ -65,7 +65,7 @@ class Lloyd(BaseController):
     label = "Lloyd"
     summary = "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
 
-    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the centroid", high=100.0)
+    k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the target", high=100.0)
     response_time: float = response_time_gain()
     cells: str = cells_choice()
     target: str = choice("centroid", TARGETS, TARGET_HELP)

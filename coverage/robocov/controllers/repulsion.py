@@ -59,7 +59,7 @@ _BRAKING_FRACTION = 0.5
 def _compute_potential_forces(
     seen: Observations, goals: FloatArray, gains: PotentialGains, *, includes_robots: bool = True
 ) -> PotentialForces:
-    """Return the forces of the potentials on all robots, if desired without those of other robots."""
+    """Return the forces of the potentials on all robots, optionally without those of other robots."""
     if includes_robots:
         neighbors = NeighborPositions.from_graph(seen.neighbors, seen.reported_positions)
     else:
@@ -267,8 +267,8 @@ class Howard(BaseController):
     of the robots.
 
     Obstacles are the points that the rays of the range sensor hit. Each ray carries an equal fraction of the
-    charge `k_obs`, so its effect does not depend on the number of rays. Before the first scan,
-    a straight wall through the closest obstacle point is assumed.
+    charge `k_obs`, so that the force does not depend on the number of rays. Before the first scan, a straight
+    wall through the closest obstacle point is assumed.
 
     We did not have the full text of the paper; details may differ. Three choices are our own: each ray
     carries a fraction of the charge; forces do not grow below 5 cm; and robots repel all others within
@@ -285,7 +285,7 @@ class Howard(BaseController):
     friction: float = gain(2.0, "N s/m", "ν, which replaces the robots' own viscosity", high=20.0)
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
-        """Compute the forces F - ν q', less the viscosity, which the simulation adds itself."""
+        """Compute the forces F - ν q', without the viscosity that the simulation adds."""
         returns = update_returns(seen, memory.returns)
         pairs = _find_separated_neighbors(seen, 2.0 * seen.region.diameter)
         robot_forces = sum_by_robot(
@@ -299,6 +299,7 @@ class Howard(BaseController):
             offsets = np.nan_to_num(seen.positions[:, None] - returns)
             k_ray = self.k_obs / returns.shape[1]
             obstacle_forces = k_ray * _compute_inverse_squares(offsets).sum(axis=1)
+        # The simulation subtracts the viscosity of the robots. It is added here, so that only ν remains.
         friction = seen.velocities * (memory.team.viscosity - self.friction)[:, None]
         return Decision(
             forces=robot_forces + obstacle_forces + friction,
@@ -361,7 +362,7 @@ class Poduri(BaseController):
 
     @property
     def _min_degree(self) -> float:
-        """K, which avoids confusion: elsewhere, `neighbors` are the robots at the far ends of links."""
+        """Minimum number of neighbors, K. The `neighbors` of links, in contrast, are robots."""
         return self.neighbors
 
     def decide(self, seen: Observations, memory: Memory) -> Decision:
@@ -406,7 +407,7 @@ class Poduri(BaseController):
     ) -> BoolArray:
         """Return a mask of the links that are critical for one of their ends.
 
-        These are critical for the robot or, as far as the robot knows, for the neighbor.
+        A link is critical for the robot itself or, as far as the robot knows, for the neighbor.
         """
         n = len(seen.positions)
         # Entry (i, j) says whether robot j is within η R_c of robot i.
@@ -554,10 +555,11 @@ class Dispersion(BaseController):
         rate = self.k_disperse * (self.reach / np.maximum(pairs.distances, _MIN_DISTANCE_M) - 1.0)
         velocities = sum_by_robot(pairs.robots, pairs.offsets * rate[:, None], n)
         if self.explore_speed > 0.0:
-            speed = np.hypot(*seen.velocities.T)
-            is_exploring = (np.bincount(pairs.robots, minlength=n) == 0) & (speed > _MIN_EXPLORING_SPEED)
-            factor = self.explore_speed / speed[is_exploring]
-            velocities[is_exploring] = seen.velocities[is_exploring] * factor[:, None]
+            current_speed = np.hypot(*seen.velocities.T)
+            is_alone = np.bincount(pairs.robots, minlength=n) == 0
+            is_exploring = is_alone & (current_speed > _MIN_EXPLORING_SPEED)
+            speed_factor = self.explore_speed / current_speed[is_exploring]
+            velocities[is_exploring] = seen.velocities[is_exploring] * speed_factor[:, None]
         speed = np.hypot(*velocities.T)
-        factor = np.minimum(1.0, team.max_speed / np.maximum(speed, _MIN_LENGTH))
-        return np.asarray(velocities * factor[:, None])
+        clip_factor = np.minimum(1.0, team.max_speed / np.maximum(speed, _MIN_LENGTH))
+        return np.asarray(velocities * clip_factor[:, None])

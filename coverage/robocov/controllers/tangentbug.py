@@ -320,7 +320,7 @@ class TangentBug(BaseController):
 
 
 def _add_squares(squares: Squares, points: FloatArray) -> Squares:
-    """Return the squares together with those that contain obstacle points, (k, 2) m; nan for none."""
+    """Return the squares together with those that contain obstacle points, (k, 2) m; ignore nan."""
     detected = points[~np.isnan(points[:, 0])]
     indices = np.floor(detected / _SQUARE_SIDE_M).astype(np.intp)
     return squares | {(column, row) for column, row in indices.tolist()}
@@ -626,7 +626,7 @@ def compute_free_distances(
     Parameters
     ----------
     points : (m, 2) array, m
-        Obstacle points relative to the center of the disc; nan for none.
+        Obstacle points relative to the center of the disc; rows of nan stand for no point.
     directions : (k, 2) array
         Unit vectors.
     clearance : float, m

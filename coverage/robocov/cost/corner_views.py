@@ -145,7 +145,10 @@ def _add_views(
     lengths: FloatArray,
     row_count: int,
 ) -> int:
-    """Add a row for each tile in which a corner sees sites; return the new number of rows, or `NO_SPACE`.
+    """Add a row to the results for each tile in which a corner sees sites.
+
+    Rows are added to `indices` and `lengths` after the first `row_count` ones. Return the new number of rows,
+    or `NO_SPACE`.
 
     A search in the box tree of the tiles skips boxes that are hidden by walls, and empty boxes, whose lower
     bounds are infinite.
@@ -166,6 +169,7 @@ def _add_views(
                 return NO_SPACE
             if is_box_hidden(tiles.boxes, tile, wall_index, ONLY_SOURCE):
                 continue
+            # The lengths are written even if no site is visible. The next tile then overwrites them.
             visible_slots = _find_visible_sites(walls, wall_index, tiles, corner, tile, lengths[row_count])
             if visible_slots != 0:
                 indices[row_count, _CORNER] = corner

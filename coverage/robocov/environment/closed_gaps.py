@@ -181,7 +181,7 @@ def _snap_ends(search: PassageSearch, found: Sequence[FacingPoints]) -> _Segment
 
 
 def _remove_duplicates(segments: _Segments) -> _Segments:
-    """Return the segments without those of length 0, and those with the same two ends as an earlier one."""
+    """Remove segments of length 0, and those with the same two ends as an earlier segment."""
     seen: set[frozenset[Point]] = set()
     rows = []
     for row, ends in enumerate(zip(segments.starts.tolist(), segments.ends.tolist(), strict=True)):
@@ -193,7 +193,7 @@ def _remove_duplicates(segments: _Segments) -> _Segments:
 
 
 def _remove_crossings(segments: _Segments) -> _Segments:
-    """Return the segments without those that cross an earlier one.
+    """Remove segments that cross an earlier one that remains.
 
     Two segments cross only if all four ends are on one circle without a wall inside. The center of this
     circle is then not a saddle point of the distance to walls, and the second segment is not needed.

@@ -156,7 +156,7 @@ Obstacle: TypeAlias = PolygonObstacle | CircleObstacle | WallObstacle
 
 
 def shift_obstacle(obstacle: Obstacle, displacement: FloatArray) -> Obstacle:
-    """Return a copy of an obstacle at another position, where it stays.
+    """Return a copy of an obstacle that is shifted, and does not move.
 
     Parameters
     ----------

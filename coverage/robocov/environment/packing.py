@@ -150,7 +150,7 @@ def pack_randomly(rng: np.random.Generator, area: BaseGeometry, max_count: int, 
 
 
 def _drop_close_points(points: FloatArray, spacing: float) -> FloatArray:
-    """Return the points without each one that is within the spacing of an earlier remaining point."""
+    """Drop each point that is within the spacing of an earlier point that remains."""
     if len(points) == 0:
         return points
     is_kept = np.ones(len(points), dtype=bool)

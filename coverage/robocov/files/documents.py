@@ -162,7 +162,7 @@ def describe_mismatch(expected: str, value: object, *, is_missing: bool = False)
     Returns
     -------
     str
-        Message without the place of the value.
+        Message without the path of the value.
 
     Examples
     --------

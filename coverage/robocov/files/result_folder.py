@@ -16,6 +16,7 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
@@ -50,8 +51,9 @@ _STAGING_FOLDER = ".robocov-new"
 _LOCK_FILE = ".robocov.lock"
 _HEADER = {"format": "robocov-folder", "version": 1}
 """Format and version of manifests and journals."""
-_FIGURE_FILES = tuple(
-    figure + suffix for figure in (TRAJECTORIES_FIGURE, COST_FIGURE) for suffix in FIGURE_SUFFIXES
+_FIGURE_FILES = (
+    *(TRAJECTORIES_FIGURE + suffix for suffix in FIGURE_SUFFIXES),
+    *(COST_FIGURE + suffix for suffix in FIGURE_SUFFIXES),
 )
 _MAIN_FILES: dict[ResultKind, str] = {
     "comparison": COMPARISON_FILE,
@@ -72,7 +74,7 @@ _KNOWN_NAMES = {
     METRICS_FILE,
     REPORT_FILE,
     FORMER_BRANCH_FILE,
-    *(name for names in _FILES.values() for name in names),
+    *chain.from_iterable(_FILES.values()),
 }
 """Names of all files of results, except for the frames of videos."""
 _FRAME_NAME = re.compile(r"\d{6}\.png")
@@ -238,7 +240,10 @@ def create_result(
 
 
 def _list_possible_files(folder: Path, kind: ResultKind, run_names: Iterable[str]) -> set[str]:
-    """List the files that a result may have: of the frames, the first one and all that exist already."""
+    """List the files that a result may have.
+
+    There may be any number of frames. The first one and all that exist already are listed.
+    """
     names = {*_FILES[kind], f"{FRAMES_FOLDER}/000000.png", *_list_frames(folder)}
     for run_name in run_names:
         names.update(f"{run_name}/{name}" for name in _FILES["run"])
@@ -437,7 +442,9 @@ def _apply_journal(folder: Path) -> None:
             target = _resolve_inside(folder, name)
             target.parent.mkdir(parents=True, exist_ok=True)
             source.replace(target)
-    parents = {parent for name in removed_files for parent in PurePosixPath(name).parents[:-1]}
+    parents: set[PurePosixPath] = set()
+    for name in removed_files:
+        parents.update(PurePosixPath(name).parents[:-1])
     for parent in sorted(parents, key=lambda parent: len(parent.parts), reverse=True):
         with suppress(OSError):
             (folder / parent).rmdir()  # Fails, as it should, if the folder is not empty.

@@ -100,10 +100,11 @@ def _choose_grid_shape(request: MapRequest) -> GridShape:
     """Choose the shape of the grid: about the requested number of cells, which are nearly square."""
 
     def compute_mismatch(shape: GridShape) -> float:
-        """Return how much a grid differs from the requested number of cells, and its cells from squares."""
+        """Return how far a grid is from the requested number of cells, and its cells from squares."""
         columns, rows = shape
         elongation = abs(math.log(request.width / columns) - math.log(request.height / rows))
-        return abs(math.log(columns * rows / request.obstacle_count)) + _ELONGATION_WEIGHT * elongation
+        count_error = abs(math.log(columns * rows / request.obstacle_count))
+        return count_error + _ELONGATION_WEIGHT * elongation
 
     cell_count = int(request.obstacle_count)
     shapes = []
@@ -364,10 +365,12 @@ def trace_polylines(walls: BoolArray) -> Iterator[list[Post]]:
     segments = _list_segments(walls)
     starts = zip(segments.columns.tolist(), segments.rows.tolist(), strict=True)
     ends = zip(segments.end_columns.tolist(), segments.end_rows.tolist(), strict=True)
+    steps: list[tuple[Post, Post]] = []
     for start, end in zip(starts, ends, strict=True):
         neighbors[start].add(end)
         neighbors[end].add(start)
-    steps = sorted((post, neighbor) for post in neighbors for neighbor in neighbors[post])
+        steps += [(start, end), (end, start)]
+    steps.sort()
     traced: set[tuple[Post, Post]] = set()
     for start, second in steps:
         # A polyline may start only where the same polyline, traced in the opposite direction, would end.

@@ -81,14 +81,14 @@ _MIN_PIECE_ROUNDING_STEPS = 4.0
 
 
 class Box(NamedTuple):
-    """A rectangle along the axes.
+    """An axis-parallel rectangle.
 
     Attributes
     ----------
-    left, right : float, m
-        Minimum and maximum x.
-    bottom, top : float, m
-        Minimum and maximum y.
+    left, bottom : float, m
+        Minimum x and y.
+    right, top : float, m
+        Maximum x and y.
     """
 
     left: float

@@ -11,9 +11,9 @@ from robocov.typing import BoolArray, FloatArray
 STUCK_WINDOW_S = 5.0
 """Time over which the net displacement of a stuck robot is measured."""
 STUCK_DISTANCE_M = 0.05
-"""Net displacement of a stuck robot, which is less than this."""
+"""Net displacement below which a robot may be stuck."""
 MIN_STUCK_GOAL_DISTANCE_M = 0.5
-"""Distance of a stuck robot from its goal, which is more than this."""
+"""Distance from its goal above which a robot may be stuck."""
 
 
 def compute_path_lengths(positions: FloatArray, traveled: BoolArray | None = None) -> FloatArray:

@@ -380,7 +380,8 @@ def read_history(path: Path) -> CostHistory:
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     names = lines[0].split(",") if lines else []
-    if names not in (list(_HISTORY_COLUMNS), [*_HISTORY_COLUMNS, _MEAN_TIME_COLUMN]):
+    required_names = list(_HISTORY_COLUMNS)
+    if names not in (required_names, [*required_names, _MEAN_TIME_COLUMN]):
         raise InputError(f"{path}: line 1: expected the header {','.join(_HISTORY_COLUMNS)}")
     rows = np.empty((len(lines) - 1, len(names)))
     for row, line in enumerate(lines[1:]):
@@ -388,6 +389,7 @@ def read_history(path: Path) -> CostHistory:
         try:
             values = [float(cell) for cell in cells]
         except ValueError:
+            # No values are too few values, which is reported below.
             values = []
         if len(values) != len(names):
             raise InputError(f"{path}: line {row + 2}: expected {len(names)} numbers, got {quote(line)}")

@@ -152,9 +152,9 @@ def compute_run_metrics(
     record : Record
         The run.
     rate : float, Hz
-        Number of samples per simulated second; 0 samples only the first and the last time step. The last time
-        step is always sampled. Energy and path lengths
-        are integrated over all time steps of the record, regardless of the rate.
+        Number of samples per simulated second. The first and the last time step are always sampled, even if
+        the rate is 0. Energy and path lengths are integrated over all time steps of the record, regardless of
+        the rate.
     on_sample : callable or None
         Called after each sample, to report progress.
 
@@ -227,7 +227,7 @@ def _measure_connectivity_at(record: Record, step: int) -> Connectivity:
 
 
 def find_time_near_final(history: CostHistory, tolerance: float = NEAR_FINAL_TOLERANCE) -> float:
-    """Find the time from which on the mean distance stays near its final value.
+    """Find the time from which the mean distance stays near its final value.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
     -------
     mapping of str to float or None
         The metrics at the end of the run, the data rate of the messages of a robot, and the time from which
-        on the mean distance is near its final value. The names end in the units.
+        the mean distance stays near its final value. The names end in the units.
     """
     return {
         **compute_run_metrics(record, rate=0.0).final(),

@@ -10,7 +10,7 @@ from robocov.typing import BoolArray, FloatArray
 SETTLED_WINDOW_S = 4.0
 """Time over which the net displacement of a robot at rest is measured."""
 SETTLED_DISTANCE_M = 0.05
-"""Net displacement of a robot at rest, which is less than this."""
+"""Net displacement below which a robot is at rest."""
 
 
 def is_team_at_rest(before: FloatArray, after: FloatArray, distance: float = SETTLED_DISTANCE_M) -> BoolArray:

@@ -192,6 +192,7 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> FloatArra
     total_weight = float(max(len(sites), 1))
     if result.weights is not None:
         site_curvatures *= result.weights[sites]
+        # If all weights are 0, any divisor gives curvatures of 0.
         total_weight = float(result.weights[sites].sum()) or 1.0
     curvatures = np.bincount(owners, site_curvatures, minlength=len(result.positions)) / total_weight
     return np.where(curvatures > 0.0, curvatures, 1.0)

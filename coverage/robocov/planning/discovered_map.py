@@ -75,6 +75,7 @@ class DiscoveredMap:
         return cls(raster, np.zeros(raster.shape, dtype=np.uint8))
 
     def __deepcopy__(self, memo: object) -> DiscoveredMap:
+        # Copies share the object, because it never changes.
         return self
 
     @cached_property

@@ -184,16 +184,31 @@ def _find_meeting_cells(shortest: _ShortestPaths, pieces: IntArray) -> tuple[Int
 
 
 def _trace_path(shortest: _ShortestPaths, first_cell: int, last_cell: int) -> IntArray:
-    """Return the rows and columns, (k, 2), of the path between two nodes that meets in the given cells."""
+    """Trace the path between two nodes through the adjacent cells in which the paths from them meet.
+
+    Parameters
+    ----------
+    shortest : _ShortestPaths
+    first_cell, last_cell : int
+        Flat indices of these cells. Each belongs to one of the two nodes.
+
+    Returns
+    -------
+    (k, 2) int array
+        Rows and columns of the cells on the path, from the node of `first_cell` to that of `last_cell`.
+    """
     previous_cells = shortest.previous_cells.ravel()
-    ends = []
-    for cell in (first_cell, last_cell):
-        path = [cell]
-        while previous_cells[path[-1]] != _NONE:
-            path.append(int(previous_cells[path[-1]]))
-        ends.append(path)
-    to_first, to_last = ends
-    return np.column_stack(np.unravel_index([*reversed(to_first), *to_last], shortest.nodes.shape))
+    halves = []
+    for meeting_cell in (first_cell, last_cell):
+        # From the meeting cell back to the node.
+        half = [meeting_cell]
+        while previous_cells[half[-1]] != _NONE:
+            half.append(int(previous_cells[half[-1]]))
+        halves.append(half)
+    first_half, last_half = halves
+    cells = [*reversed(first_half), *last_half]
+    rows, columns = np.unravel_index(cells, shortest.nodes.shape)
+    return np.column_stack([rows, columns])
 
 
 def add_portals(edges: Edges, portals: Portals, cell_size: float) -> Edges:

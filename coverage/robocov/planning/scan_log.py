@@ -7,10 +7,11 @@ and, within a round, of robots. Robots with the same scans therefore have the sa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -38,19 +39,20 @@ Gaps and ages are counted in rounds.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NumberedScan:
-    """A scan with the numbers of its robot and its round. Immutable.
+    """A scan with the index of its robot and the number of its round. Immutable.
 
     Attributes
     ----------
     robot : int
-        Number of the robot that took the scan.
+        Index of the robot that took the scan, from 0.
     round_number : int
+        Number of the round in which all robots took a scan, from 0.
     time : float, s
         Time at which the scan was taken.
     position : (2,) array, m
         Position of the robot at that time, as the robot knew it.
     distances : (rays,) uint16 array
-        Lengths of the rays, in steps of the diameter of the region divided by 65535.
+        Lengths of the rays, in units of 1/65535 of the diameter of the region.
     is_hit : (rays,) bool array
         Whether each ray ends at an obstacle.
     """
@@ -64,7 +66,7 @@ class NumberedScan:
 
     @property
     def size(self) -> int:
-        """Size of a message with the scan: 32 bytes, plus 2 for each ray and 1 for every 8 rays.
+        """Size of a message with the scan, bytes: 32, plus 2 for each ray and 1 for every 8 rays, rounded up.
 
         Examples
         --------
@@ -74,9 +76,10 @@ class NumberedScan:
         542
         """
         rays = len(self.distances)
-        return _SCAN_HEADER_BYTES + 2 * rays + -(-rays // 8)
+        return _SCAN_HEADER_BYTES + 2 * rays + math.ceil(rays / 8)
 
     def __deepcopy__(self, memo: object) -> NumberedScan:
+        # Copies share the object, because it never changes.
         return self
 
 
@@ -233,6 +236,7 @@ class ScanLog:
         )
 
     def __deepcopy__(self, memo: object) -> ScanLog:
+        # Copies share the object, because it never changes.
         return self
 
     @cached_property
@@ -311,7 +315,7 @@ class ScanLog:
     def _list_scans(self, first_round: int, end_round: int) -> list[NumberedScan]:
         """Return the scans of the rounds from `first_round` up to, but not including, `end_round`."""
         rounds = self.rounds[first_round:end_round]
-        return [scan for round_scans in rounds for scan in round_scans if scan is not None]
+        return [scan for scan in chain.from_iterable(rounds) if scan is not None]
 
     def _repair_checkpoints(self) -> tuple[Checkpoint, ...]:
         """Return the checkpoints with the pending scans added."""

@@ -118,7 +118,7 @@ def _exclude_visited(
 
 
 def _compute_first_center(map_window: MapWindow) -> FloatArray:
-    """Return the center of the first cell of the window, in row 0 and column 0, (2,) m."""
+    """Return the center of the lower left cell of the window, from which rows and columns count, (2,) m."""
     window = map_window.window
     raster = map_window.known_map.raster
     return raster.compute_centers(np.array(window.first_row), np.array(window.first_column))

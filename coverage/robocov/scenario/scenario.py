@@ -157,7 +157,8 @@ class Scenario:
             velocities = state.velocities
             steering = state.steering
         elif velocities is not None or steering is not None:
-            raise ParameterError("velocities: expected starts as well, got none")
+            name = "steering" if velocities is None else "velocities"
+            raise ParameterError(f"{name}: expected starts as well, got none")
         check_dt(dt)
         if seed is not None:
             require_number("seed", seed, 0, MAX_SEED, whole=True)

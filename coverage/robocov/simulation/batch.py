@@ -395,7 +395,9 @@ class SimulationBatch:
         joint_record = recorder.record()
         records = []
         for run, run_bytes in enumerate(np.transpose(sent_bytes)):
-            record = self._extract_record(joint_record, run, seed=None if seeds is None else seeds[run])
+            seed = None if seeds is None else seeds[run]
+            record = self._extract_record(joint_record, run, seed=seed)
+            # Records of runs without messages have no sent bytes.
             if run_bytes.any():
                 record = replace(record, sent_bytes=run_bytes.copy())
             records.append(record)

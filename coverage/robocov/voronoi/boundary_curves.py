@@ -401,7 +401,7 @@ def _find_crossings(curves: FloatArray, line_count: int, crossings: FloatArray) 
 
 @kernel
 def _make_empty(curves: FloatArray, curve: int) -> None:
-    """Make the interval of t empty in which a curve may bound the cell: let it end at minus infinity."""
+    """Record that a curve does not bound the cell: its interval of t ends at minus infinity."""
     curves[curve, _END] = -np.inf
 
 

@@ -86,7 +86,7 @@ class ChangingWorld:
 
     @property
     def failed_robots(self) -> FloatArray:
-        """Center x and y and radius of the robots that have failed, (w, 3) m."""
+        """Center x, center y and radius of each robot that has failed, (f, 3) m."""
         return np.column_stack([self.positions, self.team.radius])[self._failed]
 
     def copy(self) -> ChangingWorld:

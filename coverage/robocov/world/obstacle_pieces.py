@@ -54,7 +54,7 @@ class Obstacles:
         `build_solid_pieces`.
     moving_obstacles : tuple of MovingObstacle
         Moving obstacles.
-    failed_robots : (w, 3) array or None, m
+    failed_robots : (f, 3) array or None, m
         Center x, y and radius of robots that have failed.
     """
 
@@ -155,7 +155,7 @@ def split_into_convex_pieces(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
 
 
 def _triangulate(polygon: BaseGeometry) -> list[Ring]:
-    """Triangulate a polygon; return counter-clockwise triangles."""
+    """Triangulate a polygon; return counter-clockwise triangles, without those of area zero."""
     rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(polygon)).reshape(-1, 4, 2)
     triangles: list[Ring] = []
     for corners in rings[:, :3].tolist():
@@ -169,7 +169,7 @@ def _triangulate(polygon: BaseGeometry) -> list[Ring]:
 
 
 def _merge_rings(rings: list[Ring]) -> list[Ring]:
-    """Return triangles, merged across their common edges as long as the results are convex.
+    """Merge triangles across their common edges, as long as the results are convex.
 
     An edge is a pair of points. All rings are counter-clockwise. If one piece has the edge from a to b, the
     piece on the other side of this edge therefore has the edge from b to a.

@@ -60,7 +60,7 @@ class World:
     Parameters
     ----------
     obstacles : Obstacles
-        See `robocov.world.obstacle_pieces.build_obstacles`.
+        Everything that is solid, as returned by `robocov.world.obstacle_pieces.build_obstacles`.
     team : Team
         The n robots.
     positions : (n, 2) array, m
@@ -77,7 +77,7 @@ class World:
     ----------
     team : Team
         The n robots.
-    failed_robots : (w, 3) array or None, m
+    failed_robots : (f, 3) array or None, m
         Center x, y and radius of the failed robots among the obstacles.
     positions : (n, 2) array, m
         Centers of the robots. Read-only.
@@ -102,8 +102,9 @@ class World:
     -----
     In each step, the forces of the controllers, the viscous term of (28) and the kinematic limits are
     combined into the net forces that pymunk integrates. Pymunk resolves contacts, in substeps so fine that no
-    robot sinks into a static wall or another robot by more than `contacts.MAX_PENETRATION_M`. A step depends
-    on nothing but positions, velocities and steering, so that a copy continues identically, bit for bit.
+    robot sinks into a static wall or another robot by more than `contacts.MAX_PENETRATION_M`. Besides its
+    arguments, a step depends only on positions, velocities and steering, so that a copy continues
+    identically, bit for bit.
 
     Moving obstacles stay on their paths and push robots aside. They may press a robot deeper into a wall: by
     some millimeters, and in very acute corners by centimeters. Walls take precedence. If no space is left
@@ -150,10 +151,10 @@ class World:
         self._may_exceed_max_speed = velocities is not None
         if velocities is None:
             velocities = np.zeros((len(team), 2))
+        positions = np.array(positions, dtype=float)
         velocities = np.array(velocities, dtype=float)
-        self._set_state(
-            np.array(positions, dtype=float), velocities, initialize_steering(team, velocities, steering)
-        )
+        steering = initialize_steering(team, velocities, steering)
+        self._set_state(positions, velocities, steering)
         # These values do not matter, because each substep sets the states of moving obstacles first.
         self._obstacle_states = compute_obstacle_states(obstacles.moving_obstacles, time=0.0, dt=1.0)
         self._response: MotionResponse | None = None
@@ -241,7 +242,11 @@ class World:
         return max(math.ceil(dt / MAX_SUBSTEP_S - _SUBSTEP_COUNT_TOLERANCE), math.ceil(travel_in_radii))
 
     def _run_substep(self, forces: FloatArray, external: FloatArray, dt: float) -> None:
-        """Advance one substep: move all robots as if there were no contacts, then those in contact again."""
+        """Advance one substep.
+
+        All robots are first moved as if there were no contacts. Those that touched something are then moved
+        again from the same initial states, and their contacts are resolved.
+        """
         response = self._get_response(dt)
         max_speed_after_contact = self.team.max_speed
         may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0

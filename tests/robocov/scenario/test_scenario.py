@@ -94,6 +94,7 @@ def test_check_accepts_what_can_run() -> None:
         ({"team": 3}, r"team: expected a Team"),
         ({"starts": [[1, 1]], "robots": 2}, r"starts: expected one for each of 2 robots, got 1"),
         ({"velocities": [[1, 1]]}, r"velocities: expected starts as well"),
+        ({"steering": [[0, 0]]}, r"steering: expected starts as well"),
         ({"dt": 2.0}, r"dt: expected"),
         ({"seed": -1}, r"seed: expected"),
         ({"duration": float("inf")}, r"duration: expected"),

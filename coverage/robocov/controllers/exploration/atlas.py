@@ -290,7 +290,7 @@ class Atlas(BaseController):
     def _list_due_robots(
         self, seen: Observations, memory: AtlasMemory, *, earliest_plan_time: float
     ) -> list[int]:
-        """Return the robots that make a plan in this step; none of them does before the given time, s."""
+        """Return the robots that make a plan in this step; no robot does before `earliest_plan_time`, s."""
         return [
             robot
             for robot, state in enumerate(memory.states)
@@ -554,7 +554,10 @@ def _has_changed(previous: PlannerState, state: PlannerState, radius: float) -> 
 
 
 def _extend_viewpoint_path(state: PlannerState, position: FloatArray, added_length: float) -> TraveledPath:
-    """Return the path with the last move, in m, as part of the path to a viewpoint, if it led to one."""
+    """Return the path after the last move, which counts toward a viewpoint if the robot headed for one.
+
+    `added_length` is the length of this move, m.
+    """
     viewpoint = None if state.motion is None else state.motion.viewpoint
     if viewpoint is None:
         return state.path

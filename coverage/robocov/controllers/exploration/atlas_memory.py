@@ -85,7 +85,7 @@ class OwnMotion:
 
 @dataclass(frozen=True, eq=False)
 class JamState:
-    """Number of plans for which a robot has been stuck among others, and end of its move away from them."""
+    """State of a robot that is stuck among others, or moves away from them."""
 
     stuck_plans: int = 0
     """Number of consecutive plans during which the robot has been stuck."""
@@ -113,6 +113,7 @@ class PlannerState:
     jam: JamState = JamState()
 
     def __deepcopy__(self, memo: object) -> PlannerState:
+        # Copies share the object, because it never changes.
         return self
 
 

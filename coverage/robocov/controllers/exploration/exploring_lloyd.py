@@ -231,7 +231,7 @@ def _choose_viewpoint(
     position : (2,) array, m
         Position of the robot.
     previous : int
-        The previous viewpoint, or `NO_SQUARE`. It is kept as long as it is unknown.
+        The previous viewpoint, or `NO_SQUARE`. It is chosen again as long as it is unknown.
     sensing_range : float, m
 
     Returns

@@ -16,6 +16,7 @@ Messages that cannot be sent before the next scan are dropped; their scans are s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
@@ -69,7 +70,7 @@ class Digest:
         81
         """
         robot_count = len(self.is_neighbor)
-        return _TIME_BYTES + _INVENTORY_BYTES * robot_count + -(-robot_count // 8)
+        return _TIME_BYTES + _INVENTORY_BYTES * robot_count + math.ceil(robot_count / 8)
 
 
 class ReceivedDigest(NamedTuple):
@@ -99,6 +100,7 @@ class RobotExchange:
     """Messages that the robot has not been able to send yet."""
 
     def __deepcopy__(self, memo: object) -> RobotExchange:
+        # Copies share the object, because it never changes.
         return self
 
 

@@ -77,6 +77,7 @@ class Plan:
     density: Density | None
 
     def __deepcopy__(self, memo: object) -> Plan:
+        # Copies share the object, because it never changes.
         return self
 
 

@@ -109,7 +109,7 @@ class Teammates(NamedTuple):
             *(np.concatenate([new, old[is_kept]]) for new, old in zip(observed, self, strict=True))
         )
         updated = joined._select(np.argsort(joined.robots))
-        # Robots that are still close to where they came to rest keep the position and the time of that.
+        # Robots that are still close to where they came to rest keep that position and its time.
         _, rows, previous_rows = np.intersect1d(
             updated.robots, self.robots, assume_unique=True, return_indices=True
         )
