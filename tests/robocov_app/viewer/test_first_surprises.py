@@ -280,4 +280,4 @@ def test_the_trajectory_of_a_failed_robot_stays_visible(tmp_path: Path) -> None:
         before = count_pixels()
         driver.viewer.attempt(lambda: driver.session.fail_robot(1))
         driver.run_frames(2)
-        assert count_pixels() > before + 20
+        assert count_pixels() > before + 10
