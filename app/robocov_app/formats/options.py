@@ -85,7 +85,7 @@ def _list_words(hint: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class ReadOptions(Options):
-    """Options for reading a map, in addition to its file. None stands for the default of the format."""
+    """Options for reading a map, in addition to its file. Their defaults are those of its format."""
 
     cell: float | None = None
     """Side of a cell, pixel or tile, m (default: 1 for MovingAI, Tiled and CoverageControl)."""
@@ -198,7 +198,7 @@ class ReadOptions(Options):
 
 @dataclass(frozen=True)
 class WriteOptions(Options):
-    """Options for writing a map. None stands for the default of the format."""
+    """Options for writing a map. Their defaults are those of its format."""
 
     cell: float | None = None
     """Side of a cell or pixel, m (default: 0.05). Walls thinner than a cell are written without gaps."""
