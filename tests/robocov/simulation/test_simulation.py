@@ -78,11 +78,12 @@ def test_runs_are_the_same_in_another_process_on_any_x86_processor(
     names: list[str], environment: dict[str, str]
 ) -> None:
     script = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sys; sys.path[:0] = sys.argv[1:3]\n"
         "from test_simulation import compute_digests\n"
-        "print(*compute_digests(sys.argv[2:]))\n"
+        "print(*compute_digests(sys.argv[3:]))\n"
     )
-    command = [sys.executable, "-W", "ignore", "-c", script, str(Path(__file__).parent), *names]
+    folder = Path(__file__).parent
+    command = [sys.executable, "-W", "ignore", "-c", script, str(folder), str(folder.parent), *names]
     process = subprocess.run(
         command, env=os.environ | environment, capture_output=True, text=True, check=True
     )
