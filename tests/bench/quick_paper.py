@@ -3,8 +3,8 @@
     python -m pytest -n 0 tests/bench/quick_paper.py
 
 This takes minutes and is therefore no part of the test suite. Close claims require the maps of the full
-study. The grid of gains is smaller than that of the quick study, and the studies beyond the paper are left
-out: tests/robocov_app/replication/test_whole_study.py covers them with a tiny plan.
+study. Runs are shorter and the grid of gains is smaller than in the quick study, and the studies beyond the
+paper are left out: tests/robocov_app/replication/test_whole_study.py covers them with a tiny plan.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from robocov_app.replication.design import plan
 
 
 def test_the_quick_study_confirms_the_clear_claims(tmp_path, monkeypatch):
-    small_grid = replace(plan.QUICK, rho_0=(2.0,), k_att=(3.0,))
-    monkeypatch.setattr(plan, "QUICK", small_grid)
+    short_study = replace(plan.QUICK, duration=30.0, rho_0=(2.0,), k_att=(3.0,))
+    monkeypatch.setattr(plan, "QUICK", short_study)
     out = tmp_path / "out"
     assert main(["paper", "--quick", "--without-beyond", "--out", str(out)]) == 0
     documents = json.loads((out / "claims.json").read_text())
