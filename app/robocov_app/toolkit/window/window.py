@@ -23,8 +23,10 @@ FPS = 60
 """Frames per second on a screen while something moves."""
 IDLE_S = 0.8
 """Time without changes after which the loop waits for events; longer than the delay of tooltips."""
-MAX_WAIT_S = 0.1
+MAX_WAIT_S = 0.2
 """Maximum time between two checks for changes while the loop waits."""
+_EVENT_CHECKS_PER_S = 30
+"""How often a loop that waits looks for events, which interrupt it."""
 
 _RATE_WEIGHT = 0.05
 """Weight of the last frame in the moving average of the frame rate."""
@@ -172,7 +174,7 @@ class BaseWindow:
         clock.tick(FPS)
         # SDL's own function for this polls a thousand times per second.
         while self.is_idle and perf_counter() - frame_start_s < MAX_WAIT_S and not pygame.event.peek():
-            clock.tick(FPS)
+            clock.tick(_EVENT_CHECKS_PER_S)
 
     @property
     def is_idle(self) -> bool:
