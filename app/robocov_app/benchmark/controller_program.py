@@ -99,6 +99,7 @@ class _SingleRobotAdapter(IndividualControllerAdapter):
     def decide(
         self, seen: Observations, memory: IndividualMemories | None, robots: Iterable[int] | None = None
     ) -> Decision:
+        """Return the decision of this robot; `robots` is ignored."""
         return super().decide(seen, memory, [self._robot])
 
 

@@ -231,11 +231,7 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
     for name, track_ratings in tracks.items():
         for rating in track_ratings:
             by_label[rating.label][name] = rating
-    scores = {}
-    for label, label_ratings in by_label.items():
-        is_complete = all(rating.is_complete for rating in label_ratings.values())
-        if is_complete and label_ratings.keys() == tracks.keys():
-            scores[label] = float(np.mean([rating.score for rating in label_ratings.values()]))
+    scores = _compute_mean_scores(by_label, tracks)
     ranked = sorted(scores, key=lambda label: -scores[label])
     not_ranked = [label for label in labels if label not in scores and by_label[label]]
     not_ranked.sort(key=str.casefold)
@@ -253,6 +249,18 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
     if missing:
         notes = (f"Without runs on these tracks: {'; '.join(missing)}.",)
     return PageTable("Scores, and median gaps on each track, %", head, rows, notes=notes)
+
+
+def _compute_mean_scores(
+    by_label: Mapping[str, Mapping[str, Rating]], tracks: Collection[str]
+) -> dict[str, float]:
+    """Return the mean score of each entry that has all runs of all tracks, by its label."""
+    scores = {}
+    for label, label_ratings in by_label.items():
+        is_complete = all(rating.is_complete for rating in label_ratings.values())
+        if is_complete and label_ratings.keys() == set(tracks):
+            scores[label] = float(np.mean([rating.score for rating in label_ratings.values()]))
+    return scores
 
 
 def _build_overview_cells(

@@ -12,11 +12,11 @@ _DIRECTIONS = 16
 """Number of directions from a mark in which its number may be written."""
 _RINGS = (1.0, 1.7, 2.5)
 """Distances of a number from the edge of its mark, as multiples of the least distance."""
-_LEAST_DISTANCE = 0.6
+_MIN_DISTANCE = 0.6
 """Minimum distance of the center of a number from the edge of its mark, in text sizes."""
 _CLEARANCE = 0.6
 """Distance from the center of a number to lines at which they do not touch it, in text sizes."""
-_MAX_REACH = _LEAST_DISTANCE * max(_RINGS) + 2.0 * _CLEARANCE
+_MAX_REACH = _MIN_DISTANCE * max(_RINGS) + 2.0 * _CLEARANCE
 """Distance from the edge of a mark, in text sizes, beyond which nothing can touch its number."""
 
 
@@ -108,5 +108,5 @@ def _list_offsets(mark_radius: float, text_size: float) -> FloatArray:
     """Return the possible offsets of a number from the center of its mark, (k, 2), the nearest first."""
     angles = np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    distances = mark_radius + _LEAST_DISTANCE * text_size * np.array(_RINGS)
+    distances = mark_radius + _MIN_DISTANCE * text_size * np.array(_RINGS)
     return np.asarray((distances[:, None, None] * directions).reshape(-1, 2))

@@ -109,7 +109,7 @@ class FollowedBoundary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NavigationState:
-    """What one robot does between two scans: its mode, waypoint and goal. Immutable."""
+    """Navigation mode, waypoint and goal of a robot between two scans. Immutable."""
 
     mode: Mode
     turn: int

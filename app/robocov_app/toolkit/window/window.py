@@ -26,7 +26,7 @@ IDLE_S = 0.8
 MAX_WAIT_S = 0.2
 """Maximum time between two checks for changes while the loop waits."""
 _EVENT_CHECKS_PER_S = 30
-"""How often a loop that waits looks for events, which interrupt it."""
+"""Number of checks per second for events, which end the wait."""
 
 _RATE_WEIGHT = 0.05
 """Weight of the last frame in the moving average of the frame rate."""
