@@ -1,7 +1,7 @@
 """The page that compares results of the benchmark: tables and Pareto plots for each track."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -163,6 +163,9 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
     }
     if not tracks:
         raise ParameterError("DIR: the results contain no run of the suite, so there is nothing to compare")
+    labeled_results = sorted(
+        zip(labels, results, strict=True), key=lambda labeled_result: labeled_result[0].casefold()
+    )
     page = load_template("benchmark.html.jinja").render(
         title=title,
         suite=suite.VERSION,
@@ -171,11 +174,11 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         marks=MARKER_PATHS,
         styles=entries.styles,
         overviews=_build_overviews(labels, tracks),
-        anomalies=_build_anomaly_table(results, labels),
+        anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
         method=describe_method(),
-        entries=_build_entries_table(results, labels),
+        entries=_build_entries_table(labeled_results),
     )
     return escape_controls(page)
 
@@ -569,10 +572,10 @@ def _describe_entries_without_messages(
         )
 
 
-def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
+def _build_entries_table(labeled_results: Iterable[tuple[str, Mapping[str, Any]]]) -> PageTable:
     """Build the table of the entries with their names, source hashes, gains and versions."""
     rows = []
-    for result, label in zip(results, labels, strict=True):
+    for label, result in labeled_results:
         entry = result["entry"]
         gains = ", ".join(f"{name} {value}" for name, value in entry["gains"].items())
         source = "built in"
@@ -585,11 +588,25 @@ def _build_entries_table(results: Sequence[Mapping[str, Any]], labels: Sequence[
     return PageTable("Entries", head, rows, text_columns=frozenset({1, 2, 3, 4, 5}))
 
 
-def _build_anomaly_table(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> PageTable:
-    """Build the table of suspicious runs, with the number of runs for each reason."""
-    rapf = _find_default_rapf(results)
+def _build_anomaly_table(
+    labeled_results: Iterable[tuple[str, Mapping[str, Any]]], rapf: Mapping[str, Any]
+) -> PageTable:
+    """Build the table of suspicious runs, with the number of runs for each reason.
+
+    Parameters
+    ----------
+    labeled_results : iterable of (str, Mapping)
+        Labels of the entries, and their results.
+    rapf : Mapping
+        The result of RAPF with default gains, with which the others are compared.
+
+    Returns
+    -------
+    PageTable
+        The table.
+    """
     rows = []
-    for result, label in zip(results, labels, strict=True):
+    for label, result in labeled_results:
         runs_by_reason: dict[str, list[str]] = {}
         for anomaly in find_anomalies(result, rapf):
             run = f"{anomaly.track}, {anomaly.map}, seed {anomaly.seed}"

@@ -302,6 +302,9 @@ def test_unranked_entries_are_in_alphabetical_order_and_entries_without_runs_are
     assert rows[-3:] == ["a", "b", "C"]
     plans = page.partition('id="overview-plans"')[2].partition("</section>")[0]
     assert "Without runs on these tracks: a; b; C." in plans
+    entries = page.partition("<span>Entries</span>")[2].partition("</table>")[0]
+    labels = re.findall(r'<th scope="row"[^>]*>(?:<svg.*?</svg>)?(.*?)</th>', entries)
+    assert labels == ["a", "b", "C", "Lloyd", "RAPF"]
 
 
 def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:
