@@ -407,6 +407,11 @@ class Scenario:
         Scenario
             A scenario that starts from the recorded positions, and has the duration of the record. Changes
             that the user made in the window during the run are not part of the scenario.
+
+        Raises
+        ------
+        ParameterError
+            If the controller of the record is neither built in nor in a file.
         """
         velocities = record.velocities[0] if record.velocities[0].any() else None
         steering = None if record.steering is None else record.steering[0]

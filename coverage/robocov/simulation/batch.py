@@ -329,7 +329,7 @@ class SimulationBatch:
         sent_bytes = np.zeros(len(self))
         is_working = np.ones(len(self.team), dtype=bool)
         for run, run_messages in enumerate(messages):
-            # The inbox before is None: all earlier messages have arrived, because there are no delays.
+            # No inbox is passed, because all earlier messages have arrived: there are no delays.
             positions = self._world.positions[self._rows[run]]
             inboxes[run], sent_bytes[run] = self._radio.send_messages(
                 None, self._steps, run_messages, positions, is_working

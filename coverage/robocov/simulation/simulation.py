@@ -173,7 +173,7 @@ class Simulation:
         )
 
     def _start_step(self) -> None:
-        """Discard the observations and the decision of the previous step, and update the sensor."""
+        """Discard the observations and the decision of the previous step, and set the time of the sensor."""
         self._knowledge: _Knowledge | None = None
         self._snapshot: Snapshot | None = None
         if self._has_changing_obstacles:
@@ -334,8 +334,8 @@ class Simulation:
     def _find_new_robots(self, positions_before: FloatArray) -> tuple[JoinedRobot, ...]:
         """Return the robots that joined at the end of the last step.
 
-        `positions_before` are the positions before that step. That of a robot that has not joined yet is the
-        position requested for it.
+        `positions_before` are the positions before that step, when the row of a new robot still contained the
+        position at which it was requested to join.
         """
         if self.conditions is None or not self.conditions.joins:
             return ()

@@ -48,6 +48,8 @@ class ChangingWorld:
 
     Attributes
     ----------
+    team : Team
+        All n robots.
     positions : (n, 2) array, m
         Centers of the robots. Read-only.
     velocities : (n, 2) array, m/s

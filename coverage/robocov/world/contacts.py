@@ -274,7 +274,7 @@ class ContactSolver:
         self._run_substep(bodies_and_discs, dt)
 
     def _run_substep(self, bodies_and_discs: list[BodyAndDisc], dt: float) -> None:
-        """Run a substep, and move robots that a moving obstacle has pushed into a wall out of the wall."""
+        """Run a substep, and move robots out of walls into which a moving obstacle has pushed them."""
         if not self._moving_bodies:
             self._space.step(dt)
             return
@@ -285,7 +285,7 @@ class ContactSolver:
     def _keep_out_of_walls(
         self, bodies_and_discs: list[BodyAndDisc], old_positions: list[pymunk.Vec2d]
     ) -> None:
-        """Move robots that a moving obstacle has pushed into a wall back in front of that wall.
+        """Move robots out of walls into which a moving obstacle has pushed them.
 
         Walls take precedence over moving obstacles, which then pass over the robot.
         """

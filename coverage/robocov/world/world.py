@@ -251,6 +251,8 @@ class World:
         max_speed_after_contact = self.team.max_speed
         may_exceed_max_speed = self._may_exceed_max_speed or len(external) > 0
         if may_exceed_max_speed:
+            # The limits of the controllers' forces do not allow for external forces, which are added to the
+            # limited net forces. The limits after contacts do.
             limits = self._compute_speed_limits(external, dt)
             response = response._replace(max_speed=limits.without_external_forces)
             max_speed_after_contact = limits.with_external_forces
