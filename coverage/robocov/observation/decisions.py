@@ -84,7 +84,8 @@ def check_decision(
     Raises
     ------
     ParameterError
-        If it is not a `Decision`, or its forces are not finite numbers of shape (robot_count, 2).
+        If it is not a `Decision`, its forces are not finite numbers of shape (robot_count, 2), or its goals
+        are not numbers of this shape.
     """
     subject = f"controller {controller!r}: decide(observations, memory) returned"
     suffix = f" at {time:.3f} s{source}"

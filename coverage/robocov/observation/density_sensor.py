@@ -22,6 +22,12 @@ DensityLog: TypeAlias = dict[tuple[int, bytes], float]
 class DensitySensor:
     """Measures an unknown density within the sensing range of each robot.
 
+    Parameters
+    ----------
+    measure : callable
+        Called with the indices of robots, (k,), and the point that each of them measures, (k, 2) m. Returns
+        φ at each point, (k,).
+
     Attributes
     ----------
     log : dict
@@ -91,8 +97,8 @@ class DensitySensor:
                 )
             if density is None:
                 return np.ones(len(points))
-            # The same array if there is no localization error. This avoids the rounding of
-            # `points - known_positions + positions`.
+            # Both are the same array if there is no localization error. The density is then evaluated at the
+            # points themselves, without the rounding of `points - known_positions + positions`.
             if known_positions is positions:
                 return density.evaluate(points)
             return density.evaluate(positions[robots] + offsets)

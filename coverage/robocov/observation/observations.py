@@ -185,7 +185,7 @@ class Observations:
         return self.reported_positions[start:stop]
 
     def find_neighbors(self, max_distance: float = np.inf) -> NeighborPairs:
-        """Find the neighbors of each robot, within a distance of their known positions.
+        """Find the neighbors of each robot whose known positions are within a distance of it.
 
         Parameters
         ----------

@@ -22,7 +22,8 @@ class Snapshot:
     decision : Decision
         Decision of the controller for these observations.
     true_positions : (n, 2) array or None, m
-        The true positions, if the robots may observe others. None: the observed positions are exact.
+        The true positions, if the observed ones may differ from them. None: the observed positions are
+        exact.
     is_working : (n,) bool array or None
         Mask of the robots that have joined and have not failed. None: all.
     inbox : object
