@@ -256,7 +256,7 @@ def _add_repulsion(sums: FloatArray, i: int, j: int, dx: float, dy: float, gains
 def _compute_separation(i: int, j: int) -> tuple[float, float]:
     """Return the unit vector in which robot i is pushed away from robot j at the same position.
 
-    The direction differs between pairs, and is opposite for j and i.
+    The direction depends on the pair, and is opposite for j and i.
     """
     angle = GOLDEN_ANGLE * (min(i, j) + 1.0) * (max(i, j) + 1.0)
     sign = 1.0 if i < j else -1.0

@@ -227,7 +227,7 @@ def is_box_hidden(boxes: FloatArray, box: int, index: AngularWallIndex, source: 
 
 @kernel
 def _wrap_bin(unwrapped_bin: int, bin_count: int) -> int:
-    """Convert the index of a bin that was counted beyond a full turn, or backward, to 0 up to `bin_count`.
+    """Convert the index of a bin that was counted beyond a full turn, or backward, to one within a full turn.
 
     Since `bin_count` is a power of 2, the bit mask gives the remainder of the division by it, even for a
     negative index.

@@ -79,7 +79,7 @@ class CornerPaths(NamedTuple):
 
 
 class CornerQueue(NamedTuple):
-    """A queue of corners whose outgoing links must be relaxed. `relax_paths` keeps its head and tail."""
+    """A queue of corners whose outgoing links must be relaxed. `relax_paths` stores its head and tail."""
 
     corners: IntArray
     """(k + 1,) The corners in the queue: a ring buffer. One slot stays unused, so that a full queue differs
