@@ -19,6 +19,8 @@ VALUE_MARGIN = 0.08
 """Free space above and below the values, as a fraction of their range."""
 GROWTH_FRACTION = 0.5
 """Space for lower values on the axis of a curve that is still growing, as a fraction of its range."""
+MIN_SPAN_FRACTION = 0.25
+"""Minimum length of the axis of a curve that is still growing, as a fraction of its highest value."""
 TICK_FACTORS = (1, 2, 5, 10)
 """Steps between ticks are one of these times a power of ten."""
 MAX_VALUE_INTERVALS = 6
@@ -127,8 +129,8 @@ def list_ticks(start: float, end: float, step: float) -> FloatArray:
 def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> Axis:
     """Choose the value axis of curves that grow while the user watches them.
 
-    Costs fall at first, so the axis has space for lower values. It starts at a multiple of the step, so that
-    it rarely changes.
+    Costs fall at first, so the axis has space for lower values, and a minimum length. It starts at a
+    multiple of the step, so that it rarely changes.
 
     Parameters
     ----------
@@ -151,6 +153,9 @@ def choose_growing_value_axis(low: float, high: float, max_intervals: float) -> 
     start, end = choose_value_limits(low, high)
     if start > 0.0:
         start -= GROWTH_FRACTION * (high - low)
+        # Otherwise, the first small changes would fill the whole height, and then shrink with every sample.
+        start = min(start, (1.0 - MIN_SPAN_FRACTION) * high)
+        end = max(end, high + VALUE_MARGIN * (high - start))
     start = max(start, 0.0)
     step = choose_tick_step(end - start, max_intervals)
     start = float(f"{step * math.floor(start / step):.12g}")

@@ -150,8 +150,8 @@ class CommandBar(CommandPart):
         return []
 
     def list_right_cells(self, ui: Ui) -> list[BarCell]:
-        """Return the cells at the right end: help, commands, theme and panel."""
-        panel = self.build_button("panel", "Panel")
+        """Return the cells at the right end: help, commands, theme and settings."""
+        panel = self.build_button("panel", "Settings")
         if ui.width < NARROW_PX:
             return [self.build_button("help", "Help"), panel]
         return [

@@ -57,6 +57,12 @@ def test_growing_axis_contains_all_values(low: float, difference: float, max_int
     assert axis.ticks[0] == pytest.approx(axis.start)
 
 
+def test_first_small_changes_do_not_fill_a_growing_axis() -> None:
+    axis = choose_growing_value_axis(6.35, 6.44, 4)
+    assert axis.end - axis.start > 10 * (6.44 - 6.35)
+    assert axis.start == choose_growing_value_axis(6.3, 6.44, 4).start
+
+
 @pytest.mark.parametrize("value", [float("nan"), 0.0])
 def test_axis_without_values_is_from_zero_to_one(value: float) -> None:
     assert choose_growing_value_axis(value, value, 4) == Axis(0.0, 1.0, 0.5)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, Driver, open_viewer
 
+import robocov_app
 from robocov_app.toolkit.command_bar import NARROW_PX, UNSAVED_SIGN, WIDE_PX
 from robocov_app.toolkit.widgets.icons import ICONS, render_icon
 
@@ -105,6 +107,16 @@ def test_icons_have_ink_and_stay_within_their_square(name: str) -> None:
     assert image.get_rect().inflate(-1, -1).contains(mask.inflate(-1, -1))
 
 
+@pytest.mark.parametrize("name", ["restart", "step", "settle"])
+def test_icons_of_playback_have_straight_symmetric_shapes_unlike_undo(name: str) -> None:
+    def is_symmetric(icon: str) -> bool:
+        alpha = pygame.surfarray.array_alpha(render_icon(icon, 40, (10, 20, 30))).astype(int)
+        return bool(np.abs(alpha - alpha[:, ::-1]).mean() < 8)
+
+    assert is_symmetric(name)
+    assert not is_symmetric("undo")
+
+
 FIRST_ACTIONS = {
     "pause": "Play",
     "tool:wall": "Wall",
@@ -128,3 +140,12 @@ def test_first_actions_have_visible_buttons_with_words(tmp_path: Path, size: tup
             assert window_box.contains(button.rect), command
             assert min(button.rect.size) >= 24, command
             assert word.lower() in f"{button.text} {button.tip}".lower(), command
+
+
+def test_the_button_of_the_panel_has_the_word_that_it_has_on_phones(driver: Driver) -> None:
+    button = driver.find_widget("button", "panel")
+    assert button is not None
+    assert button.text == "Settings"
+    page = (Path(robocov_app.__file__).parent / "web/page.html").read_text()
+    assert ">Panel<" not in page
+    assert '"Panel"' not in page

@@ -315,7 +315,7 @@ def _build_view_group(
     group.add_arrows("pan:{}", "Pan (all arrows)", pan, "ctrl+{}")
     group.add("pan:hold", "Hold to pan", window.hold_pan, "space")
     group.add("theme", "Light or dark", editor.switch_theme, "t")
-    group.add("panel", "Hide or show the panel", editor.toggle_panel, "h")
+    group.add("panel", "Hide or show the settings", editor.toggle_panel, "h")
     group.add("tab", "Next page of the panel", window.show_next_tab, "ctrl+tab")
     group.add("fullscreen", "Full screen", window.toggle_fullscreen, "f11")
     group.add(

@@ -123,10 +123,8 @@ ICONS: Mapping[str, tuple[Stroke, ...]] = MappingProxyType(
             _area((10.5, 6.0), (18.0, 12.0), (10.5, 18.0)),
             _line((20.0, 6.5), (20.0, 17.5)),
         ),
-        "restart": (
-            _arc((12.0, 12.5), 7.5, -140.0, 150.0),
-            _line((5.2, 3.6), (5.8, 8.6), (10.8, 8.0)),
-        ),
+        # Back to the start: a bar, and a triangle that points to it.
+        "restart": (_line((5.5, 5.5), (5.5, 18.5)), _area((18.5, 4.5), (7.5, 12.0), (18.5, 19.5))),
         "help": (
             _circle((12.0, 12.0), 9.0),
             _arc((12.0, 9.8), 2.8, -170.0, 60.0),

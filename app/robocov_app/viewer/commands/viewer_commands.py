@@ -203,7 +203,7 @@ def _list_view_commands(viewer: Presenter) -> list[Command]:
     group.add("fade", "Fading trajectories", view.toggle_fading, "shift+t")
     group.add("suggestions", "Suggestions when settled", view.toggle_suggestions, "shift+h")
     group.add("motion", "Smooth or instant zooming", view.toggle_motion, "shift+f")
-    group.add("panel", "Hide or show the panel", view.toggle_panel, "h")
+    group.add("panel", "Hide or show the settings", view.toggle_panel, "h")
     return group.commands
 
 

@@ -99,7 +99,7 @@ class TopBar(CommandBar):
         return [restart, play, step, settle, build_space(SPACE_PX), *speed]
 
     def list_right_cells(self, ui: Ui) -> list[BarCell]:
-        """Return the cells of share, lesson, help, commands, theme and panel."""
+        """Return the cells of share, lesson, help, commands, theme and settings."""
         share = self.build_wide_button(ui, "share", "Share", command="share")
         cells = super().list_right_cells(ui)
         if ui.width < NARROW_PX:
