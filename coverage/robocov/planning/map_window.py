@@ -47,8 +47,9 @@ class UnknownArea(NamedTuple):
 class MapWindow:
     """The cells of a discovered map in a window, (h, w), and the nodes of the window, (m,).
 
-    A cell is *near a wall* if its distance from a wall is less than the clearance. A node *has clearance* if
-    the cell in which it lies is not near a wall.
+    A cell is *near a wall* if the distance between its center and that of a blocked cell is at most the
+    clearance. Everything outside the window counts as blocked. A node *has clearance* if the cell in which it
+    lies is not near a wall.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ class MapWindow:
 
     @cached_property
     def is_near_wall(self) -> BoolArray:
-        """Whether each cell is near a wall: closer to it than the clearance, (h, w)."""
+        """Whether each cell is near a wall, (h, w)."""
         return dilate(self.is_blocked, self.clearance / self.known_map.raster.cell_size)
 
     @cached_property
@@ -148,10 +149,8 @@ class MapWindow:
     def unknown_area(self) -> UnknownArea:
         """The unknown cells, grouped by patch and by node."""
         rows, columns = self.patches.nonzero()
-        stride = self.window.stride
-        nodes = rows // stride * self.window.columns + columns // stride
-        # A node represents the cells of a square block, whose side is the stride. Each pair of a patch and a
-        # node is one number, so that the cells can be grouped by pair.
+        nodes = self.window.find_nodes(rows, columns)
+        # Each pair of a patch and a node is one number, so that the cells can be grouped by pair.
         node_count = len(self.nodes)
         pairs, index = np.unique(self.patches[rows, columns] * node_count + nodes, return_inverse=True)
         expected_free_counts = np.bincount(index, self.openness[rows, columns]).astype(np.float64)

@@ -48,8 +48,8 @@ class ScanAreas(NamedTuple):
         -------
         ScanAreas
         """
-        # Rays end in the cell behind the obstacle that they hit, plus one cell for rounding errors. Boxes end
-        # at the border of the raster.
+        # The hit of a ray may be marked in the cell behind the surface of the obstacle. Another cell is added
+        # for rounding errors. Boxes end at the border of the raster.
         reach = ranges[:, None] + 2.0 * raster.cell_size
         first_rows, first_columns = raster.find_cells(positions - reach)
         last_rows, last_columns = raster.find_cells(positions + reach)

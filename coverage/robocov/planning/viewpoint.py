@@ -95,8 +95,7 @@ def _compute_patch_costs(map_window: MapWindow, cell_distances: FloatArray) -> F
 
 def _get_path_lengths(map_window: MapWindow, path_lengths: FloatArray, candidates: _Candidates) -> FloatArray:
     """Return the path length to each candidate, (b, 4), from the lengths to all nodes, (m,), in meters."""
-    window = map_window.window
-    nodes = candidates.rows // window.stride * window.columns + candidates.columns // window.stride
+    nodes = map_window.window.find_nodes(candidates.rows, candidates.columns)
     # A cell beyond the window is not free: its node does not matter, but must exist.
     return np.asarray(path_lengths[np.clip(nodes, 0, len(path_lengths) - 1)])
 

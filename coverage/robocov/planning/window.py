@@ -123,6 +123,29 @@ class Window(NamedTuple):
         row, column = self.compute_node_cells().T
         return raster.compute_centers(row + self.first_row, column + self.first_column)
 
+    def find_nodes(self, rows: IntArray, columns: IntArray) -> IntArray:
+        """Find the node that represents each of the given cells: the one in the middle of the cell's block.
+
+        Parameters
+        ----------
+        rows, columns : (...) int arrays
+            Rows and columns of the cells in the window.
+
+        Returns
+        -------
+        (...) int array
+            Indices of the nodes.
+
+        Examples
+        --------
+        >>> window = Window(first_row=0, first_column=0, rows=2, columns=3, stride=5)
+        >>> window.find_nodes(np.array([4, 5]), np.array([10, 10]))
+        array([2, 5])
+        """
+        block_rows = rows // self.stride
+        block_columns = columns // self.stride
+        return np.asarray(block_rows * self.columns + block_columns)
+
     def compute_node_cells(self) -> IntArray:
         """Compute the row and column, within the window, of the cell in which each node lies.
 

@@ -103,10 +103,10 @@ class FrontierMedian(SharedMapController):
         window = map_window.window
         labels = self._label_frontiers(situation)
         rows, columns = np.nonzero(labels)
-        # Choose one target for each pair of a frontier and a block of cells that a node represents. Each pair
+        # Choose one target for each pair of a frontier and a node that represents some of its cells. A pair
         # is one number, so that the cells can be grouped by pair.
-        blocks = rows // window.stride * window.columns + columns // window.stride
-        pairs = labels[rows, columns] * len(map_window.nodes) + blocks
+        nodes = window.find_nodes(rows, columns)
+        pairs = labels[rows, columns] * len(map_window.nodes) + nodes
         _, first = np.unique(pairs, return_index=True)
         targets = raster.compute_centers(rows[first] + window.first_row, columns[first] + window.first_column)
         squared_distances = ((targets[:, None] - inspected) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
