@@ -74,14 +74,15 @@ class Adaptive(BaseController):
     -----
     *Basis functions.* The estimate of robot i is K(q)·a_i. The components of K are Gaussians, centered on a
     grid of `basis` by `basis` points and divided by their sum, so that a constant density is represented
-    exactly. At its position p_i, in its cell V_i with the centroid C_i, robot i learns by
+    exactly. Robot i measures φ at its position p_i, in its cell V_i with the centroid C_i, and learns by
 
         dΛ_i/dt = w K K^T,  dλ_i/dt = w K φ
         da_i/dt = γ (λ_i - Λ_i a_i) + k P_i (C_i - p_i) + ζ Σ_j (a_j - a_i) / deg_i,    a_i >= `min_density`
 
-    The first term of da_i/dt fits the robot's measurements. The second one, with P_i = ∫ K (q - p_i)^T dq
-    over V_i, makes the paper's Lyapunov function decrease. The third one is the consensus with the neighbors;
-    a_j are the newest parameters that robot i has received from robot j.
+    where w is the weight of a measurement. The first term of da_i/dt fits the robot's measurements. The
+    second one, with P_i = ∫ K (q - p_i)^T dq over V_i, makes the paper's Lyapunov function decrease. The
+    third one is the consensus with the deg_i neighbors j from which robot i has received parameters; a_j are
+    the newest of these.
 
     *Gaussian process.* One measurement is stored for each of 20 by 20 squares, as if taken at its center. The
     kernel is the squared exponential with the length `correlation`, as in Luo and Sycara (ICRA 2018) and

@@ -26,7 +26,8 @@ _ROUNDING_M = 1e-3
 _MIN_DISTANCE_M = 1e-9
 """Minimum divisor; prevents division by zero."""
 _MIN_PASSING_CLEARANCE_M = 1e-3
-"""Margin added to the safe gap in the minimum distance to a robot that moves past sideways."""
+"""Length added to the safe gap, which may be 0, to obtain the minimum divisor d in the limit v²/d of robots
+that move past each other."""
 _MIN_NORM = 1e-300
 """Minimum divisor; prevents division by zero."""
 
@@ -196,9 +197,9 @@ class Barrier(BaseController):
         speed_away = (normal * relative_velocities).sum(axis=1)
         squared_speed = (relative_velocities * relative_velocities).sum(axis=1)
         squared_sideways_speed = np.maximum(squared_speed - speed_away**2, 0.0)
-        min_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
+        min_passing_distance = self.safe_gap + _MIN_PASSING_CLEARANCE_M
         limit = self._compute_approach_limit(gap, speed_away, total_alpha)
-        limit += squared_sideways_speed / np.maximum(distance, min_distance)
+        limit += squared_sideways_speed / np.maximum(distance, min_passing_distance)
         limit *= alpha[robot] / total_alpha
         return HalfPlanes(
             normals=arrange_in_rows(robot, n, -normal, np.nan),

@@ -22,7 +22,7 @@ Messages arrive in the next step at the earliest. The conditions delay, lose and
 `robocov.conditions.communication`. The docstring of a controller describes its messages and their sizes."""
 
 TIME_TOLERANCE_S = 1e-9
-"""Margin of comparisons of times: a sum of time steps may be a little less than a multiple of them."""
+"""Tolerance for comparing times: a sum of time steps may be slightly less than their exact multiple."""
 
 
 def is_plan_due(plan_time: float, period: float, time: float) -> bool:
@@ -165,7 +165,7 @@ def get_information(controller: Any) -> Information:
 
 
 def inform_controller(controller: Controller, environment: Environment) -> Controller:
-    """Return a controller that knows the map if it uses the whole map, or else the same controller.
+    """Inform a controller of the map if it has a method ``inform``; return any other controller unchanged.
 
     Parameters
     ----------
@@ -179,8 +179,8 @@ def inform_controller(controller: Controller, environment: Environment) -> Contr
     Raises
     ------
     ParameterError
-        If the controller has a method ``inform`` without the information "whole map", or if that method
-        does not return a controller.
+        If its attribute ``information`` is not one of `Information`, or not "whole map" although there is a
+        method ``inform``; or if that method does not return a controller.
     """
     information = get_information(controller)
     inform = getattr(controller, "inform", None)
@@ -209,7 +209,7 @@ class Memory:
     returns: FloatArray | None = None
     """(n, rays, 2) m, obstacle points in the last scan of each robot; nan for none."""
     triangulation: Mesh | None = None
-    """Triangulation from which the next cells are computed."""
+    """Triangulation of the last cells. It only saves time when the next cells are computed."""
 
 
 class BaseController:

@@ -227,7 +227,8 @@ class Boosting(BaseController):
 
     - ``phi``: the weight κ Φ_i^γ w, larger for points that no other robot detects
     - ``p``: the weight κ (1 - Π (1 - p))^-γ w, larger for points that the whole team barely detects
-    - ``neighbors``: the weight w; in addition, each neighbor in range repels with κ / d^γ
+    - ``neighbors``: the weight w; in addition, each neighbor at a distance d of at most twice the largest
+      sensing range repels with κ / d^γ
 
     A robot follows it until it comes to rest, or for at most `patience`. A robot that has returned on its
     trail is not boosted again, so the result is no worse than without boosts, apart from changes by

@@ -47,16 +47,16 @@ class ConvexChart:
     samples : (k, 2) array, m
         Images of sample points of the free space.
     mass : (k,) array, m²
-        Mass of each sample in the map.
+        Mass of each sample in the map: the free area that it represents, times the density.
 
     Notes
     -----
     F is a discrete harmonic map of a mesh of the whole region, obstacles included. Vertices on the boundary
     are fixed; each other vertex is the weighted mean of its neighbors, with Floater's mean value weights
     (2003), multiplied by `shrink` in obstacles. With positive weights and a convex boundary F is one-to-one
-    (Tutte 1963, Floater 1997), for any `shrink`. An obstacle connected with the boundary shrinks to where it
-    is connected, and a wall between two rooms becomes a slit. Without obstacles, or for a `shrink` of 1, F
-    is the identity.
+    (Tutte 1963, Floater 1997), for any `shrink`. An obstacle that touches the boundary shrinks toward the
+    place where it does so, and a wall between two rooms becomes a slit. Without obstacles, or for a `shrink`
+    of 1, F is the identity.
     """
 
     def __init__(self, environment: Environment, clearance: float, lattice: int, shrink: float) -> None:
@@ -97,6 +97,7 @@ class ConvexChart:
         -------
         images : (n, 2) array, m
         jacobians : (n, 2, 2) array
+            Derivatives DF at these points.
         """
         return self._to_chart.evaluate(find_nearest_inside(self.configuration_space, positions))
 
@@ -219,9 +220,10 @@ def _build_mesh(region: Region, configuration_space: shapely.Geometry, lattice: 
         starts = np.concatenate(halved_starts)
         ends = np.concatenate(halved_ends)
     is_fixed = ~region.contains(points, -2.0 * _ROUNDING_M)
-    # Triangles on the boundary alone have no area, except for rounding.
-    is_flat = is_fixed[triangles].all(axis=1)
-    return _Mesh(points=points, triangles=triangles[~is_flat], is_fixed=is_fixed)
+    # Triangles whose vertices are all on the boundary are left out. Those along a side have no area, except
+    # for rounding. Those that fill a corner of the region have a small area, which is neglected.
+    is_on_boundary = is_fixed[triangles].all(axis=1)
+    return _Mesh(points=points, triangles=triangles[~is_on_boundary], is_fixed=is_fixed)
 
 
 def _build_inner_points(region: Region, walls: shapely.Geometry, spacing: float) -> FloatArray:

@@ -211,8 +211,8 @@ class MeasurementExchange:
         allowance = int(self.allowances[robot])
         if seen.send_limits is None:
             return allowance
-        # A robot without credits has a send limit of 1 byte. It still sends one measurement, which waits in
-        # its queue.
+        # The send limit of a robot that has used up its data rate is too low for a measurement. The robot
+        # still sends one, which waits in its queue.
         fitting = int((seen.send_limits[robot] - HEADER_BYTES) // MEASUREMENT_BYTES)
         return min(allowance, max(1, fitting))
 
@@ -239,7 +239,7 @@ def measure_own_density(seen: Observations) -> FloatArray:
 def add_received_measurements(seen: Observations, measurements: FloatArray) -> FloatArray:
     """Add the measurements that arrive in a step to those that the robots know.
 
-    In a square in which a robot already knows a measurement, it keeps this one. Messages with other contents
+    In a square in which a robot already knows a measurement, it keeps that one. Messages with other contents
     are ignored.
 
     Parameters

@@ -110,7 +110,8 @@ class Diffeomorphism(WholeMapController):
         velocities = compute_approach_velocities(offsets, self.k_prop, team.max_speed)
         # Each robot avoids one obstacle point, the nearest one in view.
         obstacle_points = seen.obstacle_points[:, None]
-        # Braking starts only at half the clearance, because paths in the chart already keep all of it.
+        # Paths in the chart keep the whole clearance. With half of it as the margin, the avoidance of
+        # collisions does not stop a robot on such a path.
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)

@@ -121,8 +121,9 @@ def compute_drive_forces(
     -------
     (n, 2) array, N
     """
-    change = (velocities - seen.velocities) * (team.mass / response_time)[:, None]
-    return np.asarray(change + seen.velocities * team.viscosity[:, None])
+    accelerating_forces = (velocities - seen.velocities) * (team.mass / response_time)[:, None]
+    # The second term compensates the viscosity.
+    return np.asarray(accelerating_forces + seen.velocities * team.viscosity[:, None])
 
 
 def update_returns(seen: Observations, previous: FloatArray | None) -> FloatArray | None:
@@ -278,6 +279,7 @@ def find_nearest_allowed_points(
     Returns
     -------
     nearest : (n, 2) array
+        A point that is not allowed if `is_feasible` is false.
     is_feasible : (n,) bool array
         Whether there is any allowed point.
 
@@ -340,7 +342,8 @@ def _find_allowed_interval(
         # Half plane k excludes the whole disc.
         low = math.inf
     for j in range(k):
-        # Half plane j allows the points with slope * t <= max_rise.
+        # Half plane j allows the points with slope * t <= max_rise. If it is nan, all comparisons are false,
+        # and it allows all points.
         slope = normals[j, 1] * nx - normals[j, 0] * ny
         max_rise = offsets[j] - offset * (normals[j, 0] * nx + normals[j, 1] * ny)
         if slope >= _MIN_SLOPE:

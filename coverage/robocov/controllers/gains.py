@@ -349,8 +349,8 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     Raises
     ------
     ParameterError
-        If a gain is unknown, with the most similar name; if a value is not allowed; or if the constructor of
-        a user's class raises an error.
+        If a gain is unknown (the message suggests the most similar name), if a value is not allowed, or if
+        the constructor of a user's class raises an error.
     """
     gains = get_gains(kind)
     controller_name = getattr(kind, "name", kind.__name__)

@@ -260,7 +260,7 @@ class GeodesicPlanner:
 
 
 def _select_sites(result: CoverageResult, sites: IntArray, owners: IntArray) -> _CellSites:
-    """Return the sites with the given indices, (s,), of which each is in the cell of a robot, (s,)."""
+    """Return the sites with the given indices, (s,), in the cells of the given owners, (s,)."""
     return _CellSites(
         owners=owners,
         first_waypoints=result.first_waypoints[sites],

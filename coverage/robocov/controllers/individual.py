@@ -162,7 +162,7 @@ class IndividualMemories:
     by_robot: Sequence[Any]
     """Memory of each robot."""
     triangulation: Mesh | None = None
-    """Triangulation from which the next cells are computed."""
+    """Triangulation of the last cells. It only saves time when the next cells are computed."""
 
 
 class IndividualControllerAdapter:
@@ -328,7 +328,7 @@ def to_team_controller(controller: Any) -> Any:
 
 
 def require_controller(value: Any) -> Controller:
-    """Return a controller of a team, or raise an error unless a value is a controller.
+    """Return a controller as one of a team; raise ParameterError for any other value.
 
     Parameters
     ----------

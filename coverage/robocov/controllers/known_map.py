@@ -12,7 +12,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 
 _QUARTER_CIRCLE_EDGES = 2
-"""Edges of quarter circles around corners of walls, which reduce the clearance by at most 8% there."""
+"""Number of edges of a quarter circle around a corner of a wall. They reduce the clearance by at most 8%."""
 _SIMPLIFICATION_M = 0.005
 """Tolerance of the simplified boundary: each corner takes computing time."""
 

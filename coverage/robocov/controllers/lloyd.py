@@ -21,9 +21,9 @@ from robocov.voronoi import build_disc_limited_polygons, compute_disc_limited_mo
 class Lloyd(BaseController):
     """Lloyd's algorithm (Cortés et al. 2004; LA in section III-B of the paper).
 
-    Each robot moves to the centroid of its Voronoi cell at full speed, and slows down over the last meters
-    such that its deceleration stays within its limits. The drive tracks this velocity and compensates the
-    viscosity. Obstacles are ignored: robots slide along them.
+    Each robot moves to the centroid of its Voronoi cell at full speed, and slows down when it gets close. By
+    default, its deceleration is then at most the maximum acceleration. The drive tracks this velocity and
+    compensates the viscosity. Obstacles are ignored: robots slide along them.
 
     A `target` other than the centroid is the optimum of the cell for another performance function f of the
     locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside

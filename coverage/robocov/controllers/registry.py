@@ -165,7 +165,8 @@ def load_controller_class(name: str, *, source: ControllerSource | None = None) 
     Raises
     ------
     ParameterError
-        If there is no such controller, with the most similar name; or if its code cannot be run.
+        If there is no such controller (the message suggests the most similar name), or if its code cannot be
+        run.
 
     Examples
     --------
@@ -248,7 +249,8 @@ def make_controller(
     Raises
     ------
     ParameterError
-        If there is no such controller or gain, with the most similar name, or a value is out of range.
+        If there is no such controller or gain (the message suggests the most similar name), or if a value is
+        out of range.
 
     See Also
     --------

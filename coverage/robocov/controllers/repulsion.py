@@ -338,10 +338,10 @@ class Poduri(BaseController):
     At d = η R_c the two are equal: k_degree = k_cover (1/η - 1)².
 
     We did not have the full text of the paper; details may differ. The following choices are our own. If at
-    most K robots are within η R_c of a robot, the links to its K nearest neighbors are critical for it,
-    before they are in danger. Robots know only positions of others: each also keeps a link that is critical
-    for the neighbor, according to the positions that it knows. The closest obstacle point repels with (24),
-    within `rho_obs`.
+    most K robots are within η R_c of a robot, the links to its K nearest neighbors are critical for it, even
+    if they are not about to break. Robots know only positions of others: each also keeps a link that is
+    critical for the neighbor, according to the positions that it knows. The closest obstacle point repels
+    with (24), within `rho_obs`.
 
     Links are never lost if robots can exert these forces: two robots that move apart at full speed have to be
     able to stop within (1 - η) R_c.

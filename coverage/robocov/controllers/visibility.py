@@ -64,9 +64,10 @@ class Visibility(BaseController):
         u_i = k ( ∫ φ n ds over the free arcs of W_i + sum over the occlusion edges of ∫ φ (s - ρ)/ρ ds t )
 
     A free arc is a piece of the circle of radius R_i on the border of W_i, and n is its outward normal. An
-    occlusion edge is a free edge of the view that begins at a reflex corner of an obstacle, at the distance
-    ρ; s is the distance along the edge, and t is normal to it, away from the obstacle (see
-    `OcclusionEdges`). Walls do not move, and the gradients of two cells along their common border cancel.
+    occlusion edge is a free edge of the view that begins at a reflex corner of an obstacle, at the distance ρ
+    from the robot; s is the distance of a point of the edge from the robot, and t is normal to the edge, away
+    from the obstacle (see `OcclusionEdges`). Walls do not move, and the gradients of two cells along their
+    common border cancel.
 
     Arcs and occlusion edges are found in the robot's own scan; between scans, robots keep their velocities.
     The cell of a robot without neighbors in communication range is its whole view.

@@ -59,7 +59,8 @@ _OWN_NODES = 2500
 _MAX_IDLE_MOVE = 0.1
 """Distance that a robot may move without a new plan, as a fraction of the spacing of nodes."""
 _CHANGED_WALL_RADII = 4.0
-"""Length of changed walls, in radii, that matters: longer than the visible side of a failed robot."""
+"""Minimum length of changed walls that matters, in radii of the robot. The visible side of a failed robot,
+which looks like a new wall, is shorter."""
 _ARRIVAL_RADIUS_M = 0.35
 """Distance from a goal or a viewpoint at which a robot has arrived."""
 _LISTENING_S = 2.0
@@ -73,7 +74,7 @@ _SWAP_SAVING = 0.1
 _JOINT_PLANNING_CROSSINGS = 3.0
 """Time that a robot spends planning for others, in multiples of the time it needs to cross the region."""
 _STAGGERING = 0.5
-"""Fraction of the period in which all robots make their first plans."""
+"""Fraction of the period over which the first plans of the robots are spread."""
 _MAX_DOUBLINGS = 60.0
 """Limit of exponents of 2: larger powers make no difference."""
 
@@ -399,14 +400,16 @@ class Atlas(BaseController):
         diameter = seen.region.diameter
         joint_planning_time = _JOINT_PLANNING_CROSSINGS * diameter / max_speed
         is_joint = is_agreed or seen.time - path.start_time <= joint_planning_time
-        group_size = 1 + len(others.robots)
+        team_size = 1 + len(others.robots)
+        group_size = min(team_size, MAX_PLANNING_GROUP)
         is_fixed = others.is_fixed
         if is_agreed:
+            # All robots make the same plan for the whole team, in which each robot may get a new goal.
+            group_size = team_size
             is_fixed = np.zeros_like(is_fixed)
-        else:
-            group_size = min(group_size, MAX_PLANNING_GROUP)
-            if not is_joint:
-                is_fixed = np.ones_like(is_fixed)
+        elif not is_joint:
+            # The robot plans for itself alone: all others keep their positions.
+            is_fixed = np.ones_like(is_fixed)
         doublings = min(path.length / (self.settling * diameter), _MAX_DOUBLINGS)
         return Cooperation(
             is_agreed=is_agreed,

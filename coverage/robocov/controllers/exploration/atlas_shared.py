@@ -92,8 +92,8 @@ class AtlasShared(Atlas):
         return replace(planned, reports=tuple(reports))
 
     def _list_reports(self, seen: Observations, memory: AtlasMemory, robot: int) -> list[TeammateReport]:
-        hears_all = len(seen.neighbors.list_neighbors(robot)) == len(memory.states) - 1
-        if hears_all:
+        is_in_range_of_all = len(seen.neighbors.list_neighbors(robot)) == len(memory.states) - 1
+        if is_in_range_of_all:
             return []
         return [report for _, report in sorted(memory.reports[robot].items())]
 

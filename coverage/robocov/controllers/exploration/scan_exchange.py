@@ -328,8 +328,10 @@ def _prepare_messages(
     repair_times = state.repair_times
     if repairs:
         min_time = seen.time - _MAX_REPAIR_MEMORY_S
-        repair_times = {key: time for key, time in repair_times.items() if time >= min_time}
-        repair_times.update(dict.fromkeys(((scan.robot, scan.round_number) for scan in repairs), seen.time))
+        remembered_times = {key: time for key, time in repair_times.items() if time >= min_time}
+        for scan in repairs:
+            remembered_times[scan.robot, scan.round_number] = seen.time
+        repair_times = remembered_times
     others = [message for message in state.outgoing if not isinstance(message.payload, NumberedScan | Digest)]
     outgoing = [*others, Message(own_scan, own_scan.size), Message(digest, digest.size)]
     outgoing += [Message(scan, scan.size) for scan in repairs]

@@ -84,7 +84,7 @@ def update_knowledge(
     )
     if reports:
         teammates = teammates.add_reports(reports, robot, loss_times)
-    encountered = (knowledge.encountered - {*failed_robots}) | {*teammates.robots.tolist()}
+    encountered = (knowledge.encountered - set(failed_robots)) | set(teammates.robots.tolist())
     return TeamKnowledge(teammates=teammates, encountered=encountered, loss_times=loss_times)
 
 

@@ -87,7 +87,7 @@ def choose_exemplars(placement_map: PlacementMap, robot_counts: IntArray) -> Int
 
 @lru_cache(maxsize=256)
 def _choose_cached_exemplars(placement_map: PlacementMap, robot_counts: tuple[int, ...]) -> IntArray:
-    """Return the result of `choose_exemplars`. Several robots and plans need the same exemplars."""
+    """Return the cached result of `choose_exemplars`: several robots and plans need the same exemplars."""
     chosen = choose_exemplars(placement_map, np.array(robot_counts, dtype=np.intp))
     chosen.setflags(write=False)
     return chosen

@@ -93,7 +93,7 @@ def move_in_turn(placement_map: PlacementMap, sources: IntArray, threshold: floa
 
 @lru_cache(maxsize=256)
 def _run_cached_search(placement_map: PlacementMap, sources: tuple[int, ...], threshold: float) -> IntArray:
-    """Return the result of `move_in_turn`. Several robots and plans start from the same sources."""
+    """Return the cached result of `move_in_turn`: several robots and plans start from the same sources."""
     chosen = move_in_turn(placement_map, np.array(sources, dtype=np.intp), threshold)
     chosen.setflags(write=False)
     return chosen

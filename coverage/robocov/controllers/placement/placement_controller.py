@@ -29,7 +29,8 @@ _MAX_LATTICE = 512
 _MISSING_PATH_FACTOR = 2.0
 """Length that stands for a missing path, as a multiple of the longest path on the map."""
 _POSITION_DECIMALS = 6
-"""Decimals of known positions, m. Rounding lets robots have exactly the same knowledge."""
+"""Number of decimals to which known positions, in m, are rounded. Robots that know the same positions then
+make the same plan, in spite of rounding errors."""
 
 
 class PlacementMap:
