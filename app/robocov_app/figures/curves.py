@@ -31,7 +31,9 @@ WEIGHTED_DISTANCE = "mean distance to the nearest robot, weighted by φ (m)"
 DISTANCE_AXIS = ValueAxis(DISTANCE, "m")
 
 _MIN_EXPONENT_VALUE = 1e7
+"""From this value on, final values may have an exponent."""
 _MIN_THOUSANDS_VALUE = 1e4
+"""From this value on, final values have thousands separators instead of decimals."""
 _MIN_SHORT_VALUE = 10.0
 """From this value on, units other than meters have four significant digits instead of three decimals."""
 MAX_FILLED_BANDS = 2
@@ -258,8 +260,7 @@ def draw_styled_curves(
     """Draw curves, each with its mark, name and final value next to its end.
 
     Solid curves are below dashed ones, so that equal curves can be seen. At most `MAX_FILLED_BANDS` bands are
-    filled; more are drawn as bars at different times. Curves without a finite value are
-    left out.
+    filled; more are drawn as bars at different times. Curves without a finite value are left out.
 
     Parameters
     ----------

@@ -190,8 +190,8 @@ def draw_row_points(axes: Axes, values: FloatArray, row: float, style: CurveStyl
 def _compute_scatter_offsets(count: int) -> FloatArray:
     """Return vertical offsets of points, (count,), from the van der Corput sequence.
 
-    Neighbors in the sequence differ widely.
     Element k of the sequence is the number whose binary fraction has the digits of k in reverse order.
+    Successive elements differ widely.
     """
     bits = np.arange(1, MAX_POINTS.bit_length() + 1)
     digits = np.arange(1, count + 1)[:, None] >> (bits - 1) & 1

@@ -155,20 +155,20 @@ def _draw_moving_obstacle(
 
 
 def compute_points_per_meter(axes: Axes) -> float:
-    """Return the number of points of the page in a meter of the map."""
+    """Return the length on the page of a meter of the map, in points (1/72 inch)."""
     ends = to_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     return abs(float(ends[1, 0] - ends[0, 0]))
 
 
 def to_points(axes: Axes, positions: FloatArray) -> FloatArray:
-    """Convert positions, (n, 2) m, to points of the page."""
+    """Convert positions, (n, 2) m, to coordinates on the page in points (1/72 inch)."""
     # The transformation is only valid once the aspect has been applied.
     axes.apply_aspect()
     return np.asarray(axes.transData.transform(positions)) * (POINTS_PER_INCH / get_figure(axes).dpi)
 
 
 def to_meters(axes: Axes, points: FloatArray) -> FloatArray:
-    """Convert points of the page, (n, 2), to positions, m."""
+    """Convert coordinates on the page in points, (n, 2), to positions, m."""
     axes.apply_aspect()
     pixels = points * (get_figure(axes).dpi / POINTS_PER_INCH)
     return np.asarray(axes.transData.inverted().transform(pixels))

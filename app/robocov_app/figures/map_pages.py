@@ -103,6 +103,11 @@ def plot_trajectories(
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        If `colors` is neither of these.
     """
     if colors not in ("paper", "robots"):
         raise ParameterError(f"colors: expected 'paper' or 'robots', got {quote(colors)}")

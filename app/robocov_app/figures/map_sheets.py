@@ -25,7 +25,7 @@ MAX_MAPS = 60
 """Maximum number of maps on a sheet; more would be too small to recognize."""
 _MAX_PAGE_HEIGHT_PX = 1600
 _MAPS_AREA_PX = (1600, 1200)
-"""Width and height of the area that the maps of a sheet should about fill."""
+"""Width and height of the area that the maps of a sheet should approximately fill."""
 # Rows of text at scale 1, px.
 _CAPTION_HEIGHT_PX = 26
 _NAME_ROW_PX = 12

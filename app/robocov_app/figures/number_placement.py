@@ -11,11 +11,11 @@ from robocov.typing import BoolArray, FloatArray, IntArray
 _DIRECTIONS = 16
 """Number of directions from a mark in which its number may be written."""
 _RINGS = (1.0, 1.7, 2.5)
-"""Distances of a number from the edge of its mark, as multiples of the least distance."""
+"""Distances of a number from the edge of its mark, as multiples of `_MIN_DISTANCE`."""
 _MIN_DISTANCE = 0.6
 """Minimum distance of the center of a number from the edge of its mark, in text sizes."""
 _CLEARANCE = 0.6
-"""Distance from the center of a number to lines at which they do not touch it, in text sizes."""
+"""Minimum distance of the center of a number from marks, lines and other numbers, in text sizes."""
 _MAX_REACH = _MIN_DISTANCE * max(_RINGS) + 2.0 * _CLEARANCE
 """Distance from the edge of a mark, in text sizes, beyond which nothing can touch its number."""
 
@@ -35,7 +35,7 @@ class Discs:
 
 
 def select_discs(discs: Discs, rows: IntArray) -> Discs:
-    """Return some of several discs."""
+    """Return the discs in the given rows."""
     return Discs(discs.centers[rows], discs.radii[rows])
 
 

@@ -59,7 +59,7 @@ _HALF_TICK_PX = 4
 """Half the height of the ticks at the ends of the scale bar."""
 _SCALE_BAR_LABEL_GAP_PX = 8
 _MIN_SCALE_BAR_PX = 20.0
-"""Minimum length of the longest scale bar, regardless of the scale."""
+"""Minimum of the maximum length of the scale bar, which does not depend on the scale of the page."""
 
 
 def to_plot_color(color: Color) -> PlotColor:

@@ -60,7 +60,7 @@ _MIN_NUMBERED_START_PT = 4.6
 """Starts have no numbers if their rings are smaller, because the numbers would be too close to each other."""
 _GOAL_PT = 8.0
 _HALO_PT = 2.6
-"""Width of the lines of a cross or star with its light edge."""
+"""Width of the lines of a cross or star, including its light edge."""
 _GOAL_DIAMETERS = 0.6
 """Size of the mark of a goal, in diameters of a large robot."""
 MIN_GOAL_DISTANCE = 0.03
@@ -74,7 +74,7 @@ _ASTERISK = 2
 _MAX_TRAJECTORY_FACTOR = 1.6
 """Maximum factor for the width of the trajectories of large robots."""
 _MIN_MARK_PT = 3.2
-"""Sizes of starts and goals: of each if there is enough space, and of both in the densest crowd."""
+"""Size of the marks of starts and goals in the densest crowd."""
 _LARGE_ROBOT_PT = 12.8
 """Diameter of robots above which trajectories become wider."""
 _CELL_EDGE_WIDTH_PT = 0.8
@@ -274,7 +274,7 @@ def _draw_trajectories(axes: Axes, record: Record, colors: Sequence[Color]) -> N
 def _draw_starts(axes: Axes, record: Record, present: IntArray, colors: Sequence[Color]) -> Discs:
     """Draw a ring at the first position of each present robot: its start, or where it joined later.
 
-    `colors` are those of all robots. Returned are the rings, in points.
+    `colors` are those of all robots. The returned discs are the rings, in points.
     """
     first_rows = np.argmax(record.is_present, axis=0)[present]
     starts = record.positions[first_rows, present]
@@ -316,7 +316,7 @@ def _draw_headings(axes: Axes, record: Record, steering: FloatArray, radii: Floa
 def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, theme: Theme) -> Discs:
     """Draw the goals of working robots, or the centroids of their cells if all goals are centroids.
 
-    Robots that are at their goals, or nearly there, have no cross. Returned are the marks, in points.
+    Robots that are at their goals, or nearly there, have no cross. The returned discs are the marks, points.
     """
     working = np.flatnonzero(record.is_working[-1])
     goals = record.goals[-1][working]

@@ -13,7 +13,6 @@ from robocov.controllers.gains import format_value
 from robocov.typing import FloatArray
 from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_time, group_by
 from robocov_app.replication.assets import ASSETS
-from robocov_app.replication.claims.explanations import compute_positive_fraction
 from robocov_app.replication.design.contenders import OWN, Contender
 from robocov_app.replication.design.studies import AXES, STRONG_INDEX
 from robocov_app.replication.formatting import NO_VALUE, capitalize, format_amount
@@ -112,7 +111,7 @@ class ControllerEvidence:
 
 @cache
 def load_profile(controller: str) -> ControllerProfile:
-    """Return the profile of a controller. A controller without an entry in the file gets its summary."""
+    """Return the profile of a controller from ``controllers.toml``, or without an entry, its summary."""
     controller_class = load_controller_class(controller)
     profiles = tomllib.loads((ASSETS / "controllers.toml").read_text(encoding="utf-8"))
     entry = profiles.get(controller, {})
@@ -164,7 +163,7 @@ def summarize_contenders(
                 runs=len(gaps),
                 gap=bootstrap(gaps, clusters=known.maps),
                 quartiles=(low, high),
-                contact_fraction=compute_positive_fraction(known.get_values(contender.key, "contacts")),
+                contact_fraction=_compute_positive_fraction(known.get_values(contender.key, "contacts")),
                 blocked_fraction=_compute_mean(known.get_values(contender.key, "blocked")),
                 rest_fraction=len(rest_times) / len(settled),
                 rest_time=estimate_median_time(rest_times, censored),
@@ -172,6 +171,12 @@ def summarize_contenders(
             )
         )
     return summaries
+
+
+def _compute_positive_fraction(counts: FloatArray) -> float:
+    """Return the fraction of positive values among the finite counts, (m,); nan without finite counts."""
+    finite = counts[np.isfinite(counts)]
+    return float((finite > 0).mean()) if len(finite) else float("nan")
 
 
 def _compute_mean(values: FloatArray) -> float:

@@ -24,7 +24,7 @@ def embed_hues(record: Record, positions: FloatArray, is_working: BoolArray) -> 
     record : Record
     positions : (T, n, 2) array, m
         Positions of the robots in the embedded frames.
-    working : (T, n) bool array
+    is_working : (T, n) bool array
         Which robots work in these frames; only working robots have cells.
 
     Returns

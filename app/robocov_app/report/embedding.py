@@ -165,7 +165,7 @@ def _embed_moving_obstacles(environment: Environment, unit: float) -> list[dict[
         if path.repeat == "loop":
             return_points = path.points[:1]
         else:
-            return_points = path.points[-2::-1]  # back from the last point but one to the first
+            return_points = path.points[-2::-1]  # back from the second to last point to the first
         content = {
             "rings": _round_rings(extract_rings(obstacle.polygon), unit),
             "line": _round_points([*path.points, *return_points], unit),

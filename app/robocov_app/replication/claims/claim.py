@@ -23,7 +23,7 @@ VERDICTS: dict[Verdict, tuple[str, str]] = {
 """Predicates of each verdict, for one claim and for several."""
 
 LIMITED = 7
-"""Number of the question about limited ranges, the last one on the paper's claims, which begin with 1."""
+"""Number of the question about limited ranges. Questions 1 to 7 are on the paper's claims."""
 GOALS = 8
 RIVALS = 9
 EXTENSIONS = 10
@@ -125,10 +125,12 @@ class Claim:
     runs, maps : int
         Number of simulated runs that the criteria are based on, and of different maps among them.
     explanation : str
+        Sentences that explain the verdict.
     min_maps : int
         Minimum number of maps for a verdict other than "undecided".
     adjusted_p_value : float or None
-        The p-value adjusted by Holm for all claims that are tested together; None for a claim alone.
+        The p-value adjusted by Holm for all claims that are tested together; None if the claim is
+        tested alone.
     family_size : int
         Number of claims that are tested together.
     """
@@ -207,7 +209,7 @@ class Claim:
         return "undecided"
 
     def _is_significant(self, p_value: float) -> bool:
-        """Return whether the p-value of a criterion is significant; always for a claim alone."""
+        """Return whether the p-value of a criterion is significant; True if the claim is tested alone."""
         return self.family_size == 1 or self.family_size * p_value <= ALPHA
 
     def to_json(self) -> dict[str, Any]:
@@ -235,7 +237,7 @@ class Claim:
 def adjust_claims(claims: Sequence[Claim]) -> list[Claim]:
     """Adjust the p-values of claims that are tested together by Holm's method.
 
-    Claims without criteria count, too: their p-value is 1.
+    Claims without criteria are included: their p-value is 1.
     """
     adjusted = adjust_p_values({claim.key: claim.p_value for claim in claims})
     return [replace(claim, adjusted_p_value=adjusted[claim.key], family_size=len(claims)) for claim in claims]

@@ -41,9 +41,3 @@ def _list_ratios(pairs: PairedComparison, kinds: Sequence[str]) -> str:
     kind_array = np.array(kinds)
     medians = [(kind, pairs.ratios[kind_array == kind]) for kind in dict.fromkeys(kinds)]
     return ", ".join(f"{kind} {format_median(ratios)}" for kind, ratios in medians)
-
-
-def compute_positive_fraction(counts: FloatArray) -> float:
-    """Return the fraction of positive values among the finite counts, (m,); nan without finite counts."""
-    finite = counts[np.isfinite(counts)]
-    return float((finite > 0).mean()) if len(finite) else float("nan")

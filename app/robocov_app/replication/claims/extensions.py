@@ -37,6 +37,7 @@ def judge_targets(outcomes: Outcomes) -> Claim:
         wins.append(f"{comparison.first} lower in {fraction} of the runs")
     explanation = f"{capitalize('; '.join(wins))}."
     runs = sum(2 * len(comparison.outcomes.instances) for comparison in pairs)
+    # The comparisons may have different numbers of runs, so the number is replaced by their sum.
     judged = claim.judge(criteria, explanation, pairs[-1].outcomes, runs_per_instance=1)
     return replace(judged, runs=runs)
 

@@ -105,7 +105,7 @@ def judge_gains_every(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
 
 
 def compute_ratios_by_set(rapf: GainOutcomes, rpf: GainOutcomes) -> FloatArray:
-    """Return the ratio of RAPF's cost to RPF's with the same potential, (g, m), for each set of RAPF."""
+    """Return RAPF's cost divided by RPF's with the same potential, for each set of RAPF's gains, (g, m)."""
     rows = {(gains["k_rep"], gains["rho_0"]): row for row, gains in enumerate(rpf.gains)}
     matching_rows = [rows[gains["k_rep"], gains["rho_0"]] for gains in rapf.gains]
     return np.asarray(rapf.relative_costs / rpf.relative_costs[matching_rows])
@@ -125,6 +125,7 @@ def build_variation_criteria(
     maps : sequence of str
         Map of each value.
     bound : float
+        Upper bound for RAPF, and lower bound for RPF.
     """
     return (
         Criterion(f"RAPF: {measure}", bootstrap(rapf, clusters=maps), high=bound, unit="%"),

@@ -202,10 +202,10 @@ def judge_gap(
 
 def _explain_gaps(outcomes: Outcomes, gaps: FloatArray) -> str:
     """Return sentences on the distribution of gaps, (m,), one for each instance."""
-    better_than_reference = ""
+    beaten = ""
     if (gaps < 0).any():
         fraction = format_amount((gaps < 0).mean(), "%")
-        better_than_reference = f", and was beaten in {fraction} of the runs"
+        beaten = f", and was beaten in {fraction} of the runs"
     kinds = np.array([get_map_kind(name) for name in outcomes.maps])
     medians = [f"{kind} {format_median(gaps[kinds == kind], '%')}" for kind in dict.fromkeys(kinds.tolist())]
     worst = int(np.argmax(gaps))
@@ -213,5 +213,5 @@ def _explain_gaps(outcomes: Outcomes, gaps: FloatArray) -> str:
         f"{describe_middle_half(gaps).removesuffix('.')}; the worst is {format_amount(gaps.max(), '%')} "
         f"({outcomes.instances[worst]}). Medians per kind of map: {', '.join(medians)}. "
         f"The reference is the best of many descents with the whole map known; it is not a "
-        f"bound, but hard to beat{better_than_reference}."
+        f"bound, but hard to beat{beaten}."
     )

@@ -19,9 +19,9 @@ that is not enough. Of the 100 maps of the full study four may differ without an
 p-value is the lowest of all claims of the paper.
 """
 MOSTLY = 0.5
-"""Minimum fraction of runs in which something happens that the paper says without a number."""
+"""Minimum fraction of runs for which a statement that the paper makes without a number must be true."""
 OFTEN_BLOCKED = 1.0 / ROBOTS
-"""Robots are often blocked if it happens to at least one robot of a team on average."""
+"""Robots are often blocked if on average at least one robot of a team is."""
 CLEARLY_BELOW = 0.95
 """A controller is clearly better than another if the median ratio of their costs is below this."""
 BARELY = 0.05

@@ -114,7 +114,7 @@ TEAMS = tuple(
 """Controllers of teams with mixed speeds, with each kind of cells."""
 
 OWN = tuple(build_contender(name, {}) for name in OURS)
-"""Contenders of our own controllers."""
+"""Contenders of our own controllers; the first one is that of `MAIN_CONTROLLER`."""
 
 
 def combine_gains(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:

@@ -79,7 +79,7 @@ class BeyondPlan:
         Bundled maps, seeds of generated maps, and kinds and seeds of starts for the baselines and our own
         controllers: a selection from those of the paper's claims.
     own_seeds, shared_seeds : tuple of int
-        Seeds of starts for our own controller, and for the one that shares its map.
+        Seeds of starts for our own controller, and for its variant whose robots share their maps.
     tuning : tuple of int
         Seeds of the generated maps on which the gains of the baselines are tuned: a selection from those of
         the paper's tuning. If it is empty, the baselines keep their default gains.
@@ -137,7 +137,8 @@ class BeyondPlan:
 class Plan:
     """Extent of a study; the defaults are those of the full study.
 
-    It has 100 non-convex maps and 100 convex regions for the claims, and 12 maps for the gain grids.
+    The full study has 100 non-convex maps and 100 convex regions for the claims, and 12 maps for the gain
+    grids.
 
     Parameters
     ----------

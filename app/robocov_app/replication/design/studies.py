@@ -129,7 +129,7 @@ def build_contest(
     starts : sequence of str
     seeds : sequence of int
     **changes
-        Options of the study that differ from the plan.
+        Options of the sweep that differ from the common ones.
 
     Returns
     -------
@@ -346,7 +346,7 @@ def list_disturbances(plan: Plan) -> dict[str, Disturbances]:
 def build_conditions_studies(plan: Plan) -> dict[str, Study]:
     """Build the sweeps with disturbances, and those under ideal conditions that they are compared with."""
     studies = {}
-    for part, disturbances in list_disturbances(plan).items():
+    for prefix, disturbances in list_disturbances(plan).items():
         options: dict[str, Any] = {
             "maps": tuple(StudyMap(name, load_map(name)) for name in plan.beyond.conditions_maps),
             "controllers": disturbances.controllers,
@@ -359,19 +359,19 @@ def build_conditions_studies(plan: Plan) -> dict[str, Study]:
             "record_hz": 0.0,
             "conditions": COMMON_CONDITIONS,
         }
-        studies[f"{part}-ideal"] = Study(**options)
+        studies[f"{prefix}-ideal"] = Study(**options)
         for name, values in disturbances.axes.items():
             # The first value is the ideal one.
             disturbed = list(values[1:])
             changes: dict[str, Any] = {"conditions": {**COMMON_CONDITIONS, name: disturbed}}
             if name in TEAM_PARAMETERS:
                 changes = {name: disturbed}
-            studies[f"{part}-{name.replace('_', '-')}"] = Study(**{**options, **changes})
+            studies[f"{prefix}-{name.replace('_', '-')}"] = Study(**{**options, **changes})
     return studies
 
 
 def build_probe_studies(plan: Plan, *, beyond: bool) -> list[Study]:
-    """Build the runs from which the computing time of the study is estimated, one for each controller.
+    """Build sweeps with one run of each controller, from which the computing time of the study is estimated.
 
     Parameters
     ----------

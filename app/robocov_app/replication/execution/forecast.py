@@ -28,7 +28,7 @@ class Forecast:
     left : int
         Number of runs that are not finished.
     seconds : float
-        Computing time of the unfinished runs on all workers, s.
+        Time that the unfinished runs take with all workers, s.
     seconds_per_run : Mapping
         Computing time of one run, s, by controller.
     """
@@ -61,18 +61,18 @@ def forecast_study(folder: Path, plan: Plan, workers: int, *, claims: bool, beyo
     runs = sum(len(study) for study in sweeps.values())
     if not any(left.values()):
         return Forecast(runs, left=0, seconds=0.0, seconds_per_run={})
-    speeds = _measure_speeds(plan, beyond=beyond)
+    factors = _measure_real_time_factors(plan, beyond=beyond)
     total = 0.0
     for name, study in sweeps.items():
-        study_speeds = []
+        study_factors = []
         for controller in study.controllers:
-            study_speeds += [speeds[controller]] * len(study.get_gains(controller).choices)
-        total += left[name] * float(np.mean(study_speeds)) * study.duration
+            study_factors += [factors[controller]] * len(study.get_gains(controller).choices)
+        total += left[name] * float(np.mean(study_factors)) * study.duration
     return Forecast(
         runs,
         left=sum(left.values()),
         seconds=total / workers,
-        seconds_per_run={controller: speed * plan.duration for controller, speed in speeds.items()},
+        seconds_per_run={controller: factor * plan.duration for controller, factor in factors.items()},
     )
 
 
@@ -123,18 +123,18 @@ def _count_runs_left(folder: Path, name: str, study: Study) -> int:
     return max(len(study) - len(finished), 0)
 
 
-def _measure_speeds(plan: Plan, *, beyond: bool) -> dict[str, float]:
-    """Return the computing time per second of simulation time, s, by controller."""
-    speeds: dict[str, float] = {}
+def _measure_real_time_factors(plan: Plan, *, beyond: bool) -> dict[str, float]:
+    """Return the computing time relative to the simulation time, by controller."""
+    factors: dict[str, float] = {}
     for study in studies.build_probe_studies(plan, beyond=beyond):
         for task in generate_tasks(study):
-            if not speeds:
+            if not factors:
                 # An untimed run first, which loads and compiles everything.
                 worker.perform(task)
             start = time.perf_counter()
             worker.perform(task)
-            speeds[task.controller] = (time.perf_counter() - start) / study.duration
-    return speeds
+            factors[task.controller] = (time.perf_counter() - start) / study.duration
+    return factors
 
 
 def is_gain_grid_finished(folder: Path, plan: Plan) -> bool:

@@ -170,7 +170,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     -------
     BeyondResults
     """
-    paper_contenders, claims, references = _get_baselines(folder, plan, options, paper)
+    paper_contenders, claims, references = _get_claims_results(folder, plan, options, paper)
     gains = _run_baseline_gain_grids(folder, plan, options)
     contests = studies.build_beyond_contests(plan, find_best_gains(gains), paper_contenders)
     maps = (*build_generated_maps(plan.beyond.maps), *build_unseen_maps(plan))
@@ -208,16 +208,16 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     )
 
 
-def _get_baselines(
+def _get_claims_results(
     folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None
 ) -> tuple[tuple[Contender, ...], Outcomes, References]:
     """Return the paper's contenders, their outcomes and the references; execute missing runs."""
     if paper is not None:
         return paper.contenders, paper.claims, {**paper.references}
-    return _run_baselines(folder, plan, options)
+    return _run_claims_sweep(folder, plan, options)
 
 
-def _run_baselines(
+def _run_claims_sweep(
     folder: Path, plan: Plan, options: RunnerOptions
 ) -> tuple[tuple[Contender, ...], Outcomes, References]:
     """Run the paper's contenders on the non-convex maps of its claims.

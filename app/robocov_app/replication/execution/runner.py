@@ -147,7 +147,7 @@ def run_studies(studies: Mapping[str, Study], folder: Path, options: RunnerOptio
 
 
 def _run_in_one_pool(studies: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
-    """Execute the unfinished runs of all sweeps with local processes; each run is stored in its sweeps."""
+    """Execute the unfinished runs of all sweeps in local processes; store each in all sweeps that have it."""
     tasks: dict[str, Task] = {}
     ledgers: dict[str, list[Ledger]] = {}  # Two sweeps may have a task in common.
     notes = []

@@ -29,7 +29,7 @@ _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 
 def prepare_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
-    """Return a function that draws each plot that is not in the paper, by the name of the plot."""
+    """Return the functions that draw the plots of the results beyond the paper, by their names."""
     theme = get_theme(theme)
     samples = build_gap_samples(results)
     heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
@@ -99,7 +99,7 @@ def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
-    """Return a function that draws runs with and without knowledge of the density, both above the density."""
+    """Return a function that draws runs with and without knowledge of the density, both on its background."""
     known, ignored = results.density.figure_runs
     weighted = known.record.environment
     records = [replace(run.record, environment=weighted) for run in (known, ignored)]

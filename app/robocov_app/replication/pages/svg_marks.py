@@ -167,7 +167,7 @@ def _format_strip(strip: DotStrip, top: float, to_x: Callable[[float], float]) -
     """Return the SVG elements of a strip: its name, a dot for each map, and a line at the median."""
     kind = "ours" if strip.is_ours else "other"
     middle = top + _STRIP_LABEL_PX + (_STRIP_HEIGHT_PX - _STRIP_LABEL_PX) / 2
-    # Above the baseline of the label there is a little space.
+    # Leave a little space between the label and the dots.
     label_y = top + _STRIP_LABEL_PX - 2
     parts = [f'<text class="name" x="{_STRIP_LEFT_PX - 4}" y="{label_y}">{escape(strip.label)}</text>']
     ranked = sorted(strip.medians_by_map.items(), key=lambda item: item[1])

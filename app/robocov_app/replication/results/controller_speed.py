@@ -88,7 +88,7 @@ def measure_step_times(
         Called between blocks. If it returns True, only complete measurements are returned.
     clock : callable, optional
         Returns a time in s. By default the processor time of this process, which other processes hardly
-        affect; where its resolution is too coarse, the elapsed time.
+        affect; if its resolution is too coarse, the elapsed time.
 
     Returns
     -------

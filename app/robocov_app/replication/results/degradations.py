@@ -35,19 +35,19 @@ def read_degradations(folder: Path, plan: Plan) -> list[Degradation]:
         First the costs under ideal conditions, relative to those of RAPF; then the costs under each
         disturbance, relative to those of the same controller under ideal conditions.
     """
-    parts = studies.list_disturbances(plan)
+    disturbances = studies.list_disturbances(plan)
     ideal: CostTable = {}
-    for part in parts:
-        ideal |= _read_costs(folder / f"{part}-ideal")
+    for prefix in disturbances:
+        ideal |= _read_costs(folder / f"{prefix}-ideal")
     rapf_costs = ideal.get((RAPF_SHARED.controller, None), {})
     degradations = []
-    for part, (controllers, _, axes) in parts.items():
+    for prefix, (controllers, _, axes) in disturbances.items():
         for controller in controllers:
             costs = ideal.get((controller, None), {})
             degradations.append(_build_degradation(IDEAL, None, controller, costs, rapf_costs))
         for axis, values in axes.items():
             table = _read_costs(
-                folder / f"{part}-{axis.replace('_', '-')}", name_parameter_column(axis), default=values[1]
+                folder / f"{prefix}-{axis.replace('_', '-')}", name_parameter_column(axis), default=values[1]
             )
             for value, controller in product(values, controllers):
                 ideal_costs = ideal.get((controller, None), {})

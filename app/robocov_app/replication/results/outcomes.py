@@ -37,9 +37,9 @@ class Outcomes:
 
     Measures are ``final`` (m), ``gap`` (J / J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
     ``blocked`` (fraction of robots that have a wall between them and their goals at the end), ``contacts``,
-    ``clearance`` (smallest gap to a wall, m), ``settled`` (s, nan if it did not), ``time`` (s), ``path`` (m),
-    ``over_run`` (m, time average of the cost) and ``work`` (J, of the team), all (m,), and ``placement``, the
-    final positions, (m, n, 2) m.
+    ``clearance`` (smallest gap to a wall, m), ``settled`` (s, nan if the team did not settle), ``time`` (s),
+    ``path`` (m), ``over_run`` (m, time average of the cost) and ``work`` (J, of the team), all (m,), and
+    ``placement``, the final positions, (m, n, 2) m.
 
     Parameters
     ----------

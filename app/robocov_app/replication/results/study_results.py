@@ -98,6 +98,7 @@ class Degradation:
     axis : str
         Kind of the disturbance.
     value : float or None
+        Its value; None for an unlimited range, and on the axis `IDEAL`.
     controller, label : str
     ratio : Interval
         Median ratio of the costs.

@@ -86,8 +86,8 @@ def _choose_axis_maxima(panels: Sequence[DrawnPanel[Band]]) -> dict[str, float]:
 def _sample_histories(result: ReportedResult) -> tuple[FloatArray, dict[ReportedRun, FloatArray]]:
     """Sample the mean distances of all runs at the same times.
 
-    Returned are the times since the start, (T,) s, and the mean distances of each run, (T,) m, which are nan
-    after the end of the run.
+    Return the times since the start, (T,) s, and the mean distances of each run, (T,) m, which are nan after
+    the end of the run.
     """
     histories = {}
     for run in result.completed_runs:

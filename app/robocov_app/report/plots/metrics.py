@@ -62,7 +62,7 @@ class _MetricCurves(NamedTuple):
 
 
 def _round_to_millimeters(gaps: FloatArray) -> FloatArray:
-    """Round gaps to 1 mm, without negative zeros, because the solver tolerates smaller overlaps."""
+    """Round gaps to 1 mm, since the solver tolerates smaller overlaps, and replace negative zeros by 0."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 

@@ -38,7 +38,7 @@ class _Parameter(NamedTuple):
     get_value : callable
         Returns the value of the parameter in a run.
     choices : tuple of str
-        Values of the parameter if they are words.
+        Values of the parameter if they are texts; empty if they are numbers.
     """
 
     name: str
@@ -47,7 +47,7 @@ class _Parameter(NamedTuple):
     choices: tuple[str, ...] = ()
 
     def to_coordinate(self, value: Value) -> float:
-        """Return the coordinate of a value on an axis: nan for no limit, the index for a word."""
+        """Return the coordinate of a value on an axis: nan for no limit, the index for a text."""
         if value is None:
             return np.nan
         if isinstance(value, str):

@@ -195,7 +195,7 @@ def _load_sweep(folder: Path) -> ReportedResult:
     if not rows:
         raise InputError(f"{folder}: none of the {study.run_count} runs of the sweep is done")
     runs = [_build_run_of_row(row, study, folder) for row in rows]
-    facts = study.facts
+    facts = dict(study.facts)
     if study.teams:
         varying_parameters = study.varying_parameters
         first_team = study.teams[0].items()

@@ -55,7 +55,7 @@ def _format_gain_ranges(group: RunGroup, result: ReportedResult) -> str:
 
 
 def _format_range(values: Sequence[Value], unit: str) -> str:
-    """Format the values of a gain: the range of numbers, or a list of words; "or none" if some are None."""
+    """Format the values of a gain: the range of numbers, or a list of texts; "or none" if some are None."""
     if any(isinstance(value, str) for value in values):
         return " or ".join(dict.fromkeys(map(format_value, values)))
     numbers = [value for value in values if isinstance(value, int | float)]
