@@ -165,8 +165,12 @@ def _open_choice(start: StartLauncher, choice: StartChoice, options: Arguments) 
         return 0
     chosen = replace(options, size=f"{width}x{height}", **choice.options)
     launcher = _build_launcher(chosen)
+    # The start page has offered both.
     launcher.offers_lesson = False
+    launcher.offers_recovery = False
     with launcher.window() as window:
+        if choice.draft is not None:
+            window.viewer.files.attempt_recovery(choice.draft)
         if start.has_new_theme:
             window.viewer.view.theme = start.theme
         if choice.target is Target.LESSON:

@@ -8,6 +8,7 @@
 - `canvas`, `chart`, `panel`: the areas of the window
 - `tools`: mouse tools for the map
 - `costs`, `explanation`: the coverage cost, and the report on why a robot moves or does not
+- `recovery`: the offer to recover unsaved sessions
 - `lessons`: the guided tours
 - `branch_output`: results, videos and images of a session's branches
 """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from robocov.defaults import DEFAULT_LATTICE
 from robocov_app.render.layer_catalog import build_standard_layers
-from robocov_app.storage.autosave import find_draft_folder
+from robocov_app.storage.autosave import Draft, find_draft_folder
 from robocov_app.storage.settings import (
     find_settings_file,
     load_settings,
@@ -27,11 +27,12 @@ from robocov_app.toolkit.window.window_settings import WindowSettings, limit_win
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.messages import NO_DISPLAY
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.recovery import offer_recovery
 from robocov_app.viewer.session.clock import FRAME_BUDGET_S
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
 from robocov_app.viewer.session.files.run_saver import RunSaver
-from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window.dialogs import build_lesson_offer, offer_recovery
+from robocov_app.viewer.window.dialogs import build_lesson_offer
 from robocov_app.viewer.window.window import ViewerWindow
 
 HEADLESS_FPS = 30  # frames per second of simulated real time without a display
@@ -97,6 +98,8 @@ class ViewerLauncher:
         File of the session.
     offers_lesson : bool
         Whether to offer the lesson when the window is opened for the first time.
+    offers_recovery : bool
+        Whether to offer to recover unsaved work; the start page has offered it already.
     """
 
     session: Session
@@ -113,6 +116,7 @@ class ViewerLauncher:
     lattice: int = DEFAULT_LATTICE
     file: Path | None = None
     offers_lesson: bool = False
+    offers_recovery: bool = True
 
     @contextmanager
     def window(self) -> Iterator[ViewerWindow]:
@@ -154,10 +158,15 @@ class ViewerLauncher:
         return find_draft_folder(self.folder if self.served else None)
 
     def _offer_help(self, window: ViewerWindow, settings_file: Path | None) -> None:
-        """Offer to recover unsaved work; otherwise, offer the lesson to users who open their first window."""
-        drafts = find_recoverable_drafts(self._draft_folder)
+        """Offer to recover unsaved work; otherwise, offer the lesson to users who open their first window.
+
+        The session waits while the dialog is open.
+        """
+        drafts: tuple[Draft, ...] = ()
+        if self.offers_recovery:
+            drafts = find_recoverable_drafts(self._draft_folder)
         if drafts:
-            offer_recovery(window.viewer, window.dialogs, drafts)
+            offer_recovery(window.dialogs, drafts, window.viewer.files.attempt_recovery)
         elif self.offers_lesson and settings_file is not None and not settings_file.exists():
             window.dialogs.ask(build_lesson_offer(window.lesson.toggle))
 

@@ -19,7 +19,8 @@ from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.window.display import open_display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import ViewerLauncher, ViewerSettings
-from robocov_app.viewer.session.files.workspace import SessionWorkspace, find_recoverable_drafts
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
+from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window.status import describe_cursor, suggest_actions
 

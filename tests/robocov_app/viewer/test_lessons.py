@@ -29,8 +29,8 @@ from robocov_app.viewer.lessons.player import (
     check_lesson,
     load_lesson,
 )
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
 from robocov_app.viewer.session.files.session_file import build_session_content, format_session
-from robocov_app.viewer.session.files.workspace import find_recoverable_drafts
 from robocov_app.viewer.session.session import Session
 
 LAYERS = {layer.name for layer in (*build_standard_layers(), *build_pane_layers())}

@@ -14,12 +14,9 @@ from sample_sessions import RAPF, get_positions
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
 from robocov_app.viewer.session.files.session_file import load_session
-from robocov_app.viewer.session.files.workspace import (
-    SessionWorkspace,
-    find_recoverable_drafts,
-    recover_draft,
-)
+from robocov_app.viewer.session.files.workspace import SessionWorkspace, recover_draft
 from robocov_app.viewer.session.session import Session
 
 ROOM = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0), (0.0, 4.0)))

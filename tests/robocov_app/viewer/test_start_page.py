@@ -14,13 +14,17 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import build_key_event
+from sample_sessions import start_session
 
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov_app.commands import demo
 from robocov_app.commands.demo import Arguments
 from robocov_app.look.theme import DARK
+from robocov_app.storage.autosave import FOLDER_VARIABLE as DRAFT_FOLDER_VARIABLE
 from robocov_app.storage.settings import FOLDER_VARIABLE
 from robocov_app.toolkit.window.display import REDUCED_MOTION_VARIABLE, open_display
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
+from robocov_app.viewer.session.files.workspace import SessionWorkspace
 from robocov_app.viewer.start.cards import START_CARDS, StartChoice, Target, choose_map, choose_session
 from robocov_app.viewer.start.page import ANIMATION_S, StartPage
 from robocov_app.viewer.start.previews import RunPreview, fit_outline, load_previews
@@ -273,6 +277,72 @@ def test_a_session_that_cannot_be_opened_leads_back_to_the_page(
     assert demo.command(Arguments(folder=tmp_path)) == 0
     assert not opened
     assert "broken.robocov" in messages[1]
+
+
+def leave_draft(folder: Path, number: int) -> None:
+    """Leave the draft of a session in which a robot has failed, as a process that was killed."""
+    session = start_session()
+    workspace = SessionWorkspace(session, folder)
+    session.fail_robot(number)
+    workspace.save_draft({}, at_once=True)
+    workspace.close()
+
+
+@pytest.fixture
+def drafts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Return the folder for drafts."""
+    folder = tmp_path / "drafts"
+    monkeypatch.setenv(DRAFT_FOLDER_VARIABLE, str(folder))
+    return folder
+
+
+def answer_recovery(monkeypatch: pytest.MonkeyPatch, *answers: str, then: StartChoice | None = None) -> None:
+    """Let the user of the start page press these keys, and then choose something, unless a key has."""
+
+    def run(page: StartPage) -> None:
+        for answer in answers:
+            assert page.dialogs.current is not None
+            assert page.dialogs.current.title == "Recover unsaved work?"
+            press(page, answer)
+        assert page.dialogs.current is None
+        if page.choice is None:
+            page.choice = then
+
+    monkeypatch.setattr(StartPage, "run", run)
+
+
+def test_unsaved_work_is_recovered_from_the_page(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, drafts: Path, opened: list[ViewerWindow]
+) -> None:
+    leave_draft(drafts, 2)
+    answer_recovery(monkeypatch, "r")
+    assert demo.command(Arguments(folder=tmp_path)) == 0
+    (window,) = opened
+    assert window.viewer.session.displayed.numbers == (1, 3)
+    assert window.viewer.files.workspace.has_unsaved_edits
+    assert window.dialogs.current is None
+
+
+def test_unsaved_work_that_is_postponed_on_the_page_is_offered_at_the_next_start_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, drafts: Path, opened: list[ViewerWindow]
+) -> None:
+    leave_draft(drafts, 2)
+    answer_recovery(monkeypatch, "l", then=START_CARDS[0].choice)
+    assert demo.command(Arguments(folder=tmp_path)) == 0
+    (window,) = opened
+    assert window.dialogs.current is None
+    assert len(find_recoverable_drafts(drafts)) == 1
+
+
+def test_the_page_offers_the_next_draft_when_one_is_discarded(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, drafts: Path, opened: list[ViewerWindow]
+) -> None:
+    leave_draft(drafts, 2)
+    leave_draft(drafts, 3)
+    answer_recovery(monkeypatch, "d", "d")
+    assert demo.command(Arguments(folder=tmp_path)) == 0
+    assert not opened
+    assert find_recoverable_drafts(drafts) == ()
 
 
 def test_the_page_loads_neither_the_simulation_nor_the_compiler() -> None:

@@ -13,13 +13,8 @@ from sample_sessions import advance_session, build_presenter, get_positions, sta
 
 from robocov.errors import MapError
 from robocov.mapfile import load_map
-from robocov_app.viewer.session.files.workspace import (
-    DRAFT_KIND,
-    SessionWorkspace,
-    describe_draft,
-    find_recoverable_drafts,
-    recover_draft,
-)
+from robocov_app.viewer.session.files.drafts import DRAFT_KIND, describe_draft, find_recoverable_drafts
+from robocov_app.viewer.session.files.workspace import SessionWorkspace, recover_draft
 
 
 def crash_after_draft(workspace: SessionWorkspace) -> None:

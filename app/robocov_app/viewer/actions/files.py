@@ -12,13 +12,9 @@ from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
 from robocov_app.viewer.key_hints import explain_kept_session, explain_lesson_start, explain_pause
 from robocov_app.viewer.model import ViewerModel
+from robocov_app.viewer.session.files.drafts import describe_draft, find_recoverable_drafts
 from robocov_app.viewer.session.files.session_file import SUFFIX, load_session, save_session
-from robocov_app.viewer.session.files.workspace import (
-    SessionWorkspace,
-    describe_draft,
-    find_recoverable_drafts,
-    recover_draft,
-)
+from robocov_app.viewer.session.files.workspace import SessionWorkspace, recover_draft
 from robocov_app.viewer.session.session import Session
 
 MAX_RECENT_FILES = 9
@@ -251,6 +247,10 @@ class FileActions:
         if keeps_draft:
             message += f" {explain_kept_session(self._viewer.view)}"
         return message
+
+    def attempt_recovery(self, draft: Draft) -> None:
+        """Resume unsaved work, and show the message or the error."""
+        self._viewer.attempt(lambda: self.recover(draft))
 
     def _add_recent(self, path: Path) -> None:
         name = str(path.absolute())

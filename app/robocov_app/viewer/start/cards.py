@@ -8,6 +8,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from robocov_app.storage.autosave import Draft
+
 
 class Target(StrEnum):
     """Part of the application that a choice on the start page opens."""
@@ -28,11 +30,14 @@ class StartChoice:
     target : Target
     options : mapping
         Options of `robocov demo` that differ from the defaults.
+    draft : Draft or None
+        Unsaved work to recover; None to start a new session.
     """
 
     title: str
     target: Target = Target.WINDOW
     options: Mapping[str, Any] = field(default_factory=dict)
+    draft: Draft | None = None
 
 
 @dataclass(frozen=True)
@@ -103,3 +108,8 @@ def choose_map(name: str) -> StartChoice:
 def choose_session(path: Path) -> StartChoice:
     """Return the choice that opens a session or a map file."""
     return StartChoice(path.stem, options={"map": str(path)})
+
+
+def choose_draft(draft: Draft) -> StartChoice:
+    """Return the choice that recovers unsaved work."""
+    return StartChoice("the unsaved session", draft=draft)

@@ -6,11 +6,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
+from robocov_app.storage.autosave import Draft, find_draft_folder
 from robocov_app.storage.settings import find_settings_file, load_settings
 from robocov_app.toolkit.window.display import choose_scale, fit_to_screen, open_display
 from robocov_app.toolkit.window.layout import explain_reduced_scale
 from robocov_app.toolkit.window.window_settings import WindowSettings
 from robocov_app.viewer.messages import NO_DISPLAY
+from robocov_app.viewer.session.files.drafts import find_recoverable_drafts
 from robocov_app.viewer.start.cards import StartChoice
 from robocov_app.viewer.start.page import StartPage, ThemeName
 from robocov_app.viewer.start.preparation import Preparation
@@ -73,6 +75,8 @@ class StartLauncher:
     def choose(self, message: str = "") -> StartChoice | None:
         """Show the page until the user has chosen something, and the viewer is ready to open it.
 
+        The first time, the page offers to recover unsaved work.
+
         Parameters
         ----------
         message : str
@@ -83,6 +87,9 @@ class StartLauncher:
         StartChoice or None
             None if the user has closed the page.
         """
+        drafts: tuple[Draft, ...] = ()
+        if not self._has_started:
+            drafts = find_recoverable_drafts(find_draft_folder())
         scale = choose_scale(self._requested_scale or self._settings.scale, has_display=True)
         page = StartPage(
             self.size,
@@ -90,6 +97,7 @@ class StartLauncher:
             theme_name=self.theme,
             recent=[Path(name) for name in self._settings.recent if Path(name).is_file()],
             folder=self._folder,
+            drafts=drafts,
             can_open_viewer=lambda: self._preparation.is_ready,
         )
         reduced_scale = explain_reduced_scale(self._requested_scale, page.screen.get_size())

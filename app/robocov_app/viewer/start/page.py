@@ -14,6 +14,7 @@ from robocov.errors import RobocovError
 from robocov_app.look.colors import mix
 from robocov_app.look.theme import Theme, get_theme
 from robocov_app.render.fonts import measure_text, render_text, shorten_to_width
+from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.toolkit.commands.command import Command, CommandTable
 from robocov_app.toolkit.commands.help_page import HelpPage
@@ -24,8 +25,9 @@ from robocov_app.toolkit.window.input import get_wheel_notches
 from robocov_app.toolkit.window.layout import Box, find_max_scale
 from robocov_app.toolkit.window.window import BaseWindow
 from robocov_app.toolkit.window.window_model import WindowModel
+from robocov_app.viewer.recovery import offer_recovery
 from robocov_app.viewer.start.card_section import CardSection
-from robocov_app.viewer.start.cards import START_CARDS, StartChoice, choose_session
+from robocov_app.viewer.start.cards import START_CARDS, StartChoice, choose_draft, choose_session
 from robocov_app.viewer.start.drawing import StartDrawing
 from robocov_app.viewer.start.items import ItemFocus, StartItem
 from robocov_app.viewer.start.layout import StartLayout, build_start_layout
@@ -74,6 +76,8 @@ class StartPage(BaseWindow):
         Sessions used recently, newest first.
     folder : Path
         Folder in which files are opened.
+    drafts : sequence of Draft
+        Unsaved work of earlier windows, newest first, which the page offers to recover.
     can_open_viewer : callable
         Returns whether the viewer can be opened. Until then, the page shows that it is loading.
 
@@ -96,6 +100,7 @@ class StartPage(BaseWindow):
         theme_name: ThemeName = _LIGHT_NAME,
         recent: Sequence[Path] = (),
         folder: Path = Path(),
+        drafts: Sequence[Draft] = (),
         can_open_viewer: Callable[[], bool] = lambda: True,
     ) -> None:
         super().__init__(size)
@@ -117,6 +122,8 @@ class StartPage(BaseWindow):
         self._animation_end_s = ANIMATION_S
         self._is_motion_reduced = prefers_reduced_motion()
         self._commands = CommandTable(self._list_commands(), self.model.attempt)
+        if drafts:
+            offer_recovery(self.dialogs, drafts, self._recover)
         self._arrange()
         self.draw()
 
@@ -152,6 +159,9 @@ class StartPage(BaseWindow):
         """Choose what to open. The page closes as soon as the viewer can be opened."""
         self.choice = choice
         self.model.revision += 1
+
+    def _recover(self, draft: Draft) -> None:
+        self.choose(choose_draft(draft))
 
     def open_dialog(self) -> None:
         """Let the user choose a file."""

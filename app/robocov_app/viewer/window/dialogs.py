@@ -1,24 +1,19 @@
-"""Dialogs of the window: files, branches, and offers when the window is opened."""
+"""Dialogs of the window: files, branches, and the offer of the lesson when the window is opened."""
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from robocov_app.storage.autosave import Draft, remove_draft
 from robocov_app.toolkit.dialogs import (
     Answer,
     Choice,
-    Dialogs,
     Option,
     Question,
     create_file_choice,
     create_list_choice,
-    create_recovery_question,
 )
 from robocov_app.viewer.panel.panel import describe_controllers, label_controllers
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.files.session_file import SUFFIX
-from robocov_app.viewer.session.files.workspace import describe_draft
 from robocov_app.viewer.session.setup.scenario import require_space_for_pane
 
 
@@ -93,38 +88,3 @@ def build_lesson_offer(start_lesson: Callable[[], None]) -> Question:
     )
     answers = [Answer("Start the lesson", start_lesson), Answer("Explore on my own")]
     return Question("Welcome to robocov", text, answers)
-
-
-def offer_recovery(viewer: Presenter, dialogs: Dialogs, drafts: Sequence[Draft]) -> None:
-    """Open a dialog that offers to recover unsaved work.
-
-    The session waits while the dialog is open, and runs if no draft is recovered.
-
-    Parameters
-    ----------
-    viewer : Presenter
-        The viewer.
-    dialogs : Dialogs
-        Shows the open dialog.
-    drafts : sequence of Draft
-        Drafts of unsaved work, newest first. If the newest one is discarded, the next one is offered.
-    """
-    newest = drafts[0]
-    others = drafts[1:]
-
-    def recover() -> None:
-        viewer.attempt(partial(viewer.files.recover, newest))
-
-    def discard() -> None:
-        remove_draft(newest.folder)
-        if others:
-            offer_recovery(viewer, dialogs, others)
-
-    question = create_recovery_question(
-        f"{describe_draft(newest)}.",
-        other_count=len(others),
-        recover=recover,
-        discard=discard,
-        postpone=lambda: None,
-    )
-    dialogs.ask(question)

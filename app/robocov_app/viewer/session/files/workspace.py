@@ -9,6 +9,7 @@ import numpy as np
 
 from robocov_app.storage import autosave
 from robocov_app.terminal.output import find_free_path
+from robocov_app.viewer.session.files.drafts import DRAFT_KIND
 from robocov_app.viewer.session.files.session_file import (
     SUFFIX,
     build_session_content,
@@ -17,7 +18,6 @@ from robocov_app.viewer.session.files.session_file import (
 )
 from robocov_app.viewer.session.session import Session
 
-DRAFT_KIND = "robocov-session-draft"
 DRAFT_PAUSE_S = 0.9
 """Minimum time between two drafts."""
 _NEVER_SAVED = -1
@@ -133,40 +133,6 @@ class SessionWorkspace:
             Whether a draft can be recovered, because there are unsaved edits.
         """
         return self._autosaver.close(discard=not self.has_unsaved_edits)
-
-
-def find_recoverable_drafts(folder: Path | None) -> tuple[autosave.Draft, ...]:
-    """Return the drafts left behind by processes that have ended, newest first."""
-    return autosave.find_drafts(folder, DRAFT_KIND, _check_draft)
-
-
-def _check_draft(draft: autosave.Draft) -> autosave.Draft | None:
-    """Return a draft; None if it contains no unsaved session. A damaged draft raises a KeyError."""
-    if "session" not in draft.content:
-        return None
-    describe_draft(draft)
-    return draft
-
-
-def describe_draft(draft: autosave.Draft) -> str:
-    """Describe a draft for the question whether to recover it."""
-    name = "session" if draft.path is None else f"changes to {draft.path.name}"
-    session = draft.content["session"]
-    nodes = session["touches"] if "touches" in session else session["edits"]  # the former in old drafts
-    count = len(nodes) - 1
-    unit = "edit" if count == 1 else "edits"
-    map_name = _get_map_name(session)
-    if draft.path is None and map_name:
-        name = f"{name} of {map_name}"
-    return f"Unsaved {name}, {draft.when:%H:%M}, {count} {unit}"
-
-
-def _get_map_name(session: Mapping[str, Any]) -> str:
-    """Return the name of the first map of a saved session; empty if it has none."""
-    maps = session.get("maps")
-    if not isinstance(maps, list) or not maps or not isinstance(maps[0], dict):
-        return ""
-    return str(maps[0].get("bundled") or maps[0].get("name") or "").capitalize()
 
 
 def recover_draft(
