@@ -3,18 +3,23 @@
 import gzip
 import hashlib
 import json
-import re
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias, get_args
+from typing import Any
 
-from robocov.controllers.base import Information
 from robocov.controllers.registry import update_gain_names
-from robocov.errors import InputError, format_bound, quote
+from robocov.errors import InputError
 from robocov.files.result_folder import require_result
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov_app.benchmark import suite
+from robocov_app.benchmark.result_checks import (
+    METRICS,
+    RESULTS_VERSION_PATTERN,
+    Row,
+    check_head,
+    check_row,
+)
 from robocov_app.runs.cost import AREA_TOLERANCE_M2
 from robocov_app.sweep.ledger import Entry
 from robocov_app.sweep.tasks import Task
@@ -26,29 +31,10 @@ ENTRIES = Path(__file__).parent / "entries"
 """Folder with the results of the built-in controllers, compressed with ``gzip -9 -n``."""
 RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
 """Entries of a result that identify its format."""
-MAX_LABEL_CHARS = 60
-"""Maximum length of the label of an entry."""
-METRICS = (
-    "mean_distance_m",
-    "mean_distance_over_run_m",
-    "uncovered_area_m2",
-    "near_final_s",
-    "settled_at_s",
-    "path_length_m",
-    "work_J",
-    "contacts",
-    "min_clearance_m",
-    "stuck_robots",
-)
-"""Metrics of a run that a row contains in addition to its effort and its gaps."""
 _FORMER_METRIC_NAMES = {"told_bytes": "sent_bytes"}
 """Names of metrics in rows of earlier versions, with those of today."""
-_RESULTS_VERSION_PATTERN = re.compile(r"\(results (\d+)\)")
-"""Number of the results' version in that of robocov; see `robocov_app.sweep.worker.list_result_versions`."""
 _FIRST_VERSION_WITH_MESSAGES = 5
 """Version of the results from which on the built-in controllers share maps by messages."""
-Row: TypeAlias = dict[str, Any]
-"""One run of a result: its track, map and seed, and its metrics or its error."""
 
 
 def find_reference(map_name: str, robots: int) -> Mapping[str, Any]:
@@ -181,7 +167,7 @@ def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
     entry = result["entry"]
     if entry["information"] != "shared map" or entry["source_sha256"]:
         return True
-    version = _RESULTS_VERSION_PATTERN.search(str(result["versions"].get("robocov", "")))
+    version = RESULTS_VERSION_PATTERN.search(str(result["versions"].get("robocov", "")))
     return version is None or int(version[1]) >= _FIRST_VERSION_WITH_MESSAGES
 
 
@@ -220,7 +206,7 @@ def read_result(path: Path) -> dict[str, Any]:
         raise InputError(
             f"{path}: suite: expected the suite of {suite.SUITE_FILE.name}, got {result.get('suite')}"
         )
-    _check_all_except_rows(result, path)
+    check_head(result, path)
     result["is_bundled"] = False
     _update_gain_names(result["entry"])
     result["method"] = [_update_metric_names(str(sentence)) for sentence in result["method"]]
@@ -228,7 +214,7 @@ def read_result(path: Path) -> dict[str, Any]:
     for k, row in enumerate(result["rows"]):
         location = f"{path}: rows[{k}]"
         _update_row_names(row)
-        _check_row(row, location)
+        check_row(row, location)
         run = (row["track"], row["map"], row["seed"])
         if run in runs:
             raise InputError(
@@ -259,49 +245,6 @@ def check_gaps(result: Mapping[str, Any], path: Path) -> None:
                 )
 
 
-_HEAD_TYPES = {"entry": dict, "selection": dict, "versions": dict, "rows": list, "method": list}
-_ENTRY_TYPES = {
-    "controller": str,
-    "label": str,
-    "information": str,
-    "gains": dict,
-    "set": dict,
-    "source_sha256": str | None,
-}
-_SELECTION_TYPES = {"quick": bool, "tracks": list, "maps": list}
-_RUN_TYPES = {"track": str, "map": str, "seed": int}
-_FAILED_ROW_TYPES = {**_RUN_TYPES, "error": str}
-_ROW_TYPES = {
-    **_RUN_TYPES,
-    **dict.fromkeys((*METRICS, "gap", "gap_to_bound"), int | float | None),
-    **dict.fromkeys(
-        ("mean_distance_m", "uncovered_area_m2", "path_length_m", "contacts", "sent_bytes", "deciding_s"),
-        int | float,
-    ),
-}
-_METRICS_THAT_MAY_BE_NEGATIVE = ("min_clearance_m", "gap", "gap_to_bound")
-_MAX_METRIC = 1e15
-"""Maximum of all metrics, which no run reaches."""
-_BOUND_TOLERANCE = 1e-9
-"""Fraction by which rounding errors may make a cost lower than the lower bound."""
-
-
-def _check_all_except_rows(result: dict[str, Any], path: Path) -> None:
-    """Raise InputError unless everything but the rows of a result has the expected types and values."""
-    _require_types(result, _HEAD_TYPES, path)
-    _require_types(result["entry"], _ENTRY_TYPES, f"{path}: entry")
-    _require_types(result["selection"], _SELECTION_TYPES, f"{path}: selection")
-    label = result["entry"]["label"]
-    if not 0 < len(label.strip()) <= MAX_LABEL_CHARS:
-        raise InputError(
-            f"{path}: entry: label: expected 1 to {MAX_LABEL_CHARS} characters, got {quote(label)}"
-        )
-    information = result["entry"]["information"]
-    if information not in get_args(Information):
-        expected = ", ".join(get_args(Information))
-        raise InputError(f"{path}: entry: information: expected one of {expected}, got {quote(information)}")
-
-
 def _update_gain_names(entry: dict[str, Any]) -> None:
     """Replace, in place, the names of gains that were renamed since an entry was made."""
     for key in ("gains", "set"):
@@ -320,52 +263,6 @@ def _update_row_names(row: Any) -> None:
     for former_name, name in _FORMER_METRIC_NAMES.items():
         if isinstance(row, dict) and former_name in row:
             row[name] = row.pop(former_name)
-
-
-def _check_row(row: Any, location: str) -> None:
-    """Raise InputError unless a row belongs to a run of the suite, and its metrics are possible."""
-    has_failed = isinstance(row, dict) and "error" in row
-    _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, location)
-    if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
-        raise InputError(f"{location}: {row['track']} on {row['map']} is not a run of the suite")
-    if has_failed:
-        return
-    for name in sorted(_ROW_TYPES.keys() - {*_RUN_TYPES, *_METRICS_THAT_MAY_BE_NEGATIVE}):
-        if row[name] is not None and row[name] < 0.0:
-            raise InputError(f"{location}: {name}: expected at least 0, got {row[name]}")
-        if row[name] is not None and row[name] > _MAX_METRIC:
-            raise InputError(
-                f"{location}: {name}: expected at most {format_bound(_MAX_METRIC)}, got {row[name]}"
-            )
-    if row["gap_to_bound"] is not None and row["gap_to_bound"] < -_BOUND_TOLERANCE:
-        raise InputError(
-            f"{location}: gap_to_bound: expected at least 0, got {row['gap_to_bound']}. "
-            "No placement has a lower cost than the lower bound"
-        )
-
-
-_TYPE_NAMES: Mapping[Any, str] = {
-    dict: "an object",
-    list: "a list",
-    str: "a string",
-    bool: "true or false",
-    int: "a whole number",
-    str | None: "a string or null",
-    int | float: "a number",
-    int | float | None: "a number or null",
-}
-
-
-def _require_types(values: Any, types: Mapping[str, Any], location: object) -> None:
-    """Raise InputError unless a JSON object has all keys in `types`, with values of these types."""
-    for name, expected in types.items():
-        if not isinstance(values, dict) or name not in values:
-            raise InputError(f"{location}: {name}: missing, expected a complete result")
-        # A bool is an int in Python.
-        is_wrong_bool = isinstance(values[name], bool) and expected is not bool
-        if is_wrong_bool or not isinstance(values[name], expected):
-            type_name = _TYPE_NAMES[expected]
-            raise InputError(f"{location}: {name}: expected {type_name}, got {quote(values[name])}")
 
 
 def load_bundled_results() -> list[dict[str, Any]]:

@@ -9,10 +9,10 @@ from robocov.errors import InputError, OutputError
 from robocov.files.result_names import RUNS_FOLDER
 from robocov.files.writing import replace_file
 from robocov_app.benchmark.rated_controller import RatedController, Selection
+from robocov_app.benchmark.result_checks import Row
 from robocov_app.benchmark.results import (
     RESULT_FILE,
     RESULT_FORMAT,
-    Row,
     build_row,
     describe_method,
     identify_suite,

@@ -48,7 +48,8 @@ from robocov_app.benchmark.new_maps import (
 from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
 from robocov_app.benchmark.referee import Referees, RepeatedRun, RunCheck
 from robocov_app.benchmark.references import RESTARTS
-from robocov_app.benchmark.results import Row, build_row, compute_gaps, read_result
+from robocov_app.benchmark.result_checks import Row
+from robocov_app.benchmark.results import build_row, compute_gaps, read_result
 from robocov_app.evaluation.reference_search import ReferenceQuery, answer_queries
 from robocov_app.sweep.ledger import describe_version_differences
 from robocov_app.sweep.progress import SweepProgress, report_progress

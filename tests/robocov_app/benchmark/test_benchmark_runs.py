@@ -629,11 +629,10 @@ def test_entries_that_no_page_can_show_are_rejected(change: Any, message: str, t
         read_result(tmp_path / "out")
 
 
-@pytest.mark.usefixtures("short_runs")
 def test_no_file_contains_a_bundled_result(tmp_path: Path) -> None:
-    run_short_benchmark(tmp_path / "out")
-    change_result(tmp_path / "out", lambda result: result.update(is_bundled=True))
-    assert read_result(tmp_path / "out")["is_bundled"] is False
+    result = json.loads(gzip.decompress((ENTRIES / "rapf.json.gz").read_bytes()))
+    (tmp_path / RESULT_FILE).write_text(json.dumps({**result, "is_bundled": True}))
+    assert read_result(tmp_path)["is_bundled"] is False
     assert all(result["is_bundled"] for result in load_bundled_results())
 
 
