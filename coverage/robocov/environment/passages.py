@@ -295,8 +295,8 @@ class PassageSearch:
         offsets = q - p
         widths = compute_lengths(offsets)
         is_candidate = (widths > min_width) & (widths < max_width)
-        # The disc does not contain part of the two edges that meet at the corner only if the angle between
-        # each of them and the offset is at least a right angle.
+        # If the angle between the offset and one of the two edges that meet at the corner is less than a
+        # right angle, the disc contains part of that edge.
         for other_ends in (self.edge_starts[self._previous[corners]], self.edge_ends[corners]):
             sides = other_ends - p
             side_lengths = compute_lengths(sides)

@@ -228,7 +228,8 @@ class Start:
             # The disc contains the centers of the robots. Robots may extend beyond it by their radius.
             center = shapely.Point(self.spec.center)
             area = area.intersection(center.buffer(self.spec.radius, quad_segs=_DISC_QUADRANT_SEGMENTS))
-        return area
+        # A disc that only touches the area gives a point or a line, in which no position can be sampled.
+        return area if area.area > 0.0 else shapely.Polygon()
 
     def _require_whole_number(self, name: str, value: object, minimum: int) -> None:
         if not is_number(value, Integral) or value < minimum:

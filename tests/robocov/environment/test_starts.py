@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
-from robocov.environment import DiscStart, Environment, PointsStart, Start, UniformStart
+from robocov.environment import (
+    DiscStart,
+    Environment,
+    PointsStart,
+    Start,
+    UniformStart,
+    compute_start_clearance,
+)
 from robocov.errors import StartError
 
 SQUARE = shapely.box(0, 0, 10, 10)
@@ -103,6 +110,13 @@ def test_given_positions_are_used_in_order() -> None:
 def test_a_start_without_space_is_reported() -> None:
     with pytest.raises(StartError, match=r"start 'slit': no space for a robot of radius 0.1 m"):
         Start("slit", DiscStart((5.0, 5.0), 0.5), shapely.box(0, 4.95, 10, 5.05)).sample(1)
+
+
+def test_a_disc_that_only_touches_the_space_of_centers_has_no_space() -> None:
+    start = Start("rim", DiscStart((0.0, 5.0), compute_start_clearance(0.1)), SQUARE)
+    assert start.estimate_capacity(0.1) == 0
+    with pytest.raises(StartError, match=r"start 'rim': no space for a robot of radius 0.1 m"):
+        start.sample(1, radius=0.1)
 
 
 @pytest.mark.parametrize("disc", [DiscStart((5.0, 5.0), 0.9), DiscStart((0.0, 0.0), 1.5)])
