@@ -148,7 +148,7 @@ class MapError(InputError):
     source_name : str
         Name of the document.
     line, column : int or None
-        Place of the first issue.
+        Position of the first issue, as in `Issue`.
 
     See Also
     --------

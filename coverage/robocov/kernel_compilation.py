@@ -151,7 +151,7 @@ def call_planning_kernels() -> None:
     # A wall with a gap of 0.3 m, wide enough for the clearance.
     state[:34, 30] = WALL
     state[37:, 30] = WALL
-    # So few nodes give a stride above 1, as on a large map.
+    # With so few nodes, the stride is above 1, as on a large map.
     middle = np.array([3.0, 3.0])
     window = Window.build_around(raster, middle, half_width=math.inf, max_nodes=16)
     planner = GridPlanner(DiscoveredMap(raster, state), window, clearance=0.13)

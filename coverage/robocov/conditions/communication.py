@@ -432,7 +432,7 @@ class Radio:
         return inbox, sent_bytes
 
     def _allocate_bandwidth_to_positions(self, inbox: Inbox) -> tuple[Inbox, BoolArray]:
-        """Return the inbox after the robots sent their positions, and which of them had the credits to do so.
+        """Return the inbox after the robots paid for their positions, and which of them send theirs now.
 
         The bytes of one sending period are added to the credits, and those of sent positions subtracted.
         The credits of a robot never exceed the bytes of one period. A robot whose last transmission was its

@@ -73,7 +73,8 @@ class Conditions:
     Attributes
     ----------
     loss : float
-        Probability that a message does not reach a receiver.
+        Probability that a message does not reach a receiver. A controller message that is sent in several
+        packets is lost if any of them is lost; see `robocov.conditions.communication`.
     delay : float, s
         Latency of messages.
     message_rate : float or None, Hz

@@ -16,6 +16,7 @@ MAX_TIME_S = 1e6
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d{1,3})?"
 _EVENT = re.compile(rf"(\d{{1,9}})@({_NUMBER})(?::({_NUMBER}),({_NUMBER}))?", re.ASCII)
+"""An event as text: its groups are the robot, the time and, if there is a position, x and y."""
 
 
 class Failure(NamedTuple):

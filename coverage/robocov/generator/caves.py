@@ -118,14 +118,14 @@ def build_cave(
 
 
 def _compute_border_rise(request: MapRequest, points: FloatArray) -> FloatArray:
-    """Return the height by which the field is raised at each point, depending on its boundary distance."""
+    """Return the height by which the field is raised at each point, which is largest at the boundary."""
     upper_right = points[-1, -1]
     distances = np.minimum(points, upper_right - points).min(axis=-1)
     return np.asarray(_BORDER_RISE * np.exp(-((distances / (_BORDER_SPACINGS * request.mean_spacing)) ** 2)))
 
 
 def _compute_start_depth(request: MapRequest, corner_disc: DiscStart, points: FloatArray) -> FloatArray:
-    """Return the depth by which the field is lowered at each point, depending on its start distance."""
+    """Return the depth by which the field is lowered at each point, which is largest at the start."""
     distances = compute_lengths(points - np.array(corner_disc.center))
     return np.asarray(_START_DEPTH * np.exp(-((distances / (_START_SPACINGS * request.mean_spacing)) ** 2)))
 
@@ -209,7 +209,7 @@ def _create_builder(request: MapRequest, corner_disc: DiscStart) -> _CaveBuilder
 
 
 def _build_inner_rectangle(request: MapRequest, distance: float) -> Polygon:
-    """Return the rectangle at a distance from the rock along the boundary where the rock is thinnest."""
+    """Return the rectangle at a distance, m, from a layer of rock of minimum thickness along the boundary."""
     width = float(request.width)
     height = float(request.height)
     offset = _MIN_ROCK_SIDES * min(width, height) + distance

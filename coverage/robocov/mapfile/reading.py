@@ -51,6 +51,8 @@ def load_map(source: str | Path) -> Environment:
     MapError
         If the map cannot be read or is not valid. The message contains the line, the column and the JSON path
         of each issue.
+    ParameterError
+        If `source` is neither a str nor a path.
 
     See Also
     --------
@@ -91,6 +93,8 @@ def find_map_file(source: str | Path) -> Path:
     ------
     MapError
         If there is no bundled map of this name.
+    ParameterError
+        If `source` is neither a str nor a path.
     """
     if not isinstance(source, str | PathLike):
         raise ParameterError(f"map: expected a path, or the name of a bundled map, got {quote(source)}")

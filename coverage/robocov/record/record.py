@@ -352,7 +352,8 @@ class Record(Drawable):
         summary : mapping or None
             The summary of the run; see `summarize`.
         lattice : int or None
-            Number of lattice sites along each side of the map with which the cost was computed.
+            Number of lattice sites along each side of the map with which the cost was computed, from 2 to
+            2048. A record that was saved with another number cannot be loaded.
 
         Returns
         -------

@@ -380,7 +380,8 @@ class SimulationBatch:
         Raises
         ------
         ParameterError
-            If the duration is negative or not finite, or there is not one seed for each run.
+            If the duration is negative or not finite, there is not one seed for each run, or the controller
+            fails.
         """
         if seeds is not None and len(seeds) != len(self):
             raise ParameterError(f"seeds: expected {len(self)}, one for each run, got {len(seeds)}")

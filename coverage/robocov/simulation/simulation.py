@@ -88,7 +88,8 @@ class Simulation:
     StartError
         If a robot would start in a wall or in another robot.
     ParameterError
-        If the control period is out of range, or team and starts differ in size.
+        If the control period is out of range, team and starts differ in size, the conditions refer to other
+        robots, or the controller cannot be used.
 
     See Also
     --------
@@ -367,7 +368,9 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the duration is negative or not finite.
+            If the duration is negative or not finite, or the controller fails.
+        StartError
+            If there is no space for a robot that joins.
         """
         steps = count_steps(duration, self.dt)
         yield self.observe_and_decide()
@@ -394,7 +397,9 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the duration is negative or not finite.
+            If the duration is negative or not finite, or the controller fails.
+        StartError
+            If there is no space for a robot that joins.
 
         Examples
         --------
