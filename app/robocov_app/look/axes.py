@@ -68,7 +68,7 @@ def choose_value_limits(
     low, high : float
         Minimum and maximum value, finite.
     margin : float
-        Free space on both sides as a fraction of the range.
+        Free space on both sides as a fraction of the range. If both values are equal, it is a tenth of them.
     origin : float
         Value that proportions refer to: 0 for distances, 1 for ratios.
 

@@ -23,7 +23,7 @@ MIN_TRAIL_CONTRAST = 2.4
 """Minimum contrast ratio between the trajectory of a robot and its cell."""
 _MIN_TRAIL_INK_FRACTION = 0.12
 _TRAIL_INK_STEP = 0.04
-"""Fraction of ink in the color of a trajectory: the least, and the step by which it grows."""
+"""Fraction of ink in the color of a trajectory: the minimum, and the step by which it grows."""
 _CROWDED_TRAIL_BACKGROUND_FRACTION = 0.25
 """Fraction of the background in the color of the trajectories of a large team."""
 
@@ -133,7 +133,7 @@ def choose_trail_colors(theme: Theme, hues: list[int], scheme: ColorScheme) -> l
     """Choose the color of the trajectory of each robot.
 
     In a team that is too large for one hue per robot, trajectories could have the colors of the cells that
-    they cross. There all are red, as in the scheme of the paper, but paler, since there are many.
+    they cross. So they are all red, as in the scheme of the paper, but paler, since there are many.
 
     Parameters
     ----------

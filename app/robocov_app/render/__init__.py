@@ -20,5 +20,5 @@ crowding, panel_grid
 
 import os
 
-# pygame prints a greeting to stdout, which belongs to the answers of commands.
+# pygame prints a greeting to stdout, which is reserved for the output of commands.
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")

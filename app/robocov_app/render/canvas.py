@@ -264,10 +264,11 @@ class Canvas:
         # Short arrows are only a head.
         head_length = min(_HEAD_LENGTH_FACTOR * width + _MIN_HEAD_LENGTH_PX * self.scale, length)
         half_bar = _BAR_FACTOR * width + _MIN_HALF_BAR_PX * self.scale
-        barbs = (
-            _list_bar_ends(tip, along, half_bar) if head == "bar" else _list_barbs(tip, along, head_length)
-        )
-        sketch = sprites.Sketch.from_points([tail.tolist(), *barbs], 2 * width)
+        if head == "bar":
+            head_points = _list_bar_ends(tip, along, half_bar)
+        else:
+            head_points = _list_barbs(tip, along, head_length)
+        sketch = sprites.Sketch.from_points([tail.tolist(), *head_points], 2 * width)
         if sketch is None:
             return
         shaft_end = tip
@@ -275,11 +276,11 @@ class Canvas:
             shaft_end = tip - _SHAFT_INSET_FACTOR * head_length * along
         sketch.draw_path([tail.tolist(), shaft_end.tolist()], color, width)
         if head == "full":
-            sketch.fill_polygon(barbs, color)
+            sketch.fill_polygon(head_points, color)
         elif head == "dot":
-            sketch.draw_dot(barbs[1], _DOT_FACTOR * width, color)
+            sketch.draw_dot(tip.tolist(), _DOT_FACTOR * width, color)
         else:
-            sketch.draw_path(barbs, color, width)
+            sketch.draw_path(head_points, color, width)
         sketch.draw_on(self.surface)
 
     def draw_sprite(self, sprite: Sprite, center: Pixel) -> None:

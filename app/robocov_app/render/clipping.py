@@ -41,7 +41,8 @@ def clip_polygon(corners: FloatArray) -> list[FloatArray]:
     Returns
     -------
     list of (m, 2) arrays, px
-        Outlines of the pieces; the polygon itself if nothing is clipped, none with under three corners.
+        Outlines of the pieces: the polygon itself if nothing is clipped; none if it has fewer than three
+        corners, or nothing of it is left.
     """
     if len(corners) < 3:
         return []

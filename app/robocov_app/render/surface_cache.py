@@ -46,7 +46,7 @@ class CachedRenderer(Generic[Arguments]):
         return surface
 
     def _add(self, key: object, surface: pygame.Surface) -> None:
-        """Cache a surface unless it is larger than the whole cache; drop others to make room."""
+        """Cache a surface unless it is larger than the whole cache; drop others to make space."""
         size = _count_bytes(surface)
         if size > self._max_bytes:
             return

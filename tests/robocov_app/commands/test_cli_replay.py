@@ -136,7 +136,7 @@ def test_runs_of_different_lengths_can_be_rendered_but_not_opened(both: Path, tm
     read_json(capsys, "replay", str(both), "--frames", *SMALL, "--fps", "2", "--out", str(tmp_path / "video"))
     assert len(read_frames(tmp_path / "video")) == 3 + 2
     assert read_error(capsys, "replay", str(both)) == (
-        f"{both}/lloyd: moments: expected 31 as in {both}/rpf, got 61; --frames and --video show both"
+        f"{both}/lloyd: states: expected 31 as in {both}/rpf, got 61; --frames and --video show both"
     )
 
 

@@ -332,7 +332,7 @@ def set_different_radius(record: Record) -> Record:
 @pytest.mark.parametrize(
     ("build_other", "message"),
     [
-        (lambda record: record_run(steps=5), r"saved/1: moments: expected 61 as in saved/0, got 6"),
+        (lambda record: record_run(steps=5), r"saved/1: states: expected 61 as in saved/0, got 6"),
         (lambda record: record_run(dt=1 / 50), r"saved/1: dt_s: expected 0.016\d* as in"),
         (lambda record: record_run(robots=3), r"saved/1: team: "),
         (

@@ -15,8 +15,8 @@ _LIMIT_FACTORS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _TICK_FACTORS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 _MAX_TICK_INTERVALS = 5
 _TOLERANCE = 1e-9
-_HATCH_LINE_FRACTION = 9
-"""The distance between lines of the hatching divided by their width."""
+_HATCH_SPACING_WIDTHS = 9
+"""Distance between the lines of the hatching, in widths of a line."""
 
 
 def choose_color_limit(distance: float) -> float:
@@ -121,7 +121,7 @@ def compute_color_levels(
     levels = distances.astype(np.uint8)
     if not is_reached.all():
         rows, columns = np.indices(is_reached.shape)
-        line_width = max(hatch_px // _HATCH_LINE_FRACTION, 1)
+        line_width = max(hatch_px // _HATCH_SPACING_WIDTHS, 1)
         is_on_line = (rows + columns) % hatch_px < line_width
         hatching = np.where(is_on_line, _HATCH_LEVEL, _UNREACHED_LEVEL)
         levels[~is_reached] = hatching[~is_reached]

@@ -10,7 +10,7 @@ from robocov_app.render.scene import Scene
 _MIN_SMOOTH_WIDTH_PX = 20.0
 """Mean width of cells, at scale 1, below which edges are not antialiased: the difference hardly shows."""
 _EDGE_STEPS_PER_PX = 16.0
-"""Corners count as equal if they are equal after rounding to this fraction of a pixel."""
+"""Corners count as equal if they are equal after rounding to this many steps per pixel."""
 
 
 def _is_colored_by_distance(canvas: Canvas, scene: Scene) -> bool:

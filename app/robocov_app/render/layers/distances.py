@@ -111,7 +111,8 @@ def render_geodesic_cells(
 ) -> pygame.Surface:
     """Render the geodesic cells, or only their borders if the distance map is visible, as a `FieldRenderer`.
 
-    Geodesic cells are the cells of the coverage cost: their points are nearest along paths around obstacles.
+    Geodesic cells are the cells of the coverage cost: a point belongs to the robot with the shortest path to
+    it around obstacles.
     """
     if "distances" in canvas.visible_layers:
         return _render_borders(canvas, field, x, y)

@@ -53,7 +53,7 @@ _BELIEF_DASH_PX = 3.0
 _FAILED_SIZE_FACTOR = 0.85
 """Size of failed robots compared with working ones."""
 _NUMBER_GAP_PX = 7.0
-"""Space between a failed robot and its number, where the ring of a selected robot has space."""
+"""Space between a failed or selected robot and its number, into which the ring of a selected one fits."""
 _INK_HALF_HEIGHT = 0.4
 """Half the height of digits, as a fraction of the text size."""
 _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
@@ -63,9 +63,8 @@ _NUMBER_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1))
 def compute_drawn_radii(canvas: Canvas, scene: Scene) -> FloatArray:
     """Compute the radii at which robots are drawn.
 
-    Discs are large enough for readable numbers. In a crowd they are smaller, but not below the true
-    radius. Very large discs are limited to `_MAX_RADIUS_PX`.
-    Robots of the same radius have discs of the same size.
+    Discs are large enough for readable numbers. In a crowd they are smaller, but not below the true radius.
+    Very large discs are limited to `_MAX_RADIUS_PX`. Robots of the same radius have discs of the same size.
 
     Parameters
     ----------

@@ -134,6 +134,7 @@ def _draw_moving_obstacle(
         if not isinstance(part, shapely.Polygon):
             continue
         corners = _get_corners(canvas, part.exterior)
+        # Filling would also cover the holes.
         if not part.interiors:
             canvas.fill_polygon(corners, (*fill, 255))
         canvas.draw_outline(corners, edge, 2 * width)

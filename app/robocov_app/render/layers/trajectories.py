@@ -102,7 +102,7 @@ class TrajectoriesLayer:
         self._draw_ends(canvas, _to_limited_pixels(canvas, trail[-1]).tolist(), pen)
 
     def _count_drawn_rows(self, trail: FloatArray) -> int:
-        """Return the number of rows of a trail are on the page: those up to the row that was drawn last.
+        """Return the number of rows of a trail that are on the page: those up to the row drawn last.
 
         They are fewer than in the last frame if older rows were removed since, and 0 if the trail does not
         contain the row that was drawn last.

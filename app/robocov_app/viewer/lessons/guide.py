@@ -115,7 +115,7 @@ class LessonGuide:
         self.player = LessonPlayer(self._viewer, self._fit_view, saved, is_unattended=self.is_unattended)
 
     def toggle(self) -> None:
-        """Leave the lesson or return to it; if none is open, start that of the open file or the last one."""
+        """Leave the lesson or return to it; else start the one in the open file or the last one."""
         if self.player is None:
             self.start(self._find_file())
         elif self.player.state is LessonState.LEFT:
@@ -166,6 +166,7 @@ class LessonGuide:
         return False
 
     def _handle_pause(self, player: LessonPlayer) -> bool:
+        """Explain why the chapter does not play on; return False if it can be paused or continued."""
         if player.state is LessonState.ASKING:
             self._viewer.show_message(explain_answering(self._viewer.view))
             return True

@@ -333,7 +333,7 @@ class LessonPage:
             self._draw_item("→", step)
 
     def _draw_item(self, sign: str, text: str, *, color: Color | None = None) -> None:
-        """Write a paragraph with a sign at its left, in a color or as text behind a green sign."""
+        """Write a paragraph with a sign at its left, both in one color; by default the sign is green."""
         self._write(sign, self.text_px, color or self.theme.start, bold=True)
         self._write_paragraph(text, color or self.theme.ink, indent=_ITEM_INDENT_PX, right_indent=0)
         self.y += _ITEM_GAP_PX * self.scale

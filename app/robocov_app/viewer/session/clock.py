@@ -8,13 +8,15 @@ from time import perf_counter
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Selectable speeds, simulated seconds per second; infinite for as fast as possible."""
 MAX_FRAME_S = 0.1
-"""Maximum real time of a frame that counts. Longer frames slow the simulation down."""
+"""Maximum real time that is counted for a frame. Longer frames slow the simulation down."""
 FRAME_BUDGET_S = 0.008
 """Maximum computing time for the simulation in each frame of a visible window."""
 MAX_SPEED_WITHOUT_BUDGET = 16.0
 """Speed that replaces an infinite one if the computing time of a frame is not limited."""
 _MAX_COMPARED_SPEED = 1e4
+"""Finite speed that replaces higher ones, such as an infinite one, in comparisons."""
 _STEP_TOLERANCE = 1e-9
+"""Fraction of a step that may be missing when the step is already due; absorbs rounding errors."""
 
 
 def format_speed(speed: float) -> str:
@@ -25,12 +27,12 @@ def format_speed(speed: float) -> str:
 
 
 def find_speed_index(speed: float) -> int:
-    """Return the index in `SPEEDS` of the speed that is nearest to a given one, by their ratio."""
+    """Return the index in `SPEEDS` of the speed whose ratio to a given one is nearest to 1."""
 
-    def compute_distance(index: int) -> float:
+    def compute_log_ratio(index: int) -> float:
         return abs(_compute_log(SPEEDS[index]) - _compute_log(speed))
 
-    return min(range(len(SPEEDS)), key=compute_distance)
+    return min(range(len(SPEEDS)), key=compute_log_ratio)
 
 
 def _compute_log(speed: float) -> float:

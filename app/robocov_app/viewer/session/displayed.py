@@ -71,7 +71,8 @@ class DisplayedState:
                 snapshot = select_working(simulation.observe_and_decide(), state.setup)
                 if state.recorded is None or has_same_forces(snapshot.decision, state.recorded):
                     return snapshot
-            # The memory and the messages are those of all robots.
+            # The state cannot be resumed as recorded: show the working robots alone. The recorded memory and
+            # messages do not fit them, because they are those of all robots.
             state = state._replace(memory=None, inbox=None)
         return rebuild_snapshot(state, self.time, dt)
 

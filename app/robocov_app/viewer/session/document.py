@@ -74,7 +74,6 @@ class Node:
     cached_states: list[RunState] = field(default_factory=list, repr=False)
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
     trails: dict[int, list[TrailSection]] = field(default_factory=dict, repr=False)
-
     automatic_events: set[AutomaticEvent] = field(default_factory=set, repr=False)
 
     @property

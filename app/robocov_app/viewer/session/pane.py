@@ -259,13 +259,14 @@ class Pane:
         """
         old = self.simulation
         setup = continuation.setup
-        has_same_robots = setup.simulated_numbers == self.setup.simulated_numbers
-        # An unchanged controller keeps its memory. Without memory, it is rebuilt, as on resuming.
-        keeps_controller = setup.controller == self.controller and has_memory(old.controller)
-        leaves_schedule = self.setup.follows_schedule and not setup.follows_schedule
-        controller = None if keeps_controller and not leaves_schedule else setup.controller.build()
         if self._differs_only_in_density(continuation):
             return old.with_density(setup.simulated_environment)
+        has_same_robots = setup.simulated_numbers == self.setup.simulated_numbers
+        # An unchanged controller keeps its memory, except for one of all robots of a schedule that ends here.
+        # A controller without memory is rebuilt, as when a recorded state is resumed.
+        is_same_controller = setup.controller == self.controller and has_memory(old.controller)
+        leaves_schedule = self.setup.follows_schedule and not setup.follows_schedule
+        controller = None if is_same_controller and not leaves_schedule else setup.controller.build()
         rows = self._find_rows(setup.simulated_numbers)
         if setup.follows_schedule:
             changed = self._build_on_schedule(continuation, controller)
@@ -323,7 +324,7 @@ class Pane:
         )
 
     def _find_rows(self, numbers: tuple[int, ...]) -> IntArray:
-        """Return the rows of robots in the simulation, given by their numbers, (n,); -1 for other robots."""
+        """Return the row of each of these robots in the simulation, (n,); -1 for robots that it lacks."""
         row_by_number = {number: row for row, number in enumerate(self.setup.simulated_numbers)}
         return np.array([row_by_number.get(number, -1) for number in numbers], dtype=np.intp)
 

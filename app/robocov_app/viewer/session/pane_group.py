@@ -92,7 +92,7 @@ class PaneGroup:
             if keeps_a_robot(conditions, len(positions)):
                 scheduled_robots = len(positions)
             else:
-                # `advance` adds and stops robots, and lets the last one work.
+                # `advance` adds and stops the robots, but never stops the last one.
                 conditions = conditions.drop_team_changes()
                 is_simulated = is_working
         velocities = None
@@ -169,10 +169,8 @@ class PaneGroup:
         events: list[AutomaticEvent] = []
         for number in now.numbers:
             if number not in before.all_numbers:
-                text = (
-                    f"robot {number} joined{self._describe_offset(number, self._find_join_position(number))}"
-                )
-                events.append(AutomaticEvent(self.step, "robot", text))
+                offset = self._describe_offset(number, self._find_join_position(number))
+                events.append(AutomaticEvent(self.step, "robot", f"robot {number} joined{offset}"))
         events += [
             AutomaticEvent(self.step, "failure", f"robot {number} failed")
             for number in before.numbers
@@ -281,8 +279,8 @@ class PaneGroup:
                 continue
             position = self._find_join_position(number)
             self.apply(AddRobot(number, position))
-            text = f"robot {number} joined{self._describe_offset(number, position)}"
-            events.append(AutomaticEvent(self.step, "robot", text))
+            offset = self._describe_offset(number, position)
+            events.append(AutomaticEvent(self.step, "robot", f"robot {number} joined{offset}"))
         return events
 
     def _find_join_position(self, number: int) -> Point:

@@ -173,7 +173,6 @@ def cache_present(document: SessionDocument, present: Present) -> None:
             node.trails[pane.number] = merge_sections(
                 pane.trail.extract(node.first_step * dt, end_time), node.trails.get(pane.number, [])
             )
-
             for quantity, curve in pane.curves.items():
                 merged = curve.extract(node.first_step * dt, end_time)
                 merged.extend(node.curves[pane.number, quantity])
@@ -207,7 +206,7 @@ def _restore_trail(path: list[Node], last_steps: Mapping[int, int], pane: Pane, 
     for node, following in zip(path, [*path[1:], None], strict=True):
         end = last_steps[node.number] * dt
         if following is None:
-            # The first row of a following node replaces the row of its step; the last node keeps that row.
+            # A row at the end of a node belongs to the node that follows; that of the last node is included.
             end += _STEP_MARGIN * dt
         sections += [section.cut(-np.inf, end) for section in node.trails.get(pane.number, [])]
     simulated = pane.trail.extract(-np.inf, np.inf)
@@ -260,8 +259,9 @@ def _restore_panes(document: SessionDocument, old: Present, new: Present) -> Ite
     path = document.get_path(new.head)
     last_steps = document.get_last_steps(new.head, new.run.step)
     old_last_step = document.get_last_steps(old.head, old.run.step).get(new.head.number, -1)
-    is_earlier = new.run.step <= old_last_step
-    old_panes = {pane.number: pane for pane in old.run.panes} if is_earlier else {}
+    # Sensed points can be copied if the new present lies on the path to the old one.
+    is_in_old_past = new.run.step <= old_last_step
+    old_panes = {pane.number: pane for pane in old.run.panes} if is_in_old_past else {}
     dt = new.run.scenario.dt
     for pane in new.run.panes:
         _restore_trail(path, last_steps, pane, dt)

@@ -40,7 +40,7 @@ _PERIOD_TOLERANCE = 1e-6
 _TIME_TOLERANCE = 1e-6
 """Relative tolerance of the times of a record, which are rounded."""
 _STEP_TOLERANCE = 1e-3
-"""The same as a fraction of the interval between two times."""
+"""Absolute tolerance of these times, as a fraction of the interval between two of them."""
 _FORCE_TOLERANCE = 1e-9
 
 
@@ -134,7 +134,7 @@ def _describe_run(record: Record) -> Mapping[str, object]:
     """Return the properties that runs must share to be displayed side by side."""
     return {
         "dt_s": record.dt,
-        "moments": len(record),
+        "states": len(record),
         "team": record.team.to_dict(),
         "robots": build_roster(record).numbers,
         "conditions": record.conditions,

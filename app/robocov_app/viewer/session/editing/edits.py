@@ -44,7 +44,7 @@ def _load_density(model: Any, context: Any) -> Density | None:
 
 
 def _dump_density(density: Density | None, _: object) -> object:
-    """Return a density as in a map file. Densities are only written with a map, so a square serves as one."""
+    """Return a density as in a map file. `to_json` writes whole maps only, so a square serves as the map."""
     square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
     return to_json(square.with_density(density)).get("density")
 
@@ -167,7 +167,7 @@ class RemoveRobot(RobotEdit):
 
     def build_continuation(self, pane: Pane) -> Continuation:
         """Return the setup and state with which a pane continues after the edit."""
-        _find_row(pane, self.robot)
+        _find_row(pane, self.robot)  # raises if there is no such robot
         _require_another_robot(pane, self.robot)
         return _change_robot(pane, self.robot)
 
@@ -354,9 +354,10 @@ def compare_obstacles(before: Environment, after: Environment) -> EditObstacles:
     """
     old = before.obstacles
     new = after.obstacles
-    first = _count_equal(old, new)
-    last = _count_equal(old[first:][::-1], new[first:][::-1])
-    return EditObstacles(first, len(old) - first - last, new[first : len(new) - last])
+    equal_at_start = _count_equal(old, new)
+    equal_at_end = _count_equal(old[equal_at_start:][::-1], new[equal_at_start:][::-1])
+    removed = len(old) - equal_at_start - equal_at_end
+    return EditObstacles(equal_at_start, removed, new[equal_at_start : len(new) - equal_at_end])
 
 
 def _count_equal(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:

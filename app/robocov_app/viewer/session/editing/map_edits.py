@@ -116,7 +116,8 @@ def find_obstacle(environment: Environment, point: Point, reach: float = 0.0) ->
     Returns
     -------
     int or None
-        Index of the nearest obstacle; if several contain the point, of the topmost one; None without one.
+        Index of the nearest obstacle; if several contain the point, of the topmost one; None if no obstacle
+        is within reach.
     """
     polygons = [obstacle.polygon for obstacle in environment.obstacles]
     distances = shapely.distance(polygons, shapely.Point(point))

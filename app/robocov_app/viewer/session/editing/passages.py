@@ -11,6 +11,7 @@ from robocov.typing import FloatArray
 _WIDTH_TOLERANCE = 1e-6
 """Relative amount by which a gap may be narrower than a robot and still count as wide enough."""
 _QUARTER_SEGMENTS = 4
+"""Number of line segments that approximate a quarter of a circle around a corner."""
 _MIN_WHOLE_AREA_M2 = 10.0  # larger areas are rounded to whole numbers
 
 

@@ -65,7 +65,7 @@ def _check_robot(robot: int | None, source_name: str, path: _Path, robot_count: 
 
 
 def _check_condition(condition: ConditionModel, source_name: str, path: _Path, robot_count: int) -> None:
-    """Check that a condition can be fulfilled: it has one, and a robot and a box belong together."""
+    """Check that a condition is not empty, has a robot and a box or neither, and that these are valid."""
     boxes = {"inside": condition.inside, "outside": condition.outside}
     has_box = any(box is not None for box in boxes.values())
     has_robot = condition.robot is not None

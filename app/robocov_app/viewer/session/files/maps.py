@@ -91,6 +91,8 @@ class FileContext:
         ------
         MapError
             If the map cannot be used.
+        PydanticCustomError
+            If there is no map with this number.
         """
         if number not in self._environments:
             self._environments[number] = self._load_environment(number)

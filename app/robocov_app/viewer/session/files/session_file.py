@@ -40,8 +40,8 @@ _REWRITES = (
     (r"a valid ", "a "),
     (r".* should have (.*?)( after validation)?(, not \d+)?$", r"\1"),
 )
-# In the location of a validation error, pydantic inserts the kind that it has chosen after `KEY, index` for
-# each KEY of these.
+# In the location of a validation error, pydantic inserts the kind of item that it has chosen two places after
+# each of these keys: after the key itself and an index or a name.
 _STEPS_BEFORE_KIND = ("changes", "added", "maps", "gains")
 
 
@@ -249,7 +249,7 @@ class _NodeReader:
     """
 
     def __init__(self, source_name: str, nodes: list[Node]) -> None:
-        self._where = source_name
+        self._source_name = source_name
         self._nodes = nodes
 
     def read(self, model: NodeModel) -> Node:
@@ -272,7 +272,7 @@ class _NodeReader:
         return node
 
     def _reject(self, path: tuple[str | int, ...], value: object, expected: str) -> None:
-        reject_value(self._where, ("edits", len(self._nodes), *path), value, expected)
+        reject_value(self._source_name, ("edits", len(self._nodes), *path), value, expected)
 
     def _check_parent(self, model: NodeModel) -> None:
         is_first = not self._nodes

@@ -100,7 +100,7 @@ def _decide(seen: Observations, state: PaneState) -> Decision:
     if controller is None:
         return no_forces
     try:
-        # The controller may change its memory in place, but it may be asked about this state again.
+        # The controller may change its memory in place, but this state may be displayed again.
         memory = deepcopy(state.memory)
         if memory is None:
             memory = controller.begin(state.setup.sensed_environment.region, state.setup.team)

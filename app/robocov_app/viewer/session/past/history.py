@@ -84,6 +84,7 @@ class RunHistory:
         self.states.append(state)
         self._sizes.append(size)
         self._bytes += size
+        # Thin repeatedly, until the states fit or no more of them can be removed.
         previous_count = len(self) + 1
         while self._bytes > self.max_bytes and MIN_STATES < len(self) < previous_count:
             previous_count = len(self)
@@ -96,7 +97,7 @@ class RunHistory:
         self.append(state)
 
     def rewind(self, last: RunState) -> None:
-        """Remove the states after a given one, which becomes the newest one again."""
+        """Remove the states after a given one, which becomes the newest one again, even if it was removed."""
         while self.states and self.last is not last and self.last.step >= last.step:
             self._remove_last()
         if not self.states or self.last is not last:

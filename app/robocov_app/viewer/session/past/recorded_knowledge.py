@@ -1,4 +1,4 @@
-"""What robots remembered at each state of a record, which files do not contain, computed by simulation."""
+"""Memories and messages of robots at each state of a record, which are recomputed: files lack them."""
 
 from contextlib import suppress
 from copy import deepcopy
@@ -13,7 +13,8 @@ from robocov.simulation import Simulation, TeamState
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 _MAX_ROBOTS_WITH_MESSAGES = 30
-"""Messages of all pairs of robots need memory: of larger teams, only those of the last state are kept."""
+"""Maximum size of a team whose messages are kept for every state. Those of a larger team are kept only for
+the last state, because the memory that they need grows with the number of pairs of robots."""
 
 
 class Knowledge(NamedTuple):

@@ -21,7 +21,7 @@ from robocov_app.viewer.session.setup.scenario import SessionScenario
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """Map, controller and robots of a pane, which change only by edits.
+    """Map, controller and robots of a pane, which change only by edits and by the conditions.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class PaneSetup:
     conditions : Conditions or None
         Conditions of the simulation. Robots fail and join by them only if the setup follows a schedule.
     scheduled_robots : int
-        If the simulation lets robots fail and join by its conditions: number of all robots, from 1 on, which
-        are the rows of the simulation. 0 if the simulation contains the working robots alone.
+        Number of all robots, if the simulation lets them fail and join by its conditions: its rows are then
+        the robots 1 to this number. 0 if the simulation contains the working robots alone.
     """
 
     environment: Environment
@@ -71,7 +71,7 @@ class PaneSetup:
 
     @property
     def simulated_environment(self) -> Environment:
-        """The map of the simulation. On a schedule, the simulation adds robots that fail by itself."""
+        """The map of the simulation. On a schedule, the simulation itself adds failed robots as obstacles."""
         if self.follows_schedule:
             return self.environment
         return self.sensed_environment

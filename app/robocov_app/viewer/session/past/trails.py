@@ -178,7 +178,7 @@ class Trail:
             self.numbers, dict(self._starts), self._positions[open_rows], self._times[open_rows]
         )
         sections: list[TrailSection] = []
-        # The first row of a section replaces a row of the same time before it.
+        # The first row of a section replaces a row of the same time in the section before it.
         for section in [open_section, *reversed(self._closed_sections)]:
             part = section.cut(start, end)
             if len(part.times):
@@ -196,9 +196,11 @@ class Trail:
             self.change_robots(later.numbers)
             self._starts = {**later.starts, **self._starts}
             self._start_arrays = {}
-            chunk = max(MAX_TRAIL_ROWS // 8, 1)
-            for first in range(0, len(later.times), chunk):
-                self._append_rows(later.positions[first : first + chunk], later.times[first : first + chunk])
+            # A chunk fits into the space that `_simplify` makes.
+            chunk_rows = max(MAX_TRAIL_ROWS // 8, 1)
+            for first in range(0, len(later.times), chunk_rows):
+                rows = slice(first, first + chunk_rows)
+                self._append_rows(later.positions[rows], later.times[rows])
 
     def _append_rows(self, positions: FloatArray, times: FloatArray) -> None:
         while self._count + len(times) > len(self._times):

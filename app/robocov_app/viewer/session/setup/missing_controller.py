@@ -54,7 +54,7 @@ class MissingController(ControllerChoice):
 
     def decide(self, seen: Observations, memory: None) -> Decision:
         """Raise a ParameterError with the reason."""
-        replace(self, is_placeholder=False).build()
+        replace(self, is_placeholder=False).build()  # always raises
         raise AssertionError
 
 

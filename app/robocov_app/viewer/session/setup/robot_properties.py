@@ -118,7 +118,7 @@ def _drop_defaults(properties: RobotProperties, serialize: Any) -> dict[str, Any
     """Serialize properties, but omit optional keys with default values."""
     optional: dict[str, object] = {
         "different": {},
-        "communication_range": None,
+        "communication_range": None,  # no limit
         "track_width": DEFAULT_TRACK_WIDTH_M,
         "turning_rate": DEFAULT_TURNING_RATE_RAD_S,
     }
