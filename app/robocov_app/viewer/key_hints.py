@@ -12,6 +12,15 @@ def explain_pause(view: ViewState) -> str:
     )
 
 
+def explain_download(view: ViewState) -> str:
+    """Return a hint on how to download a file that was saved in a browser."""
+    return _choose_hint(
+        view,
+        phone="More → Download copies it to your device.",
+        computer="Download copies it to your device.",
+    )
+
+
 def explain_kept_session(view: ViewState) -> str:
     """Return a hint that the session before the opened one is kept as a draft."""
     return f"Your unsaved session is kept: {_explain_recovery(view)}"

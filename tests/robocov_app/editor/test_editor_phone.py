@@ -118,6 +118,7 @@ def test_every_button_of_the_page_has_a_command(phone: EditorDriver) -> None:
     tools, others = (re.findall(r'"?([\w:]+)"?: "', text) for text in found.groups())
     commands = phone.window.commands
     assert set(tools) == set(phone.editor.toolbox.by_name)
+    others.remove("saved")  # opens a list of the page
     for name in (*others, "finish", "try", "delete", "save", "undo"):
         assert name in commands
 

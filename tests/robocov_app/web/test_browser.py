@@ -687,7 +687,7 @@ def test_a_finger_that_moves_to_the_side_moves_a_slider_of_the_panel(touch):
 
 
 def test_the_buttons_of_a_phone_are_large(shared_phone):
-    assert list_bar_buttons(shared_phone) == ["Play", "Undo", "Tools", "Settings", "Lesson", "More"]
+    assert list_bar_buttons(shared_phone) == ["Play", "Undo", "Tools", "Settings", "Lesson", "More", "1 here"]
     assert are_large(shared_phone.find_all("#touch button"))
     shared_phone.find("#to-more").click()
     assert are_large(shared_phone.find_all("#more button"))
@@ -706,6 +706,43 @@ def test_the_bar_of_a_phone_shows_the_chosen_tool(phone):
     button = phone.find("#to-tools")
     phone.wait_until(lambda: button.get_attribute("aria-label") == "Tools: Fail robot")
     assert button.text == "Tools", "users find it again"
+
+
+def list_lit_buttons(browser):
+    """Return the labels of the buttons in the bar of a phone that are highlighted."""
+    return [button.text for button in browser.find_all("#touch button.lit")]
+
+
+def test_one_button_of_the_bar_of_a_phone_is_lit(phone):
+    phone.find("#to-tools").click()
+    phone.find("[data-command='tool:failure']").click()
+    phone.wait_until(lambda: list_lit_buttons(phone) == ["Tools"])
+    phone.find("#panel").click()
+    phone.wait_until(lambda: list_lit_buttons(phone) == ["Settings"])
+    phone.find("#to-more").click()
+    assert list_lit_buttons(phone) == ["More"]
+    phone.find("#to-more").click()
+    assert list_lit_buttons(phone) == ["Settings"]
+
+
+def locate_bar_buttons(browser):
+    """Return the left edge of each visible button in the bar of a phone, CSS px, by its label."""
+    buttons = browser.find_all("#touch button")
+    return {button.text: button.rect["x"] for button in buttons if button.is_displayed()}
+
+
+def test_buttons_of_a_phone_stay_in_place_when_there_are_files_to_download(phone):
+    before = locate_bar_buttons(phone)
+    phone.find("#to-more").click()
+    sheet = {button.text: button.rect for button in phone.find_all("#more button") if button.is_displayed()}
+    push_button(phone, "#more button", "Save")
+    phone.wait_until(lambda: "saved" in get_classes(phone))
+    assert locate_bar_buttons(phone) == before
+    phone.find("#to-more").click()
+    for button in phone.find_all("#more button"):
+        assert button.text == "Download" or button.rect == sheet[button.text]
+    push_button(phone, "#more button", "Download")
+    assert phone.find("#saved a").text == "rooms-1.robocov"
 
 
 def test_the_bar_of_a_phone_undoes_an_edit(phone):
@@ -854,14 +891,16 @@ def check_saved_files(browser, *, has_touch):
     assert browser.find("#downloads").is_displayed() != has_touch
     if not has_touch:
         return
-    button = browser.find("#to-saved")
-    assert min(button.size.values()) >= 48
-    button.click()
+    more = browser.find("#to-more")
+    more.click()
+    push_button(browser, "#more button", "Download")
     assert browser.find("#saved a").text == "rooms-1.robocov"
     assert find_covering_elements(browser) == ["#saved"]
-    button.click()
+    more.click()
+    more.click()
     assert find_covering_elements(browser) == []
-    button.click()
+    more.click()
+    push_button(browser, "#more button", "Download")
     browser.find("#to-tools").click()
     assert find_covering_elements(browser) == [], "another sheet replaces it"
 

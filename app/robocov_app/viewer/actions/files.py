@@ -10,7 +10,12 @@ from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
 from robocov_app.terminal.output import find_free_path
-from robocov_app.viewer.key_hints import explain_kept_session, explain_lesson_start, explain_pause
+from robocov_app.viewer.key_hints import (
+    explain_download,
+    explain_kept_session,
+    explain_lesson_start,
+    explain_pause,
+)
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.files.drafts import describe_draft, find_recoverable_drafts
 from robocov_app.viewer.session.files.session_file import SUFFIX, load_session, save_session
@@ -157,7 +162,7 @@ class FileActions:
         message = f"{kind} saved: {path.absolute()}"
         if self._viewer.hidden_folder is None:
             return message
-        return f"{message}. Download copies it to your device."
+        return f"{message}. {explain_download(self._viewer.view)}"
 
     def list_sessions(self) -> list[str]:
         """Return the paths of the session files in the folder."""
