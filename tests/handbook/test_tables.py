@@ -11,6 +11,7 @@ import pytest
 from markdown_pages import find_code_blocks, find_file_name, list_handbook_pages
 
 from robocov_app.cli import main
+from robocov_app.runs import execution
 
 COMMAND_WITH_TABLE = re.compile(
     r"```sh\n(robocov (?:compare|cost) [^\n]*)\n```\n"  # the command
@@ -56,6 +57,8 @@ def test_each_command_prints_its_table(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    # The tables contain final costs. Costs over time take longer than the runs.
+    monkeypatch.setattr(execution, "DEFAULT_RATE_HZ", 0.1)
     tables = TABLES_BY_COMMAND[command]
     save_files_of_page(tables[0].page)
     _, *words = command.split()

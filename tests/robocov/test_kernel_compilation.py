@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -28,7 +29,6 @@ from robocov.kernel_compilation import (
     are_kernels_compiled,
     call_path_kernels,
     call_planning_kernels,
-    call_step_kernels,
     compile_in_background,
     compile_kernels,
 )
@@ -159,19 +159,41 @@ def test_examples_call_the_kernels_of_planned_routes() -> None:
         assert any(types.startswith(f"{position_type};") for types in nodes), nodes
 
 
+NET_FORCES = "robocov.world.dynamics.compute_net_forces"
+COMPILE_NET_FORCES = """
+import pickle, sys
+from pathlib import Path
+from robocov import kernel_compilation
+from robocov.compiled import interpret_kernels
+
+def step_simulation():
+    interpret_kernels(lambda name, arguments: name != sys.argv[2])
+    pickle.loads(Path(sys.argv[1]).read_bytes()).step()
+
+kernel_compilation.ALL_EXAMPLES = (step_simulation,)
+kernel_compilation.main()
+sys.stdin.read()  # As if it compiled further kernels.
+"""
+
+
 @pytest.mark.slow
 def test_kernels_are_interpreted_until_another_process_has_compiled_them(
-    empty_cache: Path, cluttered: Environment
+    empty_cache: Path, cluttered: Environment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     simulation = Simulation(cluttered, Rapf(), cluttered.start("uniform").sample(4, seed=1))
+    simulation_file = tmp_path / "simulation.pickle"
+    simulation_file.write_bytes(pickle.dumps(simulation))
+
+    def start_compilation_process() -> subprocess.Popen[bytes]:
+        """Start a process that only compiles this kernel."""
+        command = [sys.executable, "-P", "-c", COMPILE_NET_FORCES, str(simulation_file), NET_FORCES]
+        variables = {"PYTHONPATH": str(ROOT / "coverage")}
+        return subprocess.Popen(command, env=os.environ | variables, stdin=subprocess.PIPE)
+
+    monkeypatch.setattr(kernel_compilation, "_start_compilation_process", start_compilation_process)
     with compile_in_background():
-        simulation.step()
-        assert is_interpreting()
-        name = "robocov.world.dynamics.compute_net_forces"
         must_interpret = compiled._must_interpret
         assert must_interpret is not None
-        assert must_interpret(name, ())
-        wait_until(lambda: are_kernels_compiled([call_step_kernels]))
         interpreted: list[str] = []
 
         def record(kernel: str, arguments: tuple[Any, ...]) -> bool:
@@ -181,13 +203,16 @@ def test_kernels_are_interpreted_until_another_process_has_compiled_them(
             return is_interpreted
 
         interpret_kernels(record)
+        simulation.step()
+        assert NET_FORCES in interpreted
 
         def runs_as_machine_code() -> bool:
             interpreted.clear()
             simulation.step()
-            return name not in interpreted
+            return NET_FORCES not in interpreted
 
         wait_until(runs_as_machine_code)
+        assert interpreted, "the other kernels are not compiled yet"
     assert not is_interpreting()
 
 

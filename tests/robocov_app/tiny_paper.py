@@ -6,7 +6,7 @@ from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(
     name="quick",
-    duration=3.0,
+    duration=2.0,
     dt=0.05,
     bundled=("blocks-a",),
     generated=(1,),

@@ -114,15 +114,10 @@ for speeds in (None, np.array([0.3, 0.7, 0.3])):
 
 
 @pytest.mark.slow
-def test_bits_are_the_same_without_the_compiler_and_on_any_processor():
+def test_bits_are_the_same_without_the_compiler():
     script = PRINT_RESULTS.format(folder=str(Path(__file__).parents[1]))
-    environments = [
-        {},
-        {"NUMBA_DISABLE_JIT": "1"},
-        {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "OPENBLAS_CORETYPE": "Prescott"},
-    ]
     outputs = []
-    for variables in environments:
+    for variables in ({}, {"NUMBA_DISABLE_JIT": "1"}):
         process = subprocess.run(
             [sys.executable, "-c", script],
             env=os.environ | variables,
@@ -133,4 +128,3 @@ def test_bits_are_the_same_without_the_compiler_and_on_any_processor():
         outputs.append(process.stdout)
     assert len(outputs[0].split()) > 100
     assert outputs[1] == outputs[0]
-    assert outputs[2] == outputs[0]
