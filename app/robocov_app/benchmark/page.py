@@ -22,7 +22,7 @@ from robocov_app.benchmark.label_placement import (
     compute_nearest_points,
     place_labels,
 )
-from robocov_app.benchmark.ratings import Rating, format_number, shorten
+from robocov_app.benchmark.ratings import Rating, shorten
 from robocov_app.benchmark.results import describe_method, shares_maps_by_messages
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
@@ -173,7 +173,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
         styles=entries.styles,
-        overviews=_build_overviews(labels, tracks),
+        overviews=_build_overviews(labels, tracks, entries.information),
         anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
@@ -208,7 +208,7 @@ def _build_sort_key(rating: Rating) -> tuple[bool, float]:
 
 
 def _build_overviews(
-    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]
+    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], information: Mapping[str, str]
 ) -> list[tuple[str, str, PageTable]]:
     """Build the identifier, heading and table of each ranking for which there are runs.
 
@@ -218,17 +218,21 @@ def _build_overviews(
     for ranking, heading in suite.RANKINGS.items():
         ranked_tracks = {name: tracks[name] for name in suite.RANKED_TRACKS[ranking] if name in tracks}
         if ranked_tracks:
-            overviews.append((f"overview-{ranking}", heading, _build_overview(labels, ranked_tracks)))
+            overview = _build_overview(labels, ranked_tracks, information)
+            overviews.append((f"overview-{ranking}", heading, overview))
     if not overviews:
-        overviews.append(("overview-other", "Overview", _build_overview(labels, tracks)))
+        overviews.append(("overview-other", "Overview", _build_overview(labels, tracks, information)))
     return overviews
 
 
-def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> PageTable:
+def _build_overview(
+    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], information: Mapping[str, str]
+) -> PageTable:
     """Build the table of scores and gaps on some tracks.
 
     Entries that have all runs of all these tracks come first, ranked by mean score. The other entries have no
-    rank and follow in alphabetical order. A note lists the entries without any runs.
+    rank and follow in alphabetical order. Notes list the entries without any runs, and those that have the
+    smallest gap on a track but no rank.
     """
     by_label: dict[str, dict[str, Rating]] = {label: {} for label in labels}
     for name, track_ratings in tracks.items():
@@ -247,11 +251,38 @@ def _build_overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]
         rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
     headings = [suite.format_heading(name) for name in tracks]
     head = ("Controller", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
-    notes: tuple[str, ...] = ()
+    notes = []
+    competing = [label for label in labels if information[label] != _WHOLE_MAP]
+    leaders = _find_unranked_leaders({label: by_label[label] for label in competing}, scores, tracks)
+    if leaders:
+        notes.append(
+            "The best ranked controller is not the best on every track. Of the controllers that do not know "
+            "the whole map, these have the smallest gap on a track, but lack runs on others and have no "
+            f"rank: {'; '.join(leaders)}."
+        )
     missing = sorted((label for label in labels if not by_label[label]), key=str.casefold)
     if missing:
-        notes = (f"Without runs on these tracks: {'; '.join(missing)}.",)
-    return PageTable("Scores, and median gaps on each track, %", head, rows, notes=notes)
+        notes.append(f"Without runs on these tracks: {'; '.join(missing)}.")
+    return PageTable("Scores, and median gaps on each track, %", head, rows, notes=tuple(notes))
+
+
+def _find_unranked_leaders(
+    by_label: Mapping[str, Mapping[str, Rating]], ranked: Collection[str], tracks: Iterable[str]
+) -> list[str]:
+    """Return the label and the tracks of each entry that has the smallest gap on a track, but no rank."""
+    led_tracks: dict[str, list[str]] = {}
+    for track in tracks:
+        gaps = {
+            label: label_ratings[track].gap.estimate
+            for label, label_ratings in by_label.items()
+            if track in label_ratings and label_ratings[track].is_complete
+        }
+        if not gaps:
+            continue
+        leader = min(gaps, key=lambda label: gaps[label])
+        if leader not in ranked:
+            led_tracks.setdefault(leader, []).append(suite.format_heading(track))
+    return [f"{label} ({', '.join(names)})" for label, names in led_tracks.items()]
 
 
 def _compute_mean_scores(
@@ -275,14 +306,15 @@ def _build_overview_cells(
     suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)
     contacts = sum(row["contacts"] > 0 for row in rows)
     at_rest = sum(row["settled_at_s"] is not None for row in rows)
-    cells = [ratings.format_run_count(run_count, suite_run_count)]
-    cells += [f"{count / max(1, len(rows)):.0%}" for count in (contacts, at_rest)]
+    cells = [ratings.format_run_count(run_count, suite_run_count, run_count - len(rows))]
+    cells.append(f"{contacts / len(rows):.0%}" if rows else ratings.NO_VALUE)
+    cells.append(f"{at_rest / run_count:.0%}" if run_count else ratings.NO_VALUE)
     for name in tracks:
         rating = label_ratings.get(name)
         gap = np.nan
         if rating is not None and rating.is_complete:
-            gap = 100.0 * rating.gap.estimate
-        cells.append(format_number(gap, ".1f"))
+            gap = rating.gap.estimate
+        cells.append(ratings.format_gap(gap))
     return cells
 
 
@@ -321,8 +353,7 @@ def _build_incomplete_tables(track_ratings: Sequence[Rating], entries: _Entries)
     incomplete = [rating for rating in track_ratings if not rating.is_complete]
     tables = []
     for rating in incomplete[:MAX_INCOMPLETE_TABLES]:
-        keys = [ratings.get_run_key(row) for row in rating.rows]
-        compared = [yardstick.select_runs(keys) for yardstick in yardsticks]
+        compared = [yardstick.select_runs(rating.run_keys) for yardstick in yardsticks]
         caption = f"{rating.label}, incomplete and not ranked"
         if compared:
             caption += ", and others over the same runs"

@@ -18,6 +18,11 @@ from robocov_app.figures.statistics import Interval, bootstrap, estimate_median_
 
 NO_VALUE = "–"
 """Text of a cell whose value is unknown."""
+_INFINITE_GAP = "∞"
+"""Text of a cell with a gap that is infinite because runs failed."""
+_MAX_FINITE_GAP = 1e30
+"""Gap in place of an infinite one in resamples, because percentiles of infinite values are not defined. The
+gaps of all runs are smaller than its square root."""
 MIN_INTERVAL_MAPS = 12
 """Minimum number of maps for an interval. A 95% bootstrap interval contains the true value in 82% of all
 cases with 5 maps, and in 92% with 12."""
@@ -67,17 +72,19 @@ NOTES = (
     "and so does a run that covers a different area from the reference. The score of an entry depends on no "
     "other entry. Only entries with all runs of a track are ranked on it.",
     "Gap: J / J_ref − 1 at the end. Columns give its median over runs, the 95% interval of the median "
-    "(bootstrap over maps, for at least 12 maps), the mean and the worst. J_ref is that of the reference: "
+    "(bootstrap over maps, for at least 12 maps), the mean and the worst. The gap of a run that failed, or "
+    "that covers a different area from the reference, is infinite (∞). J_ref is that of the reference: "
     "the best known placement, not a proven optimum, so gaps may be too small. The number in brackets cannot "
     "be too small: it is the median gap to bound, J / J_bound − 1, where J_bound is a proven lower bound. It "
     "is given if all bounds are known. They are certified for J as it is computed, a sum over 128 x 128 "
     "sites, not for the integral that it approximates.",
     "Within 5%: the time from which J stays within 5% of its final value. ∫J / J_ref: the integral of J "
     "over the run, divided by J_ref. Path: mean path length of a robot. Both are medians over runs, and so "
-    "are the other columns, with these exceptions. Runs with contacts: those in which a robot touched a "
-    "wall or another robot. Settled: the fraction of runs at whose end no robot moves 5 cm or more within "
-    "4 s, and the Kaplan-Meier median of the time at which this begins; runs that do not settle are "
-    "censored.",
+    "are the other columns, with these exceptions. Failed runs count as infinite in all medians, so that no "
+    "entry improves by failing. Runs with contacts: those runs among the finished ones in which a robot "
+    "touched a wall or another robot. Settled: the fraction of runs at whose end no robot moves 5 cm or "
+    "more within 4 s, and the Kaplan-Meier median of the time at which this begins; runs that fail or do "
+    "not settle are censored. Plots leave out entries whose median gap is infinite.",
     "B/s: bytes that a robot sends per second, received or not: 20 for each position (number, position), "
     "and the sizes of the messages of its controller, in which robots share maps and reports about other "
     "robots. The controller itself declares these sizes. µs/s: processor time of the controller per robot "
@@ -102,8 +109,8 @@ class Rating:
         Name of the track.
     rows : sequence of Mapping
         Rows of the runs that did not fail.
-    failed : int
-        Number of runs that failed.
+    failed_rows : sequence of Mapping
+        Rows of the runs that failed.
 
     Attributes
     ----------
@@ -116,21 +123,37 @@ class Rating:
     label: str
     track: str
     rows: Sequence[Mapping[str, Any]]
-    failed: int
+    failed_rows: Sequence[Mapping[str, Any]] = ()
 
     def get_values(self, metric: str) -> FloatArray:
         """Return the values of a metric in the runs that have one, (m,)."""
         return np.array([row[metric] for row in self.rows if row[metric] is not None], dtype=float)
 
     def compute_median(self, metric: str) -> float:
-        """Return the median of a metric over the runs; nan if no run has a value."""
+        """Return the median of a metric over the runs; nan if no run has a value.
+
+        Failed runs count as infinite, so that no entry improves by failing.
+        """
         values = self.get_values(metric)
-        return float(np.median(values)) if len(values) else float("nan")
+        if not len(values):
+            return float("nan")
+        return float(np.median([*values, *[np.inf] * len(self.failed_rows)]))
 
     @property
     def run_count(self) -> int:
         """Number of runs, including failed ones."""
-        return len(self.rows) + self.failed
+        return len(self.rows) + len(self.failed_rows)
+
+    @property
+    def run_keys(self) -> list[RunKey]:
+        """Map and seed of each run, including failed ones."""
+        return [get_run_key(row) for row in (*self.rows, *self.failed_rows)]
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Gap of each run in `run_keys`; infinite if the run failed or covers a different area."""
+        gaps = [np.inf if row["gap"] is None else row["gap"] for row in self.rows]
+        return np.array([*gaps, *[np.inf] * len(self.failed_rows)])
 
     @property
     def is_complete(self) -> bool:
@@ -145,19 +168,23 @@ class Rating:
     @property
     def gap(self) -> Interval:
         """Median gap to the reference placement, with an interval if there are enough maps."""
-        maps = [row["map"] for row in self.rows if row["gap"] is not None]
-        gaps = self.get_values("gap")
-        if not maps:
-            return Interval(np.nan, np.nan, np.nan)
+        maps = [map_name for map_name, _ in self.run_keys]
         if len(set(maps)) < MIN_INTERVAL_MAPS:
-            return Interval(float(np.median(gaps)), np.nan, np.nan)
-        return bootstrap(gaps, "median", maps)
+            return Interval(float(np.median(self.gaps)), np.nan, np.nan)
+        interval = bootstrap(np.minimum(self.gaps, _MAX_FINITE_GAP), "median", maps)
+        limits = (interval.estimate, interval.low, interval.high)
+        # Percentiles between a finite and an infinite gap are interpolated, and count as infinite, too.
+        estimate, low, high = (np.inf if gap > np.sqrt(_MAX_FINITE_GAP) else gap for gap in limits)
+        return Interval(estimate, low, high)
 
     def select_runs(self, keys: Iterable[RunKey]) -> "Rating":
-        """Return the rating over the runs with the given keys, without failed runs."""
+        """Return the rating over the runs with the given keys, including those that failed."""
         selected = set(keys)
-        rows = [row for row in self.rows if get_run_key(row) in selected]
-        return replace(self, rows=rows, failed=0)
+        return replace(
+            self,
+            rows=[row for row in self.rows if get_run_key(row) in selected],
+            failed_rows=[row for row in self.failed_rows if get_run_key(row) in selected],
+        )
 
     def compute_rest(self) -> tuple[float, float | None]:
         """Compute the fraction of runs that came to rest, and the median time until rest.
@@ -168,12 +195,13 @@ class Rating:
             Fraction of the runs in which the team has settled.
         time : float or None
             Kaplan-Meier estimate of the median time to rest, s; None if most runs did not come to rest.
+            Failed runs count as runs that did not come to rest.
         """
         rest_times = self.get_values("settled_at_s").tolist()
-        fraction = len(rest_times) / max(1, len(self.rows))
+        fraction = len(rest_times) / max(1, self.run_count)
         if not rest_times:
             return fraction, None
-        censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest_times))
+        censored = [suite.TRACKS[self.track].duration] * (self.run_count - len(rest_times))
         median = estimate_median_time(rest_times, censored)
         return fraction, median if np.isfinite(median) else None
 
@@ -250,7 +278,8 @@ def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating
             if not runs:
                 continue
             rows = [row for row in runs if "error" not in row]
-            rating = Rating(label, track, rows, failed=len(runs) - len(rows))
+            failed_rows = [row for row in runs if "error" in row]
+            rating = Rating(label, track, rows, failed_rows)
             ratings.setdefault(track, []).append(rating)
     return ratings
 
@@ -296,6 +325,11 @@ def format_number(value: float | None, format_spec: str = ".3g") -> str:
     return f"{value:{format_spec}}"
 
 
+def format_gap(gap: float) -> str:
+    """Format a gap in percent; a dash stands for nan."""
+    return _INFINITE_GAP if np.isposinf(gap) else format_number(100.0 * gap, ".1f")
+
+
 def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
     """Build the row of a rating in the table of its track.
 
@@ -312,61 +346,52 @@ def build_rating_cells(rating: Rating, information: str) -> dict[str, str]:
         Cells by the columns in `HEAD`, in the same order.
     """
     gap = rating.gap
-    gaps = rating.get_values("gap")
-    mean_gap = 100.0 * float(np.mean(gaps)) if len(gaps) else None
-    worst_gap = 100.0 * float(np.max(gaps)) if len(gaps) else None
     fraction_at_rest, rest_time = rating.compute_rest()
-    rest_text = f"{fraction_at_rest:.0%}" if rating.rows else NO_VALUE
     contacts = sum(row["contacts"] > 0 for row in rating.rows)
-    interval = NO_VALUE if np.isnan(gap.low) else f"{100.0 * gap.low:.1f}–{100.0 * gap.high:.1f}"
+    interval = NO_VALUE if np.isnan(gap.low) else f"{format_gap(gap.low)}–{format_gap(gap.high)}"
     return {
         "Controller": rating.label,
         "Knows": information,
         "Score, %": format_number(100.0 * rating.score, ".1f"),
-        "Runs": _format_runs(rating, len(gaps)),
-        "Gap, %": format_number(100.0 * gap.estimate, ".1f") + _format_bound(rating, len(gaps)),
+        "Runs": _format_runs(rating),
+        "Gap, %": format_gap(gap.estimate) + _format_bound(rating),
         "95%": interval,
-        "Mean": format_number(mean_gap, ".1f"),
-        "Worst": format_number(worst_gap, ".1f"),
+        "Mean": format_gap(float(np.mean(rating.gaps))),
+        "Worst": format_gap(float(np.max(rating.gaps))),
         "Within 5%, s": format_number(rating.compute_median("near_final_s"), ".0f"),
         "∫J / J_ref, s": format_number(_compute_cost_integral(rating), ".0f"),
         "Path, m": format_number(rating.compute_median("path_length_m"), ".1f"),
         "Work, J": format_number(rating.compute_median("work_J"), ".0f"),
         "Runs with contacts": f"{contacts} of {len(rating.rows)}",
-        "Settled": rest_text,
+        "Settled": f"{fraction_at_rest:.0%}",
         "Settled, s": format_number(rest_time, ".0f"),
         "B/s": format_number(rating.compute_rate("sent_bytes"), ".0f"),
         "µs/s": format_number(1e6 * rating.compute_rate("deciding_s"), ".0f"),
     }
 
 
-def format_run_count(count: int, total: int) -> str:
-    """Format the number of runs of an entry, with their total number if some are missing."""
-    return str(count) if count == total else f"{count} of {total}"
+def format_run_count(count: int, total: int, failed: int) -> str:
+    """Format the number of runs of an entry, with their total number if some are missing or failed."""
+    text = str(count) if count == total else f"{count} of {total}"
+    return f"{text}, {failed} failed" if failed else text
 
 
-def _format_runs(rating: Rating, gap_count: int) -> str:
-    """Return the numbers of runs, failed runs and runs without a gap as text.
-
-    `gap_count` is the number of runs with a gap.
-    """
-    text = format_run_count(rating.run_count, len(list_run_keys(rating.track)))
-    if rating.failed:
-        text += f", {rating.failed} failed"
-    if gap_count < len(rating.rows):
-        text += f", {len(rating.rows) - gap_count} without gap"
+def _format_runs(rating: Rating) -> str:
+    """Return the numbers of runs, failed runs and runs without a gap as text."""
+    text = format_run_count(rating.run_count, len(list_run_keys(rating.track)), len(rating.failed_rows))
+    missing_count = sum(row["gap"] is None for row in rating.rows)
+    if missing_count:
+        text += f", {missing_count} without gap"
     return text
 
 
-def _format_bound(rating: Rating, gap_count: int) -> str:
-    """Return the median gap to bound in brackets; empty unless all bounds are known.
-
-    `gap_count` is the number of runs with a gap.
-    """
-    gaps_to_bound = rating.get_values("gap_to_bound")
-    if not gap_count or len(gaps_to_bound) != gap_count:
+def _format_bound(rating: Rating) -> str:
+    """Return the median gap to bound in brackets; empty unless all bounds are known."""
+    gaps_to_bound = [row["gap_to_bound"] for row in rating.rows if row["gap"] is not None]
+    if not gaps_to_bound or None in gaps_to_bound:
         return ""
-    return f" (≤ {100.0 * float(np.median(gaps_to_bound)):.1f})"
+    missing_count = rating.run_count - len(gaps_to_bound)
+    return f" (≤ {format_gap(float(np.median([*gaps_to_bound, *[np.inf] * missing_count])))})"
 
 
 def _compute_cost_integral(rating: Rating) -> float | None:
@@ -378,7 +403,9 @@ def _compute_cost_integral(rating: Rating) -> float | None:
             ratios.append(row["mean_distance_over_run_m"] / reference_cost)
     if not ratios:
         return None
-    return float(np.median(ratios)) * suite.TRACKS[rating.track].duration
+    missing_count = rating.run_count - len(ratios)
+    median = float(np.median([*ratios, *[np.inf] * missing_count]))
+    return median * suite.TRACKS[rating.track].duration
 
 
 def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -395,14 +422,15 @@ def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[
     rows : list of tuple of str
         One row for each rating.
     """
-    families = list(dict.fromkeys(suite.FAMILY_OF[row["map"]] for rating in ratings for row in rating.rows))
+    run_keys = [key for rating in ratings for key in rating.run_keys]
+    families = list(dict.fromkeys(suite.FAMILY_OF[map_name] for map_name, _ in run_keys))
     table = []
     for rating in ratings:
         cells = [rating.label]
         for family in families:
-            rows = [row for row in rating.rows if suite.FAMILY_OF[row["map"]] == family]
-            gap = replace(rating, rows=rows).compute_median("gap")
-            cells.append(format_number(100.0 * gap, ".1f"))
+            keys = [key for key in rating.run_keys if suite.FAMILY_OF[key[0]] == family]
+            gaps = rating.select_runs(keys).gaps
+            cells.append(format_gap(float(np.median(gaps))) if keys else NO_VALUE)
         table.append(tuple(cells))
     return ("Controller", *families), table
 

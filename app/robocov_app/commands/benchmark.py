@@ -25,7 +25,8 @@ _OPTIONS_BY_ACTION = {
 _EXPLANATIONS = {
     "Score, %": "Score: mean of J_ref / J over the runs; J is the final cost, J_ref that of the best known "
     "placement.\n  Halved for a run with a contact, and halved again if the team has not settled.",
-    "Gap, %": "Gap: median of J / J_ref - 1; in brackets that of J / J_bound - 1 for a proven lower bound.",
+    "Gap, %": "Gap: median of J / J_ref - 1; in brackets that of J / J_bound - 1 for a proven lower bound.\n"
+    "  The gap of a failed run is infinite.",
     "95%": "95%: confidence interval of the median gap, for at least 12 maps.",
     "Worst": "Worst: largest gap of a run.",
     "Within 5%, s": "Within 5%: time from which the cost stays within 5% of its final value, median.",

@@ -364,16 +364,80 @@ def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:
     assert ratings.compute_score({**row, "contacts": 1}) == 0.4
     assert ratings.compute_score({**row, "settled_at_s": None}) == 0.4
     assert ratings.compute_score({**row, "gap": None}) == 0.0
-    two_runs = ratings.Rating("", "ideal", [{**row, "map": "rooms", "seed": 0}], failed=1)
+    two_runs = ratings.Rating("", "ideal", [{**row, "map": "rooms", "seed": 0}], [row])
     assert two_runs.score == 0.4
 
 
 def test_intervals_require_at_least_12_maps() -> None:
-    rows = [{"map": str(k), "gap": 0.1 * k} for k in range(ratings.MIN_INTERVAL_MAPS)]
-    assert np.isfinite(ratings.Rating("", "ideal", rows, 0).gap.low)
-    gap = ratings.Rating("", "ideal", rows[1:], 0).gap
+    rows = [{"map": str(k), "seed": 0, "gap": 0.1 * k} for k in range(ratings.MIN_INTERVAL_MAPS)]
+    assert np.isfinite(ratings.Rating("", "ideal", rows).gap.low)
+    gap = ratings.Rating("", "ideal", rows[1:]).gap
     assert np.isnan(gap.low)
     assert gap.estimate == pytest.approx(0.6)
+
+
+def build_failing_rating(failed_count: int) -> ratings.Rating:
+    """Build a rating on 20 maps, some of whose runs failed; the others have small values."""
+    names = suite.TRACKS["ideal"].maps[:20]
+    rows = [
+        {**row, "map": name}
+        for name, row in zip(names, build_result("Mine", 0.01)["rows"][:1] * 20, strict=True)
+    ]
+    failed_rows = [{"track": "ideal", "map": name, "seed": 0, "error": ""} for name in names[:failed_count]]
+    return ratings.Rating("Mine", "ideal", rows[failed_count:], failed_rows)
+
+
+def test_failed_runs_count_as_infinite() -> None:
+    """No value of an entry improves if runs fail in which the controller would do badly."""
+    some = ratings.build_rating_cells(build_failing_rating(9), "own")
+    assert (some["Runs"], some["Gap, %"], some["95%"]) == ("20 of 142, 9 failed", "1.0", "1.0–∞")
+    assert (some["Mean"], some["Worst"], some["Settled"]) == ("∞", "∞", "55%")
+    most = ratings.build_rating_cells(build_failing_rating(11), "own")
+    assert (most["Gap, %"], most["95%"]) == ("∞", "1.0–∞")
+    for column in ("Within 5%, s", "∫J / J_ref, s", "Path, m", "Work, J", "Settled, s", "B/s", "µs/s"):
+        assert some[column] != ratings.NO_VALUE and most[column] == ratings.NO_VALUE
+    bounded_rating = build_failing_rating(11)
+    for row in bounded_rating.rows:
+        row |= {"gap_to_bound": 0.02}  # type: ignore[operator]
+    assert ratings.build_rating_cells(bounded_rating, "own")["Gap, %"] == "∞ (≤ ∞)"
+
+
+def test_a_run_with_another_area_has_an_infinite_gap() -> None:
+    row = {"map": "rooms", "seed": 0, "gap": None}
+    assert ratings.Rating("", "ideal", [row]).gap.estimate == np.inf
+
+
+def test_failed_runs_are_selected_and_have_gaps_by_families() -> None:
+    rating = build_failing_rating(12)
+    assert rating.select_runs(rating.run_keys) == rating
+    assert rating.select_runs(rating.run_keys[-2:]).run_count == 2
+    head, (row,) = ratings.build_family_rows([rating])
+    # The first twelve maps are the bundled ones.
+    assert dict(zip(head, row, strict=True)) == {
+        "Controller": "Mine",
+        "bundled": "∞",
+        "polygons": "1.0",
+        "blocks": "1.0",
+    }
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_entries_with_failed_runs_are_neither_in_plots_nor_hidden() -> None:
+    failing = build_result("Failing", 0.1)
+    failing["rows"][0] = {"track": "ideal", "map": MAPS[0], "seed": 0, "error": "it failed"}
+    page = build_page([failing, build_result("Mine", 0.2), build_bundled_rapf()], "Test")
+    descriptions = re.findall(r"Median gap against .*?\.", page)
+    assert descriptions and not any("Failing" in description for description in descriptions)
+    overview = page.partition('id="overview-core"')[2].partition("</section>")[0]
+    row = re.search(r"<tr>[^\n]*Failing.*?</tr>", overview)
+    assert row is not None and "2, 1 failed" in row[0] and "50%" in row[0] and "∞" in row[0]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_unranked_entries_with_the_smallest_gap_are_named() -> None:
+    """The oracle has even smaller gaps, but does not compete."""
+    page = build_page(load_results_of("atlas-shared", "rapf", "oracle"), "Test")
+    assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
 
 
 def test_teams_that_never_move_or_end_far_above_rapf_are_found() -> None:
@@ -482,7 +546,7 @@ def test_invalid_commands_are_rejected(
 @given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
 def test_the_median_time_to_rest_is_that_of_kaplan_and_meier(runs: list[tuple[float, bool]]) -> None:
     rows = [{"settled_at_s": time if has_settled else None} for time, has_settled in runs]
-    fraction, median = ratings.Rating("", "ideal", rows, 0).compute_rest()
+    fraction, median = ratings.Rating("", "ideal", rows).compute_rest()
     # Runs that did not settle are censored at the end, so the curve is the fraction that still moves.
     times = sorted(row["settled_at_s"] for row in rows if row["settled_at_s"] is not None)
     expected = None

@@ -20,7 +20,7 @@ def format_row(controller: str, track: str) -> str:
     """Return the row of a controller's results on a track."""
     rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
     assert not any("error" in row for row in rows)
-    rating = Rating(controller, track, rows, 0)
+    rating = Rating(controller, track, rows)
     medians = {}
     for name in suite.TRACKS[track].maps:
         gaps = [row["gap"] for row in rows if row["map"] == name and row["gap"] is not None]
@@ -92,7 +92,7 @@ def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
     expected = []
     for name in names:
         rows = [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"]
-        expected.append(f"{100.0 * Rating(name, 'ideal', rows, 0).gap.estimate:.1f}")
+        expected.append(f"{100.0 * Rating(name, 'ideal', rows).gap.estimate:.1f}")
     assert gaps == expected
 
 
@@ -156,13 +156,13 @@ def test_results_in_tunnels_agree_with_the_entries(controller: str) -> None:
 def compute_median_gap(controller: str, track: str) -> float:
     """Return the median gap of a controller on a track, %."""
     rows = [row for row in read_result(ENTRIES / f"{controller}.json.gz")["rows"] if row["track"] == track]
-    return 100.0 * Rating(controller, track, rows, 0).gap.estimate
+    return 100.0 * Rating(controller, track, rows).gap.estimate
 
 
 def test_results_of_the_trained_policy_agree_with_the_entries() -> None:
     text = " ".join((PAGE.parent / "learning.md").read_text(encoding="utf-8").split())
     rows = [row for row in read_result(ENTRIES / "learned.json.gz")["rows"] if row["track"] == "ideal"]
-    rating = Rating("learned", "ideal", rows, 0)
+    rating = Rating("learned", "ideal", rows)
     assert f"the median gap of `learned` is {100.0 * rating.gap.estimate:.1f}%" in text
     assert sum(row["contacts"] for row in rows) == 0
     assert rating.compute_rest()[0] == 0.0
