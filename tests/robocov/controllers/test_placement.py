@@ -214,6 +214,19 @@ def test_robots_reach_their_goals_around_walls(kind: type[PlacementController]) 
     assert np.count_nonzero(final[:, 0] > 3) in (1, 2)
 
 
+@pytest.mark.parametrize("offset", [4e-7, -4e-7])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_robot_halfway_between_two_rooms_has_a_route(
+    kind: type[PlacementController], offset: float
+) -> None:
+    # The robot fits into the door, but not with its clearance. The rounding of its position decides in which
+    # of the two rooms its goal is.
+    walls = (WallObstacle(((3, 0), (3, 2.885)), 0.2), WallObstacle(((3, 3.115), (3, 6)), 0.2))
+    narrow = Environment("narrow door", SQUARE.boundary, walls)
+    simulation = Simulation(narrow, kind(nodes=40), [[3.0 + offset, 3.0]])
+    assert np.isfinite(simulation.run(1.0).positions).all()
+
+
 def test_gains_are_checked() -> None:
     with pytest.raises(ParameterError, match=r"local-search\.nodes: .*whole number from 16 to 20000"):
         make_controller("local-search", {"nodes": 50.5})

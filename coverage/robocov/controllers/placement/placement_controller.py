@@ -278,7 +278,9 @@ class PlacementController(WholeMapController):
             goals[robot] = plans[knowledge]
             start = find_nearest_inside(planner.configuration_space, seen.positions[robot][None])[0]
             path = planner.paths.find_path(start, goals[robot, robot])
-            routes.append(path[1:])
+            # Rounding may have moved the known position, and with it the goal, to another component. There is
+            # no path then, and the robot stays.
+            routes.append(path[1:] if len(path) > 0 else start[None])
         return replace(
             memory,
             sightings=sightings,
