@@ -12,7 +12,8 @@
 - `exploration`: controllers that build the map while they cover the region
 - `known_cells`, `known_map`, `convex_chart`, `driving`: cells, maps, velocities and forces, for several
   controllers
-- `gaussian_process`: a Gaussian process of the density, given measurements
+- `gaussian_process`, `square_grid`: a Gaussian process of the density, given measurements, and the squares in
+  which robots measure it
 - `density_exchange`: messages with measurements of the density
 """
 

@@ -341,7 +341,8 @@ class Lattice:
     functions: FloatArray
     """(k, m) K at the samples."""
     squares: FloatArray
-    """(s, 2) m, centers of the squares with one measurement each."""
+    """(s, 2) m, centers of the squares with one measurement each. They divide the bounding box of the region,
+    and are rectangles unless this is a square."""
     sample_covariance: FloatArray
     """(k, s) Covariances of φ at the samples and at the centers of the squares."""
     square_covariance: FloatArray

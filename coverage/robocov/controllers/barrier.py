@@ -111,7 +111,7 @@ class Barrier(BaseController):
         desired = (velocities - seen.velocities) / self.response_time
         accelerations, memory = self.certify(seen, memory, desired)
         forces = accelerations * team.mass[:, None] + seen.velocities * team.viscosity[:, None]
-        # The correction by the barriers is counted from the part of Lloyd's acceleration that is possible.
+        # The correction by the barriers is the difference from the attainable part of Lloyd's acceleration.
         scale = team.max_acceleration / np.maximum(np.hypot(*desired.T), _MIN_NORM)
         attainable = desired * np.minimum(1.0, scale)[:, None]
         corrections = (accelerations - attainable) * team.mass[:, None]

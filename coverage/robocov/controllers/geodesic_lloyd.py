@@ -223,6 +223,7 @@ class GeodesicPlanner:
         unique_positions, rows = np.unique(np.vstack([positions, free_received]), axis=0, return_inverse=True)
         results = self.cost.evaluate_teams(unique_positions[:, None])
         distances = np.array([result.distances for result in results])
+        # Rows of `distances` that belong to the position of each robot, and to those that it has received.
         own_rows = rows[:n]
         neighbor_ends = np.cumsum([len(received) for received in received_positions])
         neighbor_rows = np.split(rows[n:][received_rows], neighbor_ends[:-1])

@@ -104,7 +104,7 @@ class RangeLimited(BaseController):
 
     Each robot moves to the centroid of its limited cell: the part of its Voronoi cell within half the
     interaction range r. The robots within r determine it, because a robot farther away than r is farther
-    than r/2 from all of it.
+    than r/2 from each of its points.
 
     Notes
     -----

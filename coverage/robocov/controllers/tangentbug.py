@@ -581,7 +581,8 @@ class Navigator:
         assert state.fixed_goal is not None
         rays = np.arange(len(self.view.free_distances))
         if len(ends) == 2:
-            # The contour extends counter-clockwise from one end to the other.
+            # The contour extends counter-clockwise from one end to the other. The rays are sorted, so that
+            # `argmin` chooses the one with the lowest index if several points are equally near.
             first = ends[CLOCKWISE].ray + 1
             count = (ends[COUNTERCLOCKWISE].ray - first) % len(rays)
             rays = np.sort((first + np.arange(count)) % len(rays))

@@ -1,7 +1,8 @@
 """Planning by one robot: its map of the obstacles, routes between them, and goals for robots.
 
 - `raster`, `discovered_map`: square cells, and the occupancy grid that a robot builds from scans
-- `scan_log`: the scans that a robot has, and the map that it builds from them
+- `scan_log`, `scan_areas`: the scans that a robot has, the map that it builds from them, and the cells that a
+  scan can change
 - `openness`: the probability that an unknown cell is free
 - `window`, `map_window`: the cells of the map in a window, and a lattice of nodes
 - `lattice`, `portals`, `lattice_graph`: the edges between the nodes, and the shortest distances along them

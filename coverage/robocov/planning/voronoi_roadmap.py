@@ -72,7 +72,7 @@ class VoronoiRoadmap(NamedTuple):
         # Each group of adjacent cells of the graph becomes a vertex, at its first cell. Two vertices are
         # connected if their groups touch. Finally, the other free cells are added to the nearest group.
         is_in_graph = find_voronoi_cells(has_clearance)
-        # On a line, a group contains at least `steps` cells.
+        # Along a line, a group contains more than `steps` cells, unless other groups leave it fewer.
         steps = max(1, math.ceil(max(spacing, np.count_nonzero(is_in_graph) / max_vertices)))
         first_cells, vertex_of_cell = _group_cells(is_in_graph, steps, _NEIGHBOR_STEPS)
         vertices = np.column_stack(np.divmod(first_cells, has_clearance.shape[1]))

@@ -4,10 +4,10 @@ Robots send three kinds of messages, each to all robots in communication range:
 
 - *Scans* (`NumberedScan`). A robot sends each of its own scans once, when it takes it: 542 bytes for 240
   rays.
-- *Digests* (`Digest`). With each scan, a robot sends a list of the scans that it has and of its
-  neighbors: 8 bytes, and 12 bytes and 1 bit for each robot of the team.
-- *Repairs*. A robot sends scans that are missing in the digest of another robot again, also those that it
-  has received from third robots: at most `MAX_REPAIRS` for each scan that it takes.
+- *Digests* (`Digest`). With each scan, a robot sends a list of the scans that it has, and a list of its
+  neighbors: 8 bytes, plus 12 bytes and 1 bit for each robot of the team.
+- *Repairs*. If a digest shows that a neighbor lacks scans that a robot has, its own or received ones, the
+  robot sends these again: at most `MAX_REPAIRS` for each scan that it takes.
 
 In this way, lost scans are sent again, scans reach robots out of range over several hops, and robots that
 meet again exchange the scans that they have missed. A robot never sends more than the conditions allow.
