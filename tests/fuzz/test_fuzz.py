@@ -17,8 +17,8 @@ pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="select() works with pipes on POSIX only"),
 ]
 
-CASE_COUNT = 120
-CASE_COUNTS = {"dxf": 40}
+CASE_COUNT = 80
+CASE_COUNTS = {"dxf": 30}
 """Fewer cases for formats with slow libraries."""
 
 

@@ -45,9 +45,10 @@ BEST = {
 }
 PAPERS = build_paper_contenders(BEST)
 
-both = pytest.mark.parametrize(
-    "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]
-)
+# Tests in one process generate the maps only once.
+in_one_process = pytest.mark.xdist_group("maps of the full study")
+FULL_STUDY = pytest.param(FULL, marks=[pytest.mark.slow, in_one_process])
+both = pytest.mark.parametrize("plan", [FULL_STUDY, QUICK], ids=["full", "quick"])
 
 
 class TestMaps:
@@ -154,6 +155,7 @@ class TestMaps:
             assert [p <= ALPHA for p in p_values] == [True] * 2 + [False] * 4
 
     @pytest.mark.slow
+    @in_one_process
     def test_unseen_maps_are_of_other_families(self):
         unseen = {each.name: each.environment for each in study_maps.build_unseen_maps(FULL)}
         assert list(unseen)[:4] == ["blocks-301", "blocks-302", "blocks-303", "rooms-301"]
@@ -171,6 +173,7 @@ class TestMaps:
 
 class TestPaper:
     @pytest.mark.slow
+    @in_one_process
     def test_the_full_study_has_the_documented_size(self):
         assert len(study_maps.build_claim_maps(FULL)) == len(study_maps.build_convex_maps(FULL)) == 100
         study = studies.build_claims_contest(FULL, PAPERS).study
@@ -272,6 +275,7 @@ class TestBeyond:
                 assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
 
     @pytest.mark.slow
+    @in_one_process
     def test_our_controller_runs_as_often_as_rapf_in_the_full_study(self):
         assert FULL.beyond.own_seeds == FULL.seeds
         assert min(len(FULL.beyond.maps), len(FULL.beyond.conditions_maps)) >= MIN_MAPS
@@ -332,6 +336,7 @@ class TestBeyond:
         assert 1 <= len(GAIN_GRIDS[name][0]) <= 3
 
     @pytest.mark.slow
+    @in_one_process
     def test_baselines_are_tuned_on_separate_maps_in_the_full_study(self):
         study = studies.build_baseline_gains_study(FULL)
         assert study is not None
