@@ -171,9 +171,16 @@ def _choose_robot_positions(free: MultiPolygon, conversion: Conversion) -> Float
     for k in np.flatnonzero(fits).tolist():
         previous = positions[:k][fits[:k]]
         fits[k] = (np.hypot(*(previous - positions[k]).T) >= 2 * clearance).all()
-    count = f"{int(fits.sum())} of {format_count(len(robots), 'position')}"
-    note = f'start "robots": {count} of robots in the file'
-    if fits.sum() < len(robots):
-        note = f"{note}; robots do not fit at the others"
-    conversion.notes.append(note)
+    conversion.notes.append(_describe_robots_of_file(fitting_count=int(fits.sum()), count=len(robots)))
     return np.asarray(positions[fits])
+
+
+def _describe_robots_of_file(fitting_count: int, count: int) -> str:
+    """Return a note on the start "robots", with the number of positions at which robots fit."""
+    if fitting_count == 0:
+        places = "the position" if count == 1 else f"any of the {count} positions"
+        return f'no start "robots": no robot fits at {places} of robots in the file'
+    note = f'start "robots": {fitting_count} of {format_count(count, "position")} of robots in the file'
+    if fitting_count < count:
+        note = f"{note}; robots do not fit at the others"
+    return note
