@@ -121,7 +121,7 @@ class CommandBar(CommandPart):
         raise NotImplementedError
 
     def list_left_cells(self, ui: Ui, width: float) -> list[BarCell]:
-        """Return the cells at the left end: undo, redo and the file, which take at most a width, px."""
+        """Return the cells at the left end: undo, redo and the file, in at most a width, px at scale 1."""
         file = self.get_file()
         undo_reason = "" if file.can_undo else NO_UNDO_REASON
         redo_reason = "" if file.can_redo else NO_REDO_REASON
@@ -227,12 +227,12 @@ class CommandBar(CommandPart):
 
 
 def build_space(width: float) -> BarCell:
-    """Return an empty cell of a width, px."""
+    """Return an empty cell of a width, px at scale 1."""
     return BarCell(width, _show_nothing)
 
 
 def measure_cells(cells: list[BarCell]) -> float:
-    """Return the width of cells with the gaps between them, at scale 1, px."""
+    """Return the width of cells with the gaps between them, px at scale 1."""
     return sum(cell.width for cell in cells) + _GAP_PX * max(len(cells) - 1, 0)
 
 

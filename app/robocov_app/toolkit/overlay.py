@@ -124,10 +124,10 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
             lines[-1] += f" {word}"
             continue
         lines.append("")
-        for letter in word:
-            if lines[-1] and measure_text(lines[-1] + letter, size, bold) > width:
+        for character in word:
+            if lines[-1] and measure_text(lines[-1] + character, size, bold) > width:
                 lines.append("")
-            lines[-1] += letter
+            lines[-1] += character
     return lines
 
 
@@ -185,7 +185,7 @@ def draw_status(
     box : Box
     theme : Theme
     scale : float
-        Size of texts.
+        Scale of the texts and margins.
     facts : list of str
         Texts shown from the left; the last ones are omitted if there is not enough space.
     hint : str
@@ -228,7 +228,7 @@ def draw_message(
     arena : Box
     theme : Theme
     scale : float
-        Size of the text.
+        Scale of the text and the box.
     is_error : bool
         Whether it is drawn in the color of errors.
     is_at_top : bool

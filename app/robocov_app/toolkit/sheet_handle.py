@@ -1,4 +1,4 @@
-"""The handle of a sheet: the strip above a panel by which it is tapped or dragged closed."""
+"""The handle of a sheet: the strip above a panel, which closes the panel when tapped or dragged down."""
 
 from collections.abc import Callable
 

@@ -160,7 +160,7 @@ class Choice(Dialog):
         self._draw_scroll_bar(ui, len(options))
 
     def _draw_scroll_bar(self, ui: Ui, count: int) -> None:
-        """Draw which of the options are visible, over their right ends; nothing if all of them are."""
+        """Draw the scroll bar over the right ends of the options; nothing if all of them are visible."""
         boxes = [widget.rect for widget in ui.widgets.values() if widget.kind == "option"]
         if ui.surface is None or count <= len(boxes):
             return

@@ -35,8 +35,8 @@ def find_nearest_on_edges(
     along = ends - starts
     # Edges of length 0 are divided by 1 instead.
     squared = np.einsum("kd,kd->k", along, along)
-    part = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
-    feet = starts + np.clip(part, 0.0, 1.0)[:, None] * along
+    fractions = np.einsum("kd,kd->k", np.array(point) - starts, along) / np.where(squared > 0.0, squared, 1.0)
+    feet = starts + np.clip(fractions, 0.0, 1.0)[:, None] * along
     return feet, np.hypot(*(feet - point).T)
 
 
@@ -57,4 +57,5 @@ def constrain_angle(origin: Point, point: Point) -> Point:
     """Move a point to the nearest line through `origin` whose angle is a multiple of `SHIFT_ANGLE_DEG`."""
     cos, sin = compute_cos_sin(SHIFT_ANGLE_DEG * round(compute_bearing(origin, point) / SHIFT_ANGLE_DEG))
     along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
+    # Adding 0.0 turns -0.0 into 0.0.
     return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0

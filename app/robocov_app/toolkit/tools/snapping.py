@@ -17,11 +17,10 @@ SnapKind: TypeAlias = Literal[
 ]
 KINDS: frozenset[SnapKind] = frozenset(get_args(SnapKind))
 
-
 MAX_ALIGNMENT_REACHES = 60.0  # maximum distance of aligned points, relative to the reach
 MAX_MOVED_POINTS = 16  # points of a dragged object that are tried
 MAX_EDGE_LINES = 4  # edges near a point that are combined with other lines
-_PARALLEL = 1e-9
+_PARALLEL = 1e-9  # sine of the angle below which lines are parallel
 _MIN_SHIFT_M = 1e-9  # a smaller shift along an axis means that nothing has snapped along it
 _EDGE_TOLERANCE_M = 1e-9
 
@@ -260,7 +259,7 @@ class _SnapLine:
             point = (_round_to_multiple(foot[0], grid), foot[1])
         else:
             point = (foot[0], _round_to_multiple(foot[1], grid))
-        is_beyond_end = self.kind == "edge" and math.dist(self.find_foot(point), point) > _PARALLEL
+        is_beyond_end = self.kind == "edge" and math.dist(self.find_foot(point), point) > _EDGE_TOLERANCE_M
         return None if is_beyond_end else point
 
     def build_guide(self, point: Point) -> Guide:

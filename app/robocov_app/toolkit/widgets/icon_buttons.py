@@ -85,8 +85,8 @@ def show_icon_button(
         _draw_icon(page, icon, icon_rect, _ICON_PX, ink)
         if shortcut:
             faint = ink if selected else page.theme.faint
-            place = _place_shortcut(page, rect, in_corner=not has_label)
-            draw_text(page, shortcut, place, faint, _KEY_TEXT_PX, align="right")
+            shortcut_box = _place_shortcut(page, rect, in_corner=not has_label)
+            draw_text(page, shortcut, shortcut_box, faint, _KEY_TEXT_PX, align="right")
     return is_clicked
 
 

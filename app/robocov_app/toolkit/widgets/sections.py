@@ -3,6 +3,9 @@
 from robocov_app.toolkit.widgets.appearance import SMALL_TEXT_PX, draw_box, draw_focus_ring, draw_text, shade
 from robocov_app.toolkit.widgets.page import Page, Widget
 
+_HOVERED_SHADE = 0.06
+"""Fraction of the color of text behind a title under the mouse."""
+
 
 def show_section(page: Page, title: str, *, key: str = "", starts_open: bool = True) -> bool:
     """Show the title of a section; a click on it hides or shows the content.
@@ -32,7 +35,7 @@ def show_section(page: Page, title: str, *, key: str = "", starts_open: bool = T
     is_open = starts_open is not is_toggled
     widget.value = is_open
     if page.is_hovered(rect):
-        draw_box(page, rect, shade(page, 0.06))
+        draw_box(page, rect, shade(page, _HOVERED_SHADE))
     symbol = "▸"
     if is_open:
         symbol = "▾"

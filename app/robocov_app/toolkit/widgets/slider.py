@@ -28,7 +28,7 @@ _MIN_SPAN = 1e-300
 """Avoids a division by zero."""
 
 _KEY_STEPS = {"left": -1, "down": -1, "right": 1, "up": 1}
-_STEPS_OF_KEYS = 50
+_KEY_PRESSES_PER_RANGE = 50
 """Number of arrow key presses from one end to the other, if `step` is 0."""
 FINE_FRACTION = 0.1
 """Fraction by which drags and arrow keys move a slider while Shift is held down, if `step` is 0."""
@@ -141,7 +141,7 @@ def _read_input(page: Page, key: str, value: float, values: _Range) -> float:
     steps: float = _KEY_STEPS.get(name.removeprefix("shift+"), 0)
     if is_fine:
         steps *= FINE_FRACTION
-    return value + steps * (values.step or values.span / _STEPS_OF_KEYS)
+    return value + steps * (values.step or values.span / _KEY_PRESSES_PER_RANGE)
 
 
 def _drag_finely(page: Page, values: _Range) -> float:

@@ -87,7 +87,7 @@ class ToolTip:
 
     @property
     def is_due(self) -> bool:
-        """Whether the mouse has rested long enough over a widget that it has not pressed."""
+        """Whether the mouse has rested long enough over a widget that was not pressed."""
         if self._is_dismissed:
             return False
         return self.is_immediate or perf_counter() - self._rested_since_s >= TIP_DELAY_S

@@ -54,7 +54,7 @@ class ExceptionGuard:
             Name of the action, such as "drawing".
         call : callable
         create_save_point : callable, optional
-            Called before; returns the function that reverts the changes if `call` raises.
+            Called before `call`; returns the function that reverts the changes if `call` raises.
 
         Returns
         -------

@@ -28,6 +28,7 @@ _CLOSING_GRACE_S = 3.0
 _CLOSED_GRACE_S = 0.1
 """Time for Python to exit once everything is closed."""
 _FLUSH_S = 0.2
+"""Maximum time for writing the drafts."""
 _POLL_S = 0.02
 
 _active: _Watcher | None = None
