@@ -12,7 +12,7 @@ from robocov_app.viewer.chart.scale import TOP_PX
 
 # Position of the tag relative to the pointer's column and the top of the curves, px at scale 1.
 _LEFT_PX = 12
-_TOP_GAP_PX = 16
+_TOP_GAP_PX = 32  # below the badges of events
 _RULE_STRENGTH = 0.35
 
 
