@@ -1,1 +1,1 @@
-"""Application layer of robocov: command line, figures, frames and videos."""
+"""Application layer of robocov: command line, windows, figures, videos, reports, sweeps and benchmarks."""

@@ -38,7 +38,7 @@ def select_gains(controllers: Sequence[str], gains: Mapping[str, Any]) -> list[d
             raise ParameterError(f"--set {key}: {describe_unknown_name('controller', owner, known_gains)}")
         candidates = [owner] if owner else controllers
         if not any(gain in known_gains[name] for name in candidates):
-            all_gains = {gain for name in candidates for gain in known_gains[name]}
+            all_gains = set().union(*(known_gains[name] for name in candidates))
             raise ParameterError(f"--set {key}: {describe_unknown_name('gain', gain, all_gains)}")
         for name, values in zip(controllers, selected, strict=True):
             if name in candidates and gain in known_gains[name]:

@@ -33,7 +33,7 @@ DISTANCE_AXIS = ValueAxis(DISTANCE, "m")
 _MIN_EXPONENT_VALUE = 1e7
 """From this value on, final values may have an exponent."""
 _MIN_THOUSANDS_VALUE = 1e4
-"""From this value on, final values have thousands separators instead of decimals."""
+"""From this value on, units other than meters and percent have thousands separators and no decimals."""
 _MIN_SHORT_VALUE = 10.0
 """From this value on, units other than meters have four significant digits instead of three decimals."""
 MAX_FILLED_BANDS = 2
@@ -147,8 +147,9 @@ def format_end_label(curve: TimeCurve, unit: str = "m") -> str:
     ----------
     curve : TimeCurve
     unit : str
-        Meters have three decimals, percentages have one; large values in other units have four significant
-        digits.
+        Meters have three decimals, and percentages have one. In other units, values below 10 have three
+        decimals, and larger ones have four significant digits or are whole numbers. Values from 10 million
+        have an exponent in any unit.
 
     Returns
     -------

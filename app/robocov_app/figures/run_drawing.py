@@ -200,7 +200,11 @@ def _choose_colors(record: Record, theme: Theme, scheme: ColorScheme, adjacency:
         final_colors = [theme.final] * robots
     else:
         final_colors = [choose_trail_color(theme, hue) for hue in hues.tolist()]
-    has_own_colors = has_color_per_robot(robots, scheme)
+    starts = [theme.start] * robots
+    numbers = [theme.ink] * robots
+    if has_color_per_robot(robots, scheme):
+        starts = trails
+        numbers = trails
     failed = record.is_present[-1] & ~record.is_working[-1]
     for robot in np.flatnonzero(failed).tolist():
         final_colors[robot] = theme.failed_robot
@@ -209,9 +213,9 @@ def _choose_colors(record: Record, theme: Theme, scheme: ColorScheme, adjacency:
         cells = [theme.get_paper_cell_color(hue) for hue in hues[working].tolist()]
     return _RunColors(
         trails=trails,
-        starts=trails if has_own_colors else [theme.start] * robots,
+        starts=starts,
         robots=final_colors,
-        numbers=trails if has_own_colors else [theme.ink] * robots,
+        numbers=numbers,
         cells=cells,
     )
 
@@ -236,18 +240,24 @@ def _draw_cells(
     theme : Theme
     """
     polygons = []
-    faces = []
+    owners = []
     for outline, owner in zip(*outlines, strict=True):
         if len(outline) > 2:
             polygons.append(outline)
-            if fills is not None:
-                faces.append(to_plot_color(fills[int(owner)]))
+            owners.append(int(owner))
+    face_colors: Any = "none"
+    edge_width = _OUTLINED_CELL_EDGE_WIDTH_PT
+    order: float = _OUTLINED_CELLS_ORDER
+    if fills is not None:
+        face_colors = [to_plot_color(fills[owner]) for owner in owners]
+        edge_width = _CELL_EDGE_WIDTH_PT
+        order = _CELLS_ORDER
     collection = PolyCollection(
         polygons,
-        facecolors="none" if fills is None else faces,
+        facecolors=face_colors,
         edgecolors=to_plot_color(theme.cell_edge),
-        linewidths=_OUTLINED_CELL_EDGE_WIDTH_PT if fills is None else _CELL_EDGE_WIDTH_PT,
-        zorder=_OUTLINED_CELLS_ORDER if fills is None else _CELLS_ORDER,
+        linewidths=edge_width,
+        zorder=order,
         # A single cell has no edge in the region.
         label=legend.FINAL_VORONOI_CELL if len(polygons) > 1 else "",
     )

@@ -12,7 +12,7 @@ controller, and `ControllerPolicy` lets a controller act in an environment.
     env = CoverageEnv(
         duration=20.0, dt=0.05, repeat=5, action="velocity", reward_every=999, observation=layout
     )
-    offsets = [0, 1, 2, 3, 4, 5, 7, 8, 10, 11]  # x and y of all in an observation, without the masks
+    offsets = [0, 1, 2, 3, 4, 5, 7, 8, 10, 11]  # x and y of all vectors in an observation
 
 
     def policy(gains):  # a velocity along each offset: away from neighbors, to the middle, ...

@@ -181,7 +181,7 @@ class Episode:
 
     Attributes
     ----------
-    working : (n,) array of bool
+    is_working : (n,) array of bool
         Which robots have joined and not failed.
     coverage, initial_coverage : CoverageResult
         Coverage cost when it was last evaluated, and at the start.

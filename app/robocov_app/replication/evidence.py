@@ -269,7 +269,7 @@ def describe_failures(outcomes: Outcomes, summary: ContenderSummary) -> str:
 
 
 def _list_failures(summary: ContenderSummary) -> str:
-    """Return a sentence with the failures that are frequent enough to report; empty if there are none."""
+    """Return a sentence with the frequent failures, or that there was no contact; empty otherwise."""
     failures = (
         (summary.contact_fraction, "robots touch a wall or each other in {} of the runs"),
         (summary.blocked_fraction, "a wall is between {} of the robots and their goals at the end"),
@@ -294,8 +294,8 @@ def describe_tuning(controller: str, outcomes: GainOutcomes) -> str:
     varied = [name for name in grid.gains[best] if len({gains[name] for gains in grid.gains}) > 1]
     values = ", ".join(f"{name} {format_value(grid.gains[best][name])}" for name in varied)
     defaults = dict(get_gain_values(make_controller(controller)))
-    default_rows = [k for k, gains in enumerate(grid.gains) if dict(gains) == defaults]
-    default_row = default_rows[0] if default_rows else None
+    default_rows = (row for row, gains in enumerate(grid.gains) if dict(gains) == defaults)
+    default_row = next(default_rows, None)
     means = [format_amount(mean) for mean in grid.relative_costs.mean(axis=1)]
 
     def describe_ratio(row: int) -> str:

@@ -134,7 +134,8 @@ def list_problems(result: ReportedResult) -> list[str]:
     max_stuck = max((run.metrics.get("stuck_robots") or 0 for run in runs), default=0)
     stuck_problem = "a robot was stuck at the end"
     if max_stuck > 1:
-        stuck_problem = f"{'' if len(runs) == 1 else 'up to '}{max_stuck} robots were stuck at the end"
+        limit = "" if len(runs) == 1 else "up to "
+        stuck_problem = f"{limit}{max_stuck} robots were stuck at the end"
     counts = {
         "a robot touched a wall or another robot": sum(
             (run.metrics.get("contacts") or 0) > 0 for run in runs

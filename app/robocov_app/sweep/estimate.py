@@ -137,7 +137,7 @@ def estimate_sweep(
 
 
 def _select_middle_tasks(tasks: Iterable[Task], counts: Counter[str]) -> dict[str, Task]:
-    """Return the middle task of each controller, whose number of robots is neither the first nor the last.
+    """Return the task in the middle of those of each controller.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, build_failure
 
 _MAX_ENDS_PER_TASK = 2
-"""Number of workers that a task may end before it counts as failed."""
+"""Number of workers that a task has ended when it counts as failed."""
 _MAX_CONSECUTIVE_ENDS = 20
 """Maximum number of workers that may end in a row, without any finished task in between."""
 _MAX_CONSECUTIVE_ENDS_PER_TASK = 4

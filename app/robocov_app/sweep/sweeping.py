@@ -271,6 +271,14 @@ def execute_tasks(
 class _RowWriter:
     """Writes the rows of a table in the order of the tasks, which may finish in any order.
 
+    Parameters
+    ----------
+    ledger : Ledger
+        Contains the results of finished tasks.
+    table : Table
+    tasks : iterator of (int, Task)
+        All tasks in order, each after 1 if it had to be executed, or 0 if an earlier run is reused.
+
     Attributes
     ----------
     finished : set of str
@@ -293,8 +301,8 @@ class _RowWriter:
     def write(self) -> None:
         """Write the next rows, up to the first task that has not finished."""
         while self._next_task is not None:
-            was_remaining, task = self._next_task
-            if was_remaining and task.name not in self.finished:
+            must_execute, task = self._next_task
+            if must_execute and task.name not in self.finished:
                 return
             if not self._write_row(task):
                 raise OutputError(f"{self._ledger.folder}: {task.name} was removed by another program")

@@ -87,6 +87,8 @@ class TestMaps:
         ring = Environment("ring", ((0, 0), (9, 0), (9, 9), (0, 9)), (block,))
         with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.45 m radius"):
             study_maps.replace_starts(ring)
+        with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.35 m radius"):
+            study_maps.replace_starts(ring, ("tight",))
 
     @pytest.mark.parametrize("seed", range(6))
     def test_convex_regions_are_convex_large_and_the_same_every_time(self, seed):

@@ -69,9 +69,13 @@ class Criterion:
     @property
     def refutation_p_value(self) -> float:
         """The p-value of the hypothesis that the true value is in the range."""
-        bounds = [(-math.inf, self.low), (self.high, math.inf)]
-        finite_bounds = [ends for ends in bounds if math.isfinite(ends[0]) or math.isfinite(ends[1])]
-        p_values = [self.interval.compute_p_value(*ends) for ends in finite_bounds]
+        # The true value is outside the range if it is below the lower end or above the upper end. There is a
+        # one-sided test for each end; the lower p-value counts, adjusted for their number by Bonferroni.
+        p_values = []
+        if math.isfinite(self.low):
+            p_values.append(self.interval.compute_p_value(-math.inf, self.low))
+        if math.isfinite(self.high):
+            p_values.append(self.interval.compute_p_value(self.high, math.inf))
         return min([1.0, *(len(p_values) * p_value for p_value in p_values)])
 
     @property

@@ -171,6 +171,7 @@ def _judge_rest_goals(finished: Outcomes, own: Contender, plan: Plan) -> list[Cl
         _build_goal(
             "contacts",
             f"{label} has no contacts.",
+            # This goal is about the runs of the study, in which there must be no contact at all.
             replace(criteria.contacts, high=0.0),
             f"{has_contact.sum()} of {len(has_contact)} runs.",
             finished,
@@ -304,7 +305,7 @@ def summarize_goals(goals: Sequence[Claim]) -> str:
 
 
 def judge_unseen(outcomes: Outcomes, own: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Judge our own controller on maps of other kinds than those of its goals; None without runs.
+    """Judge our own controller on kinds of maps that its goals are not about; return None without runs.
 
     Parameters
     ----------

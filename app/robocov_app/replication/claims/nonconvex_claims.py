@@ -173,7 +173,7 @@ def judge_gap(
     *,
     limited: bool = False,
 ) -> Claim:
-    """Judge the gap to the reference: RPF's is claimed to be large, that of others small.
+    """Judge the gap to the reference, which is claimed to be large for RPF, and small for the others.
 
     Parameters
     ----------

@@ -61,9 +61,9 @@ which obstacles act. Communication is unlimited.
 LIMITED_RANGES: Mapping[str, float] = {"communication_range": 4.0, "sensing_range": 2.0}
 """Ranges of the runs at limited ranges, m. The paper limits both ranges, but does not give their values.
 
-On a square with a side of ten meters, the share of each of six robots is a square with a side of 4.1 m. So in
-a spread team, a robot is in communication range of its neighbors, but not of the others. The sensing
-range is that of the shared repulsion.
+On a square with a side of ten meters, about a fifth of which is blocked, the share of each of six robots is a
+square with a side of 3.7 m. So in a spread team, a robot is in communication range of its neighbors, but not
+of the others. The sensing range is that of the shared repulsion.
 """
 
 

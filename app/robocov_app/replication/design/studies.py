@@ -8,6 +8,7 @@ density, in ``density-ignored`` it does not.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, NamedTuple, TypeAlias
 
 from robocov.controllers import CONTROLLERS
@@ -220,7 +221,7 @@ def list_gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
     """Return the gain grids: the same potentials for both, combined with each attraction for RAPF."""
     potentials = list(contenders.combine_gains(k_rep=plan.k_rep, rho_0=plan.rho_0))
     attractions = contenders.combine_gains(k_att=plan.k_att, attraction_limit=(None,))
-    rapf = [potential | attraction for attraction in attractions for potential in potentials]
+    rapf = [potential | attraction for attraction, potential in product(attractions, potentials)]
     return {"rapf": rapf, "rpf": potentials}
 
 
@@ -259,11 +260,9 @@ def build_baseline_gains_study(plan: Plan) -> Study | None:
     """Build the sweep of the baselines' gain grids; None if the plan does not tune them."""
     if not plan.beyond.tuning:
         return None
-    participants = [
-        contenders.build_contender(name, gains)
-        for name, gain_sets in contenders.GAIN_GRIDS.items()
-        for gains in gain_sets
-    ]
+    participants = []
+    for name, gain_sets in contenders.GAIN_GRIDS.items():
+        participants += [contenders.build_contender(name, gains) for gains in gain_sets]
     maps = build_generated_maps(plan.beyond.tuning)
     return build_contest(plan, maps, participants, plan.tuning_starts, (plan.tuning_seed,)).study
 

@@ -62,7 +62,9 @@ def generate_convex_region(seed: int) -> StudyMap:
         hull = shapely.convex_hull(shapely.MultiPoint(points))
         corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
         area = hull.area
-        width = np.hypot(*np.diff(corners[:3], axis=0).T).min()
+        # The width is the shorter side of the smallest rectangle around the hull.
+        sides = np.hypot(*np.diff(corners[:3], axis=0).T)
+        width = sides.min()
     ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
     boundary = tuple((float(x), float(y)) for x, y in ring)
     region = Environment(f"convex-{seed}", boundary, description="A convex region drawn by chance.")
@@ -95,7 +97,7 @@ def _build_start(environment: Environment, kind: str) -> StartSpec:
             x, y = shapely.shortest_line(centers, desired).coords[0]
             # Rounding makes the start the same on every processor.
             return DiscStart((round(x, 2), round(y, 2)), radius)
-    raise StartError(f"map {environment.name!r}: no free disc of {START_RADII_M[-1]:g} m radius")
+    raise StartError(f"map {environment.name!r}: no free disc of {radii[-1]:g} m radius")
 
 
 @cache

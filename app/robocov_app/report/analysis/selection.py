@@ -93,7 +93,7 @@ def _select_extremes(
 
 
 def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> dict[ReportedRun, str]:
-    """Return the best and worst runs of each controller and those of the middle case, with their roles."""
+    """Return the best and worst runs of each controller, and the runs of the middle case, with roles."""
     scales = compute_medians(result)
     groups = choose_compared_groups(result).groups
     extremes = dict.fromkeys(_find_middle_case(groups, runs, scales), "typical")
@@ -108,10 +108,10 @@ def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> dict[
 def _find_middle_case(
     groups: Sequence[RunGroup], runs: Sequence[ReportedRun], scales: Scales
 ) -> tuple[ReportedRun, ...]:
-    """Return those of the given runs whose case is the most typical one for all groups.
+    """Return the runs of the most typical case among the given runs.
 
-    It is a case that the largest number of groups have. Among these, it is the one whose ranks, by distance,
-    are nearest to the middle of each group.
+    It is a case that as many groups as possible have. Among these cases, it is the one whose runs are nearest
+    to the middle of their groups when the groups are ranked by distance.
     """
     candidates = set(runs)
     offsets: dict[ReportedRun, float] = {}

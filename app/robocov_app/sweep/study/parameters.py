@@ -39,7 +39,7 @@ KINEMATIC_DEFAULTS = {
 EVENT_TYPES = {"fail": Failure, "join": Join}
 """Conditions that are given as text, for example ``3@20 5@40`` for two events in the same run."""
 CHOICES = {"kinematics": KINEMATICS, "density": get_args(DensityKnowledge)}
-"""Parameters whose values are words, with these words."""
+"""Parameters whose values are one of several texts, with these texts."""
 CONDITIONS = (*PARAMETERS, *EVENT_TYPES, "density")
 """Conditions that a study may vary."""
 TEXT_PARAMETERS = (*EVENT_TYPES, *CHOICES)
