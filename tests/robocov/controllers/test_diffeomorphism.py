@@ -26,7 +26,10 @@ WALLS = (WallObstacle(((5, 0), (5, 6)), 0.2), BLOCK)
 DOOR = Environment("door", ((0, 0), (10, 0), (10, 8), (0, 8)), (WallObstacle(((5, 0), (5, 6)), 0.2),))
 
 
-CHART = ConvexChart(Environment("walls", ((0, 0), (10, 0), (10, 8), (0, 8)), WALLS), 0.13, 24, 100.0)
+@pytest.fixture(scope="module")
+def chart() -> ConvexChart:
+    walls = Environment("walls", ((0, 0), (10, 0), (10, 8), (0, 8)), WALLS)
+    return ConvexChart(walls, 0.13, 24, 100.0)
 
 
 def compute_signed_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -67,23 +70,23 @@ def test_obstacles_become_points() -> None:
 
 
 @given(seed=st.integers(0, 2**32))
-def test_jacobians_are_the_derivatives_of_the_chart(seed: int) -> None:
+def test_jacobians_are_the_derivatives_of_the_chart(chart: ConvexChart, seed: int) -> None:
     rng = np.random.default_rng(seed)
     point = rng.uniform((1, 1), (9, 7), size=(1, 2))
     step = rng.normal(scale=1e-7, size=(1, 2))
-    image, jacobian = CHART.map_to_chart(point)
-    next_image, next_jacobian = CHART.map_to_chart(point + step)
-    is_free = shapely.contains_xy(CHART.configuration_space.buffer(-0.01), point).all()
+    image, jacobian = chart.map_to_chart(point)
+    next_image, next_jacobian = chart.map_to_chart(point + step)
+    is_free = shapely.contains_xy(chart.configuration_space.buffer(-0.01), point).all()
     if is_free and (jacobian == next_jacobian).all():
         np.testing.assert_allclose(next_image - image, (jacobian @ step[..., None])[..., 0], atol=1e-13)
 
 
 @given(seed=st.integers(0, 2**32))
-def test_maps_to_the_chart_and_back_are_inverse(seed: int) -> None:
+def test_maps_to_the_chart_and_back_are_inverse(chart: ConvexChart, seed: int) -> None:
     points = np.random.default_rng(seed).uniform((1, 1), (9, 7), size=(5, 2))
-    points = find_nearest_inside(CHART.configuration_space, points)
-    images, _ = CHART.map_to_chart(points)
-    np.testing.assert_allclose(CHART.map_to_region(images), points, atol=1e-9)
+    points = find_nearest_inside(chart.configuration_space, points)
+    images, _ = chart.map_to_chart(points)
+    np.testing.assert_allclose(chart.map_to_region(images), points, atol=1e-9)
 
 
 def test_samples_belong_to_the_nearest_robot_in_range() -> None:
