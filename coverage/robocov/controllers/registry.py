@@ -40,12 +40,31 @@ from robocov.errors import ParameterError, describe_unknown_name, quote, require
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
     for kind in (
-        # The default comparison comes first, in this order.
-        *(Rapf, Rpf, Lloyd, Atlas),
-        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
-        *(Visibility, Boosting, Adaptive, GpUcb, ExploringLloyd, Diffeomorphism),
-        *(FrontierMedian, GreedySubmodular, VoronoiGraphCoverage, AtlasShared),
-        *(LocalSearch, Exemplar),
+        # Lists of controllers, for example in the window, have this order: first the controllers of the
+        # default comparison, then Atlas, and then all others.
+        Rapf,
+        Rpf,
+        Lloyd,
+        Atlas,
+        Howard,
+        Poduri,
+        Dispersion,
+        RangeLimited,
+        TangentBug,
+        Barrier,
+        GeodesicLloyd,
+        Visibility,
+        Boosting,
+        Adaptive,
+        GpUcb,
+        ExploringLloyd,
+        Diffeomorphism,
+        FrontierMedian,
+        GreedySubmodular,
+        VoronoiGraphCoverage,
+        AtlasShared,
+        LocalSearch,
+        Exemplar,
     )
 }
 """The built-in controllers by name."""
