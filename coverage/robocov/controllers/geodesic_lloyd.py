@@ -27,8 +27,8 @@ from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
 
 _MIN_FIRST_LENGTH_FRACTION = 0.25
-"""Minimum distance to a first waypoint, as a fraction of the spacing of sites: a site at the position of a
-robot would have an infinite weight."""
+"""Minimum distance to a first waypoint, as a fraction of the spacing of sites. Without it, a site at the
+position of a robot would have an infinite weight."""
 
 
 class GeodesicPlan(NamedTuple):

@@ -76,7 +76,8 @@ class FixedGoal:
     position: FloatArray
     """(2,) m, position of the centroid when the goal was fixed."""
     best_point: FloatArray | None = None
-    """(2,) m, the point nearest to the goal of all boundaries that the robot followed or left."""
+    """(2,) m, the point nearest to the goal among the points of the boundaries that the robot has followed,
+    and those at which it has left them."""
     resting_centroid: FloatArray | None = None
     """(2,) m, the robot's centroid when it came to rest at `best_point`."""
 

@@ -143,7 +143,9 @@ class DiscoveredMap:
         return self._replace_state(state)
 
     def add_robots(self, positions: FloatArray, radius: float) -> DiscoveredMap:
-        """Return the map with the cells that robots cover marked as free. Cells that are walls stay walls.
+        """Return the map with the cells that robots cover marked as free, except for walls.
+
+        Presumed walls also become free.
 
         Parameters
         ----------
@@ -355,7 +357,7 @@ def _mark_hit_cells(state: NDArray[np.uint8], grid: CellGrid, ends: FloatArray, 
 
 @kernel
 def _mark_robots(state: NDArray[np.uint8], grid: CellGrid, positions: FloatArray, radius: float) -> None:
-    """Mark the cells whose center is within a radius of a robot as free, except for walls."""
+    """Mark the cells whose center is within a radius of a robot as free; only walls that rays hit remain."""
     rows, columns = state.shape
     for x, y in positions:
         first_column = find_column(x - radius, grid, columns)

@@ -37,7 +37,7 @@ class LatticeCells(NamedTuple):
     is_blocked: BoolArray
     """(h, w) Whether each cell is a wall or a presumed wall."""
     is_unknown: BoolArray
-    """(h, w) Whether each cell has not been seen."""
+    """(h, w) Whether each cell is unknown."""
     has_clearance: BoolArray
     """(m,) Whether each node has the required clearance."""
 

@@ -70,7 +70,7 @@ class MapWindow:
 
     @cached_property
     def is_unknown(self) -> BoolArray:
-        """Whether the robot has not seen each cell, (h, w)."""
+        """Whether each cell is unknown, (h, w). Cells beyond the raster are unknown, too."""
         return np.asarray(self.window.crop(self.known_map.state, np.uint8(UNKNOWN)) == UNKNOWN)
 
     @cached_property

@@ -64,7 +64,7 @@ class TeamGoals:
     """Goals of a robot and of others in the robot's last plan."""
 
     planner: GridPlanner
-    """Planner on which the goals were found."""
+    """Planner with which the goals were found."""
     robots: IntArray
     """(p,) Indices of the robot itself, which comes first, and of the others with goals in the plan."""
     goals: FloatArray

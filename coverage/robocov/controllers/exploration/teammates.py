@@ -52,7 +52,7 @@ class Teammates(NamedTuple):
     message_times: FloatArray
     """(k,) s, times of their last messages."""
     message_distances: FloatArray
-    """(k,) m, their distances from the robot at these times; infinite if it knows them only from reports."""
+    """(k,) m, their distances from the robot at these times; infinite for messages known from reports."""
     rest_times: FloatArray
     """(k,) s, times since which they have been within `REST_RADIUS_M` of `rest_positions`."""
     rest_positions: FloatArray
@@ -155,13 +155,15 @@ class Teammates(NamedTuple):
                 robots=report.robots,
                 positions=report.positions,
                 message_times=report.message_times,
-                # A robot that was never in range has not failed if it is silent.
+                # The robot may have been out of range at that time, so its silence does not show that it has
+                # failed.
                 message_distances=np.full(len(is_new), math.inf),
                 rest_times=report.message_times,
                 rest_positions=report.positions,
             )
             sources.append(reported._select(np.flatnonzero(is_new)))
-        merged = Teammates(*(np.concatenate(parts) for parts in zip(*sources, strict=True)))
+        # One after another, each column of all sources.
+        merged = Teammates(*(np.concatenate(columns) for columns in zip(*sources, strict=True)))
         # Keep the most recent row of each robot, or the first one of several. The sort is stable.
         order = np.lexsort((-merged.message_times, merged.robots))
         _, first_rows = np.unique(merged.robots[order], return_index=True)
