@@ -35,7 +35,7 @@ class Arguments(WindowOptions):
     map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
     """A new or existing map file, a bundled map to open as a copy, or a file of another program to import."""
     background: Path | None = None
-    """Image to display under the map, such as a scanned floor plan."""
+    """Background image to trace, such as a scanned floor plan."""
     screenshot: Path | None = None
     """PNG file for a screenshot of the window, drawn without a display; then exit."""
     page: Literal["map", "object", "snap", "problems", "history"] = "map"

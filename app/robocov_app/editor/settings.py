@@ -27,6 +27,7 @@ class LayerSwitch(NamedTuple):
     key: str
 
 
+# Settings files contain these names; "picture" is the background image.
 LAYERS = {
     "grid": LayerSwitch("Grid", "alt+3"),
     "names": LayerSwitch("Names", "alt+2"),

@@ -1,4 +1,4 @@
-"""The image under the map: its position, scale and level."""
+"""The background image: its position, scale and level."""
 
 import math
 from dataclasses import replace

@@ -254,7 +254,7 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDri
     driver.settle()
     laid = driver.sketch.background
     assert laid is not None and laid.pixels == (200, 100) and laid.scale == pytest.approx(10 / 200)
-    assert driver.editor.tool.name == "picture"
+    assert driver.editor.tool.name == "background"
     driver.click_all((2, 2), (4, 2))
     driver.type("4")
     driver.press_key("return")
@@ -271,10 +271,10 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDri
     assert driver.sketch.background is None
 
 
-def test_scaling_requires_a_picture(driver: EditorDriver) -> None:
+def test_scaling_requires_a_background_image(driver: EditorDriver) -> None:
     driver.press_key("i")
     driver.click_all((2, 2))
-    assert driver.editor.has_error_message and "no image" in driver.message
+    assert driver.editor.has_error_message and "no background image" in driver.message
 
 
 def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:

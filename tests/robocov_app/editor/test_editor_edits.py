@@ -386,8 +386,7 @@ def test_a_polygon_becomes_the_boundary(sketch):
     assert change.sketch.boundary == BOX.vertices
     assert [item.key for item in change.sketch.obstacles] == [1, 2]
     assert (
-        properties.set_background(sketch, Background("p.png", (3, 4))).description
-        == "image put under the map"
+        properties.set_background(sketch, Background("p.png", (3, 4))).description == "background image added"
     )
 
 

@@ -178,7 +178,7 @@ def test_pictures_of_all_kinds_are_shown(tmp_path: Path, mode: str) -> None:
     page = Sheet()
     sketch = replace(build_sheet(), background=Background(str(tmp_path / "one.png"), (40, 30), 0.25))
     page.draw(build_view(), sketch)
-    assert page.reference_image.error == ""
+    assert page.background_renderer.error == ""
 
 
 def test_an_unreadable_picture_is_reported_and_the_rest_is_drawn(tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_an_unreadable_picture_is_reported_and_the_rest_is_drawn(tmp_path: Path)
     page = Sheet()
     sketch = replace(build_sheet(*SHAPES), background=Background(str(tmp_path / "bad.png"), (40, 30), 0.25))
     page.draw(build_view(), sketch)
-    assert "bad.png" in page.reference_image.error
+    assert "bad.png" in page.background_renderer.error
 
 
 def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:

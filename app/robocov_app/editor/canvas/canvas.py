@@ -296,7 +296,7 @@ class EditorCanvas:
         )
 
     def _draw_sheet(self, scene: EditorScene) -> None:
-        """Draw the sheet of the committed map, with a boundary, image or density that a tool is changing."""
+        """Draw the sheet of the committed map; boundary, background and density as a tool changes them."""
         sketch = scene.committed_sketch
         is_boundary_changed = scene.sketch.boundary is not scene.committed_sketch.boundary
         if is_boundary_changed:
@@ -307,10 +307,10 @@ class EditorCanvas:
             sketch = replace(sketch, density=scene.tool_overlay.pending.density)
         clip = scene.view.clip
         scene.surface.blit(self.sheet.draw(scene.view, sketch, scene.hidden_keys), clip, clip)
-        image = self.sheet.reference_image
-        if image.error:
-            self.editor.show_message(image.error, is_error=True)
-            image.error = ""
+        renderer = self.sheet.background_renderer
+        if renderer.error:
+            self.editor.show_message(renderer.error, is_error=True)
+            renderer.error = ""
 
     def _draw_legend(self, scene: EditorScene) -> None:
         if not self.entries:

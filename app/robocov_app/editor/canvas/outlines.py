@@ -60,7 +60,8 @@ class Outline:
     def name_space(self) -> NameSpace:
         """Space for the name of the obstacle; all 0 for an empty geometry.
 
-        The widest free interval at two heights is chosen: that of the centroid, and that of a point inside.
+        It is in the middle of the widest interval inside the obstacle on two horizontal lines: one through
+        the centroid, and one through a point inside.
         """
         best = NameSpace()
         if self.geometry.is_empty:

@@ -1,4 +1,7 @@
-"""The sheet: floor, picture, grid, obstacles and boundary on a cached image; only changes are redrawn."""
+"""The sheet: floor, background image, grid, obstacles and boundary.
+
+It is drawn on a cached image, of which only changes are redrawn.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -9,8 +12,8 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov.typing import FloatArray
+from robocov_app.editor.canvas.background_renderer import BackgroundRenderer
 from robocov_app.editor.canvas.outlines import Outline, Outlines
-from robocov_app.editor.canvas.reference_image import ReferenceImage
 from robocov_app.editor.canvas.sheet_view import (
     View,
     choose_hull_excess_color,
@@ -47,7 +50,7 @@ MAX_BOXES = 40  # more boxes are merged into one
 LINE_HEIGHT_FACTOR = 1.25  # distance of the lines of a name, relative to the size of the text
 MIN_LABEL_CHARACTERS = 6  # a name that must be shortened to fewer characters is not shown
 MIN_NAMED_WIDTH_FACTOR = 3.0  # minimum width of an obstacle with a name, relative to the height of the text
-OBSTACLE_OPACITY = 0.62  # of obstacles on top of a picture
+OBSTACLE_OPACITY = 0.62  # of obstacles on top of a background image
 _TRANSPARENT = (0, 0, 0, 0)
 
 
@@ -67,13 +70,13 @@ class Sheet:
     ----------
     outlines : Outlines
         Outlines of the obstacles.
-    reference_image : ReferenceImage
-        The picture under the map.
+    background_renderer : BackgroundRenderer
+        Draws the background image.
     """
 
     def __init__(self) -> None:
         self.outlines = Outlines()
-        self.reference_image = ReferenceImage()
+        self.background_renderer = BackgroundRenderer()
         self._cached_image: Surface | None = None
         self._state: _ImageState | None = None
         self._hull_excess: LatestValue[shapely.Geometry] = LatestValue()
@@ -173,15 +176,15 @@ class Sheet:
         canvas = view.build_canvas(image)
         boundary = _compute_boundary_pixels(view, sketch)
         _draw_floor(canvas, boundary, box)
-        has_picture = self._draw_picture(image, view, sketch)
+        has_background = self._draw_background(image, view, sketch)
         if "grid" in view.shown:
-            _draw_grid(image, view, box, has_fine_lines=not has_picture)
+            _draw_grid(image, view, box, has_fine_lines=not has_background)
         if boundary is not None:
             _draw_density(canvas, sketch)
         self._draw_hull_excess(canvas, sketch)
         candidates = self.outlines.find_items(sketch, _compute_visible_box(view, box))
         visible = [item for item in candidates if items.get(item.key) is item]
-        if has_picture:
+        if has_background:
             self._draw_translucent_items(canvas, visible, box)
         else:
             self.draw_items(canvas, visible)
@@ -192,12 +195,12 @@ class Sheet:
             self._draw_names(canvas, visible)
         image.set_clip(None)
 
-    def _draw_picture(self, image: Surface, view: View, sketch: Sketch) -> bool:
-        """Draw the reference picture if it is shown; return whether it is."""
+    def _draw_background(self, image: Surface, view: View, sketch: Sketch) -> bool:
+        """Draw the background image if it is shown; return whether it is."""
         background = sketch.background
         if background is None or "picture" not in view.shown:
             return False
-        self.reference_image.draw(image, background, view.folder, view.camera, view.clip)
+        self.background_renderer.draw(image, background, view.folder, view.camera, view.clip)
         return background.shown
 
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:

@@ -42,7 +42,7 @@ class View:
     grid : float
         Spacing of the grid, m.
     folder : Path
-        Folder to which the path of the reference image is relative.
+        Folder to which the path of the background image is relative.
     """
 
     camera: Camera

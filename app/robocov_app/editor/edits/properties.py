@@ -202,11 +202,11 @@ def convert_to_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def set_background(sketch: Sketch, background: Background | None) -> Change:
-    """Set the image under the map, or remove it if None is given."""
+    """Set the background image, or remove it if None is given."""
     if background is None:
-        description = "image removed"
+        description = "background image removed"
     elif sketch.background is None:
-        description = "image put under the map"
+        description = "background image added"
     else:
-        description = "image changed"
+        description = "background image changed"
     return Change(replace(sketch, background=background), Selection(), description)

@@ -361,7 +361,7 @@ def distribute(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
 
 
 def level_map(sketch: Sketch, a: Point, b: Point) -> Change:
-    """Rotate map, picture and density about point `a` so that the line to `b` is horizontal or vertical."""
+    """Rotate map, background image and density about `a` to make the line to `b` horizontal or vertical."""
     require(math.dist(a, b) >= MIN_SIZE_M, "expected two different points")
     degrees = geometry.compute_leveling_angle(a, b)
     affine = Affine.rotation(degrees, a)

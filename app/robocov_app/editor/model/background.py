@@ -1,4 +1,4 @@
-"""The picture under a map, and the marks of obstacles, which the editor stores in the map's free keys.
+"""The background image of a map, and the marks of obstacles, which the editor stores in the map's free keys.
 
 Free keys are members of ``extra`` in a map file, where any program may store data. Marks are attributes of an
 obstacle that only the editor uses; see `MARKS`.
@@ -30,12 +30,14 @@ _KEYS = {"rotation_deg": "turn"}
 
 @dataclass(frozen=True)
 class Background:
-    """An image under the map. Pixel coordinates start at the upper left corner; y points down.
+    """An image behind the map, such as a scanned plan that the user traces.
+
+    Pixel coordinates start at the upper left corner; y points down.
 
     Attributes
     ----------
     path : str
-        Path of the picture as written in the map: relative to the map's folder, or absolute.
+        Path of the image as written in the map: relative to the map's folder, or absolute.
     pixels : tuple of int
         Width and height, px.
     scale : float
@@ -47,7 +49,7 @@ class Background:
     opacity : float
         Opacity from 0 (invisible) to 1.
     shown : bool
-        Whether the picture is shown.
+        Whether the image is shown.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -84,13 +86,14 @@ class Background:
         )
 
     def to_document(self) -> dict[str, Any]:
-        """Return the JSON object that describes the picture in a map file."""
+        """Return the JSON object that describes the image in a map file."""
         document = {_KEYS.get(name, name): to_json_value(value) for name, value in asdict(self).items()}
+        # `to_json_value` turns bools into numbers.
         return document | {"shown": self.shown}
 
     @classmethod
     def from_document(cls, document: Any) -> "Background | None":
-        """Return the picture that a JSON value describes; None if the value is something else."""
+        """Return the image that a JSON value describes; None if the value is something else."""
         keys = {field.name: _KEYS.get(field.name, field.name) for field in fields(cls)}
         if not isinstance(document, dict) or set(document) != set(keys.values()):
             return None
@@ -108,12 +111,12 @@ _ADAPTER = TypeAdapter(Background)
 
 
 def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT_WIDTH_M) -> Background:
-    """Create a picture with its lower left corner at the origin.
+    """Create a background image with its lower left corner at the origin.
 
     Parameters
     ----------
     path : str
-        Path of the picture as written in the map.
+        Path of the image as written in the map.
     pixels : tuple of int
         Width and height, px.
     width : float
@@ -122,7 +125,7 @@ def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT
     Raises
     ------
     MapError
-        If the picture is empty or too large.
+        If the image is empty or too large.
     """
     if min(pixels) < 1 or math.prod(pixels) > MAX_PIXELS:
         size = f"{pixels[0]} x {pixels[1]} pixels"
@@ -131,7 +134,7 @@ def create_background(path: str, pixels: tuple[int, int], width: float = DEFAULT
 
 
 def scale_to_length(background: Background, a: Point, b: Point, length: float) -> Background:
-    """Scale a picture about point `a` so that the distance between points `a` and `b` becomes a length, m."""
+    """Scale the image about point `a` so that the distance between points `a` and `b` becomes a length, m."""
     require(0.0 < length < math.inf, "the length between the two points must be above 0 m")
     _require_apart(background, a, b)
     factor = length / math.dist(a, b)
@@ -144,13 +147,13 @@ def scale_to_length(background: Background, a: Point, b: Point, length: float) -
 
 
 def level_background(background: Background, a: Point, b: Point) -> Background:
-    """Rotate a picture about point `a` so that the line to `b` is horizontal or vertical."""
+    """Rotate the image about point `a` so that the line to `b` is horizontal or vertical."""
     _require_apart(background, a, b)
     return rotate_background(background, compute_leveling_angle(a, b), a)
 
 
 def rotate_background(background: Background, degrees: float, about: Point) -> Background:
-    """Rotate a picture counter-clockwise about a point, m."""
+    """Rotate the image counter-clockwise about a point, m."""
     cos, sin = compute_cos_sin(degrees)
     dx = background.corner[0] - about[0]
     dy = background.corner[1] - about[1]
@@ -169,9 +172,9 @@ MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 """Marks of an obstacle with their types. Empty and false values are not written to files."""
 
 _PREFERRED_KEY = "editor"  # free key of the editor, unless another program uses it
-# Sections of the editor's key, each a list of entries with some of these marks.
+# Members of the editor's free key with marks: each is a list of entries with some of the marks.
 _SECTIONS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
-_OWN_KEYS = {*_SECTIONS, "background"}
+_OWN_MEMBERS = {*_SECTIONS, "background"}
 _LOST_NOTES = "notes of obstacles that are gone"
 FreeKeys: TypeAlias = Mapping[str, Any]
 MarksByIndex: TypeAlias = dict[int, dict[str, Any]]
@@ -186,7 +189,7 @@ class ReadMarks(NamedTuple):
     marks : dict of int to dict
         Marks of obstacles, by obstacle index.
     background : Background or None
-        The picture under the map.
+        The background image.
     others : dict
         Free keys of other programs.
     """
@@ -199,7 +202,7 @@ class ReadMarks(NamedTuple):
 def write_marks(
     free_keys: FreeKeys, marks: MarksByIndex, names: Names, background: Background | None
 ) -> dict[str, Any]:
-    """Return the free keys of a map, including the marks and the picture.
+    """Return the free keys of a map, including the marks and the background image.
 
     Parameters
     ----------
@@ -210,7 +213,7 @@ def write_marks(
     names : sequence of str or None
         Names of the obstacles.
     background : Background or None
-        The picture under the map.
+        The background image.
     """
     content: dict[str, Any] = {}
     for section, mark_names in _SECTIONS.items():
@@ -222,7 +225,7 @@ def write_marks(
         content["background"] = background.to_document()
     if not content:
         return dict(free_keys)
-    key = next(key for key in _list_own_keys() if _is_free(free_keys.get(key, {})))
+    key = next(key for key in _list_candidate_keys() if _is_available(free_keys.get(key, {})))
     return {**free_keys, key: {**free_keys.get(key, {}), **content}}
 
 
@@ -235,14 +238,14 @@ def _identify(index: int, names: Names) -> dict[str, Any]:
 
 
 def read_marks(free_keys: FreeKeys, names: Names) -> ReadMarks:
-    """Read the marks and the picture from the free keys of a map, given the names of its obstacles.
+    """Read the marks and the background image from the free keys of a map, given the names of its obstacles.
 
     A key whose content the editor could not have written is left to other programs.
     """
     # At most len(free_keys) keys can be in use, so the search ends after one more.
-    for key in islice(_list_own_keys(), len(free_keys) + 1):
+    for key in islice(_list_candidate_keys(), len(free_keys) + 1):
         content = free_keys.get(key)
-        if not isinstance(content, dict) or _is_free(content):
+        if not isinstance(content, dict) or _is_available(content):
             continue
         background = Background.from_document(content.get("background"))
         has_broken_background = "background" in content and background is None
@@ -275,7 +278,7 @@ def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[s
         Members that other programs have added to the key, and notes whose obstacle no longer exists.
     """
     marks: MarksByIndex = {}
-    rest = {key: value for key, value in content.items() if key not in _OWN_KEYS}
+    rest = {key: value for key, value in content.items() if key not in _OWN_MEMBERS}
     for section, mark_names in _SECTIONS.items():
         assigned: set[int] = set()
         for entry in content.get(section, []):
@@ -289,14 +292,15 @@ def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[s
     return marks, rest
 
 
-def _list_own_keys() -> Iterator[str]:
+def _list_candidate_keys() -> Iterator[str]:
     """Yield the free keys that the editor may use, in order of preference."""
     yield _PREFERRED_KEY
     yield from (f"{_PREFERRED_KEY} {k}" for k in count(2))
 
 
-def _is_free(content: object) -> bool:
-    return isinstance(content, dict) and not _OWN_KEYS & content.keys()
+def _is_available(content: object) -> bool:
+    """Return whether the editor may add its members to a free key with this content; not if it has any."""
+    return isinstance(content, dict) and not _OWN_MEMBERS & content.keys()
 
 
 def _are_entries(entries: object, mark_names: tuple[str, ...]) -> bool:

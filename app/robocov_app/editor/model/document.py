@@ -238,6 +238,7 @@ class Document:
         self.file_state = check_file(self.version)
         if self.file_state in ("same", previous):
             return "same"
+        # The file no longer contains any state of the history.
         self.history.saved_sketch = None
         return self.file_state
 

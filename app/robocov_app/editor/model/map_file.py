@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 
 from robocov.errors import MapError, OutputError, to_one_line
 from robocov.files.strictjson import read_bytes
-from robocov.files.writing import replace_file, resolve_target
+from robocov.files.writing import replace_file
 from robocov.mapfile import list_bundled_maps
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.sketch import Sketch, dump_sketch
@@ -102,7 +102,6 @@ def write_sketch(
     """
     path = path.absolute()
     content = dump_sketch(sketch).encode()
-    resolve_target(path)
     if not overwrites:
         _require_unchanged(path, expected)
     with replace_file(path) as temporary:

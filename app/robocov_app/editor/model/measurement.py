@@ -130,6 +130,7 @@ def compute_reach(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geom
     dilated = [part.buffer(radius) & free for part in eroded if part.area > 0.0]
     swept = tuple(sorted(dilated, key=lambda part: -part.area))
     opening = shapely.union_all(swept)
+    # Without this margin, the polygons that approximate arcs would leave slivers along the walls.
     remainder = free - opening.buffer(MAX_SAGITTA_M / 2)
     parts = np.array([part for part in _list_polygons(remainder) if part.area > 0.0], dtype=object)
     if not len(parts):

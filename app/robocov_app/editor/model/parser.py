@@ -38,7 +38,7 @@ _START_CLASSES: dict[str, Any] = {
     "points": env.PointsStart,
 }
 _EXTENT_WITHOUT_BOUNDARY: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""Extent of a density picture on a map without a boundary, m, unless the picture has its own extent."""
+"""Extent of a density image on a map without a boundary, m, unless the image has its own extent."""
 _REQUIRED_VALUES = {
     "center": "a point [x, y] in meters",
     "points": "a list of points [x, y]",
@@ -62,7 +62,7 @@ def parse_sketch(text: str | bytes, source_name: str, folder: Path | None = None
     source_name : str
         Name of the file in messages.
     folder : Path, optional
-        Folder of the pictures to which the map refers.
+        Folder of the images to which the map refers.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def build_sketch(document: Any, source_name: str = "map", folder: Path | None = 
     source_name : str
         Name of the document in messages.
     folder : Path, optional
-        Folder of the pictures to which the map refers.
+        Folder of the images to which the map refers.
 
     Returns
     -------

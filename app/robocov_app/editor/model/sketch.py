@@ -89,6 +89,7 @@ class Item:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for pickling, without cached geometries."""
+        # The copy of the shape does not contain its cached polygon.
         return {name: getattr(self, name) for name in ("key", *MARKS)} | {"shape": replace(self.shape)}
 
 
@@ -107,7 +108,7 @@ class Sketch:
     starts : tuple of (str, StartSpec)
         Names and starts; the first one is the default.
     background : Background or None
-        The picture under the map.
+        The background image.
     extra : mapping
         Free keys of the file, except for those of the editor.
     schema : str or None
@@ -301,7 +302,7 @@ class Sketch:
 
     @property
     def bounds(self) -> Box | None:
-        """Bounding box of all objects and of the picture if it is shown, m; None for an empty map."""
+        """Bounding box of all objects and of the background image, if shown, m; None for an empty map."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners

@@ -89,15 +89,15 @@ class MotionPathTool(EditorTool):
         self, context: EditorContext, event: EditorPointerEvent, key: int, path: ObstaclePath | None
     ) -> None:
         """Insert a waypoint into the leg under the pointer, or else append it; choose and drag it."""
-        leg = None
+        inserted: int | None = None  # index of the waypoint in a leg; None if it is appended
         index = 1  # in a new path, whose first waypoint is the obstacle
         if path is not None:
-            leg = paths.find_leg(path, event.unsnapped_point, LEG_REACH_FRACTION * event.reach)
-            index = len(path.points) if leg is None else leg
+            inserted = paths.find_leg(path, event.unsnapped_point, LEG_REACH_FRACTION * event.reach)
+            index = len(path.points) if inserted is None else inserted
         point = event.point
-        if leg is None:
+        if inserted is None:
             point = event.constrain(self.origin)
-        context.apply(paths.add_waypoint(context.sketch, key, point, leg, self.speed))
+        context.apply(paths.add_waypoint(context.sketch, key, point, inserted, self.speed))
         self.chosen = index
         self._dragged = index
 

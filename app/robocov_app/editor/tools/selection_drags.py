@@ -19,11 +19,11 @@ from robocov_app.toolkit.tools.snapping import Guide, Snap, snap_angle, snap_mov
 from robocov_app.toolkit.tools.tool import CursorShape
 
 MANY_POINTS = 1000  # if more vertices are dragged, an image of the obstacles is moved instead
-_TARGET_SNAPPING_POINTS = 60  # of the dragged vertices, up to twice as many are tried for snapping
+_MIN_SNAPPED_POINTS = 60  # of many dragged vertices, this many to twice as many are tried for snapping
 NO_MOVE_M = 1e-9  # shorter distances count as zero
 MIN_SIZE_M = 1e-3  # minimum size of the selection after scaling
-_FACTOR_TOLERANCE = 1e-9
-_UNIT_TOLERANCE = 1e-12
+_FACTOR_TOLERANCE = 1e-9  # factors along x and y that differ by less are shown as one
+_UNIT_TOLERANCE = 1e-12  # factors that differ from 1 by less change nothing
 
 
 class Drag:
@@ -102,7 +102,7 @@ class MoveDrag(Drag):
         points: list[Point] = []
         for owner in selection.owners:
             points += [position for _, position in list_vertices(context.sketch, owner)]
-        self._points = points[:: max(1, len(points) // _TARGET_SNAPPING_POINTS)]
+        self._points = points[:: max(1, len(points) // _MIN_SNAPPED_POINTS)]
         self._drags_image = len(points) > MANY_POINTS
         self._offset = (0.0, 0.0)
         self._copies = False

@@ -25,7 +25,7 @@ class _TargetCollector:
     def __init__(self, dragged: dict[tuple[Owner, int], set[int]]) -> None:
         self.dragged = dragged  # indices of dragged vertices by (owner, ring)
         self.vertices: list[Point] = []
-        self.rim_points: list[Point] = []
+        self.other_points: list[Point] = []  # on the rims of circles, for example
         self.centers: list[Point] = []
         self.edges: list[tuple[Point, Point]] = []
         self.walls: list[shapely.Geometry] = []
@@ -36,7 +36,7 @@ class _TargetCollector:
         shape = sketch.get_shape(owner)
         if isinstance(shape, CircleObstacle | DiscStart):
             self.centers.append(shape.center)
-            self.rim_points += sketch.list_vertex_rings(owner)[0][1:]
+            self.other_points += sketch.list_vertex_rings(owner)[0][1:]
         if isinstance(shape, CircleObstacle):
             self.circles.append(build_geometry(shape))
         elif isinstance(shape, WallObstacle):
@@ -51,7 +51,7 @@ class _TargetCollector:
         """Build the snap targets from everything that was added."""
         starts, ends = np.array(self.edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
         wall_corners = list_outline_edges(self.walls).starts
-        vertices = np.concatenate([to_array([*self.vertices, *self.rim_points]), wall_corners])
+        vertices = np.concatenate([to_array([*self.vertices, *self.other_points]), wall_corners])
         # The pointer also snaps to the visible outlines of walls and circles.
         outlines = list_outline_edges([*self.walls, *self.circles])
         return SnapTargets(vertices, to_array(self.centers), Edges(starts, ends), outlines)
@@ -87,7 +87,7 @@ def collect_snap_targets(
         else:
             skipped.add(target)
     collector = _TargetCollector(dragged)
-    collector.rim_points += extra_points
+    collector.other_points += extra_points
     for owner in sketch.owners:
         if owner not in skipped:
             collector.add(sketch, owner)

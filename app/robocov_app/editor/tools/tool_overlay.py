@@ -56,7 +56,7 @@ class EditorToolOverlay(ToolOverlay):
     pending : Sketch or None
         The map with the density or paths as the current drag changes them.
     background : Background or None
-        The reference image at the position to which it is being dragged.
+        The background image at the position to which it is being dragged.
     dragged_image : DraggedImage or None
         Objects that are dragged as an image.
     hovered : Owner or None

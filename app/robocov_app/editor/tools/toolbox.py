@@ -1,5 +1,6 @@
 """All tools of the editor."""
 
+from robocov_app.editor.tools.background import BackgroundTool
 from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.door import DoorTool
 from robocov_app.editor.tools.draw import (
@@ -13,7 +14,6 @@ from robocov_app.editor.tools.draw import (
     WallTool,
 )
 from robocov_app.editor.tools.motion_path import MotionPathTool
-from robocov_app.editor.tools.reference_image import ReferenceImageTool
 from robocov_app.editor.tools.select import PanTool, SelectTool
 from robocov_app.editor.tools.tool import EditorTool
 from robocov_app.toolkit.tools.tool import Toolbox
@@ -42,5 +42,5 @@ class EditorToolbox(Toolbox[EditorTool]):
             (self.selector, PanTool()),
             (BoundaryTool(), WallTool(), DoorTool(), PolygonTool(), RectangleTool(), CircleTool()),
             (DiscTool(), StartPositionsTool(), self.density, MotionPathTool()),
-            (ReferenceImageTool(), self.tape),
+            (BackgroundTool(), self.tape),
         )

@@ -15,7 +15,7 @@ from robocov_app.editor.settings import LAYERS
 from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui import actions
 from robocov_app.editor.ui.actions import FAR_STEPS, Edit
-from robocov_app.editor.ui.file_commands import OPEN_SUFFIXES, PICTURE_SUFFIXES, FileCommands
+from robocov_app.editor.ui.file_commands import IMAGE_SUFFIXES, OPEN_SUFFIXES, FileCommands
 from robocov_app.toolkit.commands.command import Command, CommandGroup
 from robocov_app.toolkit.tools.viewport import PAN_STEP_PX, ZOOM_STEP
 from robocov_app.toolkit.window.command_window import Action, WindowActions
@@ -132,13 +132,13 @@ def list_commands(
 def _build_file_group(
     editor: Editor, file_commands: FileCommands, window: EditorWindowActions
 ) -> EditorCommandGroup:
-    """Build the group of commands on files, on the image under the map, and on the whole window."""
+    """Build the group of commands on files, on the background image, and on the whole window."""
     ask_map = partial(file_commands.ask_path, "Open a map", file_commands.open, OPEN_SUFFIXES)
-    ask_picture = partial(
-        file_commands.ask_path, "Image under the map", file_commands.open_background, PICTURE_SUFFIXES
+    ask_background = partial(
+        file_commands.ask_path, "Background image", file_commands.open_background, IMAGE_SUFFIXES
     )
 
-    def remove_picture() -> None:
+    def remove_background() -> None:
         editor.apply(properties.set_background(editor.sketch, None))
 
     group = EditorCommandGroup("File", editor)
@@ -148,8 +148,8 @@ def _build_file_group(
     group.add("save", "Save", file_commands.save, "ctrl+s")
     group.add("save:as", "Save as", file_commands.ask_name, "ctrl+shift+s")
     group.add("export", "Export to another format", file_commands.ask_export, "ctrl+e")
-    group.add("background", "Image under the map", ask_picture, "ctrl+b")
-    group.add("background:none", "Remove the image under the map", remove_picture)
+    group.add("background", "Background image", ask_background, "ctrl+b")
+    group.add("background:none", "Remove the background image", remove_background)
     group.add("reload", "Reload the file", file_commands.reload, "ctrl+r")
     group.add("try", "Try the map in the viewer", window.start_play_mode, "f5")
     group.add("screenshot", "Screenshot", window.save_screenshot, "f12")
@@ -182,8 +182,8 @@ def _build_edit_group(editor: Editor, window: EditorWindowActions) -> EditorComm
     group.add("select:all", "Select all", select_all, "ctrl+a")
     select_next = partial(actions.select_next, editor, 1)
     select_previous = partial(actions.select_next, editor, -1)
-    group.add("select:next", "Select the next obstacle", select_next, "tab", repeats=True)
-    group.add("select:previous", "Select the previous obstacle", select_previous, "shift+tab", repeats=True)
+    group.add("select:next", "Select the next object", select_next, "tab", repeats=True)
+    group.add("select:previous", "Select the previous object", select_previous, "shift+tab", repeats=True)
     group.add("name", "Name the selection", window.edit_name, "f2")
     nudge = partial(actions.nudge, editor, 1)
     nudge_far = partial(actions.nudge, editor, FAR_STEPS)

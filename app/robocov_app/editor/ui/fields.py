@@ -158,35 +158,35 @@ def _write_description(editor: Editor, text: str) -> None:
     editor.apply(properties.set_description(editor.sketch, text.strip()))
 
 
-def _require_picture(editor: Editor) -> Background:
-    return require(editor.sketch.background, "there is no image under the map: Ctrl+B chooses one")
+def _require_background(editor: Editor) -> Background:
+    return require(editor.sketch.background, "there is no background image: Ctrl+B chooses one")
 
 
-def _read_picture_scale(editor: Editor) -> str:
-    return f"{_require_picture(editor).scale:.6g}"
+def _read_background_scale(editor: Editor) -> str:
+    return f"{_require_background(editor).scale:.6g}"
 
 
-def _write_picture_scale(editor: Editor, text: str) -> None:
-    picture = _require_picture(editor)
-    scale = parse_length(text, now=picture.scale)
+def _write_background_scale(editor: Editor, text: str) -> None:
+    background = _require_background(editor)
+    scale = parse_length(text, now=background.scale)
     require(scale > 0.0, "a pixel must be larger than 0 m")
-    editor.apply(properties.set_background(editor.sketch, replace(picture, scale=scale)))
+    editor.apply(properties.set_background(editor.sketch, replace(background, scale=scale)))
 
 
-def _read_picture_rotation(editor: Editor) -> str:
-    return format_number(_require_picture(editor).rotation_deg)
+def _read_background_rotation(editor: Editor) -> str:
+    return format_number(_require_background(editor).rotation_deg)
 
 
-def _write_picture_rotation(editor: Editor, text: str) -> None:
+def _write_background_rotation(editor: Editor, text: str) -> None:
     degrees = parse_angle(text)
-    picture = replace(_require_picture(editor), rotation_deg=degrees)
-    editor.apply(properties.set_background(editor.sketch, picture))
+    background = replace(_require_background(editor), rotation_deg=degrees)
+    editor.apply(properties.set_background(editor.sketch, background))
 
 
-def set_picture_opacity(editor: Editor, opacity: float) -> None:
-    """Set the opacity of the image under the map, from 0 to 1."""
-    picture = replace(_require_picture(editor), opacity=opacity)
-    editor.apply(properties.set_background(editor.sketch, picture), drag="opacity")
+def set_background_opacity(editor: Editor, opacity: float) -> None:
+    """Set the opacity of the background image, from 0 to 1."""
+    background = replace(_require_background(editor), opacity=opacity)
+    editor.apply(properties.set_background(editor.sketch, background), drag="opacity")
 
 
 def _build_setting_field(word: str, tip: str) -> PanelField:
@@ -224,7 +224,7 @@ FIELDS: dict[str, PanelField] = {
     "high": PanelField(_read_height, _write_height, "Also *2, 50% or +0.3"),
     "width": _build_length_field("width", "width", "Thickness of the wall"),
     "size:radius": _build_length_field("radius", "circle", "Its radius"),
-    "picture:scale": PanelField(_read_picture_scale, _write_picture_scale, "Side of a pixel"),
-    "picture:turn": PanelField(_read_picture_rotation, _write_picture_rotation, "Counter-clockwise"),
+    "background:scale": PanelField(_read_background_scale, _write_background_scale, "Side of a pixel"),
+    "background:turn": PanelField(_read_background_rotation, _write_background_rotation, "Counter-clockwise"),
 }
 """The fields of the panel by name."""

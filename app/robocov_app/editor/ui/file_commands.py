@@ -30,13 +30,13 @@ from robocov_app.toolkit.dialogs import Option, create_file_choice, create_list_
 Action: TypeAlias = Callable[[], object]
 IMPORT_PATIENCE_S = 2.0  # an import that takes longer is aborted when its settings change
 MIN_BACKGROUND_WIDTH_M = 1.0
-MAX_PARENT_FOLDERS = 1  # maximum number of ".." in the path of a picture relative to its map
+MAX_PARENT_FOLDERS = 1  # maximum number of ".." in the path of a background image relative to its map
 HEADER_BYTES = 4096  # first bytes of a file, in which the format of a map is named
 OPEN_SUFFIXES = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 _CANCEL = ("Cancel", "c", lambda: None)
-# Errors that decoders raise for files that are not pictures, are broken, or are too large.
-_PICTURE_ERRORS = (
+# Errors that decoders raise for files that are not images, are broken, or are too large.
+_IMAGE_ERRORS = (
     OSError,
     UnidentifiedImageError,
     Image.DecompressionBombError,
@@ -324,27 +324,27 @@ class FileCommands:
         return f"read again: {self.editor.document.title}"
 
     def open_background(self, path: Path) -> None:
-        """Put an image under the map, and choose the tool that scales and moves it."""
-        set_reference_image(self.editor, path)
-        self.editor.choose_tool("picture")
+        """Set the background image, and choose the tool that scales and moves it."""
+        set_background_file(self.editor, path)
+        self.editor.choose_tool("background")
         self._fit()
 
 
-def set_reference_image(editor: Editor, path: Path) -> None:
-    """Put an image under the map. It becomes as wide as the map, or gets a default width.
+def set_background_file(editor: Editor, path: Path) -> None:
+    """Set the background image to an image file. It becomes as wide as the map, or gets a default width.
 
     Raises
     ------
     MapError
-        If the file is not a picture, or its path cannot be written to a map.
+        If the file is not an image, or its path cannot be written to a map.
     """
     require_regular_file(path)
     try:
-        with Image.open(path) as picture:
-            pixels = picture.size
-    except _PICTURE_ERRORS:
+        with Image.open(path) as image:
+            pixels = image.size
+    except _IMAGE_ERRORS:
         raise MapError(f"{path}: not an image that can be read") from None
-    name = _describe_picture_path(path, editor.document.path)
+    name = _describe_image_path(path, editor.document.path)
     if remove_controls(name) != name:
         raise MapError(f"{path}: expected an image whose path is text, got control characters or other bytes")
     background = create_background(name, pixels)
@@ -356,14 +356,14 @@ def set_reference_image(editor: Editor, path: Path) -> None:
     editor.apply(set_background(editor.sketch, background))
 
 
-def _describe_picture_path(path: Path, map_path: Path | None) -> str:
-    """Return the path of a picture as written in a map: relative if the map is nearby, otherwise absolute."""
+def _describe_image_path(path: Path, map_path: Path | None) -> str:
+    """Return the path of an image as written in a map: relative if the map is nearby, otherwise absolute."""
     path = path.resolve()
     if map_path is not None:
         try:
             relative = Path(os.path.relpath(path, map_path.resolve().parent))
         except ValueError:
-            # The picture is on another drive.
+            # The image is on another drive.
             return path.as_posix()
         parent_folders = relative.parts.count("..")
         if parent_folders <= MAX_PARENT_FOLDERS:

@@ -19,7 +19,7 @@ from robocov_app.editor.settings import (
     EditorSettings,
 )
 from robocov_app.editor.tools.snap_switches import SNAPS
-from robocov_app.editor.ui.file_commands import describe_opening, open_or_detect, set_reference_image
+from robocov_app.editor.ui.file_commands import describe_opening, open_or_detect, set_background_file
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.formats import Importer
 from robocov_app.storage.autosave import find_draft_folder, remove_draft
@@ -53,7 +53,7 @@ class EditorLauncher:
     folder : Path
         Working folder for files; if `served`, also the folder in which drafts are stored.
     background : Path or None
-        Picture to put under the map.
+        File of the background image.
     theme : str or None
         ``light`` or ``dark``; None for the theme that was used last.
     size : tuple of int or None
@@ -144,11 +144,11 @@ class EditorLauncher:
         return ""
 
     def _prepare_editor(self, editor: Editor, settings: EditorSettings) -> None:
-        """Apply the theme, and put the image under the map."""
+        """Apply the theme, and set the background image."""
         editor.theme = self.theme or settings.theme
         if self.background is not None:
-            set_reference_image(editor, self.background)
-            editor.choose_tool("picture", shows_hint=False)
+            set_background_file(editor, self.background)
+            editor.choose_tool("background", shows_hint=False)
 
     def _open_window(self, editor: Editor, settings: EditorSettings) -> EditorWindow:
         """Open the window of an editor, and offer to recover drafts."""

@@ -22,7 +22,7 @@ from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.settings import LAYERS
 from robocov_app.editor.tools.snap_switches import SNAPS
 from robocov_app.editor.ui.actions import fix_problem, select_owners
-from robocov_app.editor.ui.fields import FIELDS, set_picture_opacity
+from robocov_app.editor.ui.fields import FIELDS, set_background_opacity
 from robocov_app.editor.ui.map_facts import list_map_facts
 from robocov_app.toolkit.commands.command import CommandTable
 from robocov_app.toolkit.overlay import create_flat_canvas, wrap_text
@@ -82,9 +82,9 @@ START_BUTTONS = (
     PanelButton("Anywhere", "start:uniform"),
     PanelButton("Next", "start:next"),
 )
-PICTURE_BUTTONS = (
+BACKGROUND_BUTTONS = (
     PanelButton("Choose…", "background"),
-    PanelButton("Scale, move", "tool:picture"),
+    PanelButton("Scale, move", "tool:background"),
     PanelButton("Remove", "background:none"),
 )
 PROBLEM_BUTTONS = (
@@ -334,7 +334,7 @@ class EditorPanel(CommandPanel):
             self._draw_field_pair(ui, FieldCell("width", "Thickness", "m"))
 
     def _draw_snap_page(self, ui: Ui) -> None:
-        """Draw the page "snap": snap modes, grid, visible layers, and the image under the map."""
+        """Draw the page "snap": snap modes, grid, visible layers, and the background image."""
         with ui.scroll("snap"):
             ui.header("Snap to")
             ui.row(0, 0, height=CHECK_HEIGHT_PX, below=3)
@@ -348,24 +348,24 @@ class EditorPanel(CommandPanel):
                 # The team has its check box next to the starts.
                 if name != "robots":
                     self._draw_layer_check(ui, name)
-            self._draw_picture_section(ui)
+            self._draw_background_section(ui)
 
-    def _draw_picture_section(self, ui: Ui) -> None:
-        """Draw the buttons, fields and opacity slider of the image under the map."""
-        ui.header("Image under the map")
-        self.show_buttons(ui, PICTURE_BUTTONS)
-        scale = FieldCell("picture:scale", "Pixel", "m")
-        turn = FieldCell("picture:turn", "Turn", "°")
+    def _draw_background_section(self, ui: Ui) -> None:
+        """Draw the buttons, fields and opacity slider of the background image."""
+        ui.header("Background image")
+        self.show_buttons(ui, BACKGROUND_BUTTONS)
+        scale = FieldCell("background:scale", "Pixel", "m")
+        turn = FieldCell("background:turn", "Turn", "°")
         self._draw_field_pair(ui, scale, turn)
         ui.row(LABEL_WIDTH_PX, 0)
         ui.label("Opacity")
-        picture = self.editor.sketch.background
-        if picture is None:
-            ui.slider("opacity", 0.5, 0.0, 1.0, disabled_reason="there is no image under the map")
+        background = self.editor.sketch.background
+        if background is None:
+            ui.slider("opacity", 0.5, 0.0, 1.0, disabled_reason="there is no background image")
             return
-        opacity = ui.slider("opacity", picture.opacity, 0.0, 1.0)
+        opacity = ui.slider("opacity", background.opacity, 0.0, 1.0)
         if opacity is not None:
-            self.editor.attempt(lambda: set_picture_opacity(self.editor, round(opacity, 2)))
+            self.editor.attempt(lambda: set_background_opacity(self.editor, round(opacity, 2)))
 
     def _draw_problems_page(self, ui: Ui) -> None:
         """Draw the page "problems": buttons, and a list of all problems."""

@@ -22,9 +22,9 @@ from robocov_app.formats.colors import (
 from robocov_app.formats.foreign_map import Painted, Thumbnail
 from robocov_app.render.camera import Box, Camera
 
-MAX_COLORS = 12  # number of colors that are listed; others can be chosen by a click on the picture
-COLOR_TOLERANCE = 24.0  # colors of a picture that differ by at most this in each channel count as one
-MIN_LISTED_SHARE = 0.001  # of the pixels of a picture; rarer colors are not listed
+MAX_COLORS = 12  # number of colors that are listed; others can be chosen by a click on the image
+COLOR_TOLERANCE = 24.0  # colors of an image that differ by at most this in each channel count as one
+MIN_LISTED_SHARE = 0.001  # of the pixels of an image; rarer colors are not listed
 _ROLE_CYCLE: tuple[Role | None, ...] = (None, "free", "solid", "ignore")
 
 
@@ -37,7 +37,7 @@ class ColorSheet:
     painted : tuple of Painted
         Shapes of a drawing, from bottom to top.
     thumbnail : Thumbnail or None
-        The picture, if the file is one.
+        The image, if the file is one.
     colors : tuple of Color
         Colors of the file, the most frequent first.
     """
@@ -57,7 +57,7 @@ class ColorSheet:
         return None
 
     def _find_pixel(self, thumbnail: Thumbnail, x: float, y: float) -> Color | None:
-        """Return the color of a picture at a position, m; None outside the picture."""
+        """Return the color of an image at a position, m; None outside the image."""
         left, bottom, right, top = thumbnail.bounds
         rows, columns = thumbnail.pixels.shape[:2]
         column = int((x - left) / (right - left) * columns // 1)
@@ -104,7 +104,7 @@ def build_color_sheet(foreign: ForeignMap) -> ColorSheet | None:
 
 
 def _list_pixel_colors(thumbnail: Thumbnail) -> tuple[Color, ...]:
-    """Return the frequent colors of a picture, without mixtures of two more frequent ones."""
+    """Return the frequent colors of an image, without mixtures of two more frequent ones."""
     pixels = thumbnail.pixels.reshape(-1, 3)
     values, counts = np.unique(pixels, axis=0, return_counts=True)
     min_count = MIN_LISTED_SHARE * len(pixels)
@@ -142,9 +142,9 @@ def _draw_thumbnail(surface: Surface, camera: Camera, thumbnail: Thumbnail) -> N
     left, bottom, right, top = thumbnail.bounds
     corners = camera.to_pixels(np.array([[left, top], [right, bottom]]))
     (low_x, low_y), (high_x, high_y) = corners.tolist()
-    picture = pygame.surfarray.make_surface(thumbnail.pixels.swapaxes(0, 1))
+    image = pygame.surfarray.make_surface(thumbnail.pixels.swapaxes(0, 1))
     size = (max(round(high_x - low_x), 1), max(round(high_y - low_y), 1))
-    surface.blit(pygame.transform.smoothscale(picture, size), (round(low_x), round(low_y)))
+    surface.blit(pygame.transform.smoothscale(image, size), (round(low_x), round(low_y)))
 
 
 def _fill_polygon(surface: Surface, camera: Camera, polygon: shapely.Polygon, color: Color) -> None:

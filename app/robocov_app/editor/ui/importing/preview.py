@@ -56,7 +56,7 @@ class ImportPreview:
     def __init__(self) -> None:
         self.cameras: list[Camera] = []
         self._width = 0  # maximum width of a caption, px
-        self._picture: LatestValue[Surface] = LatestValue()
+        self._image: LatestValue[Surface] = LatestValue()
 
     def arrange(self, box: Rect, imported: Imported, scale: float) -> float:
         """Place the two maps at the top of a box, next to or below each other.
@@ -102,12 +102,12 @@ class ImportPreview:
         look = (*(camera.view for camera in self.cameras), scale, theme, sheet is not None)
 
         def render_maps() -> Surface:
-            picture = _draw_comparison(screen.get_size(), imported.comparison, self.cameras, scale, theme)
+            image = _draw_comparison(screen.get_size(), imported.comparison, self.cameras, scale, theme)
             if sheet is not None:
-                sheet.draw(picture, self.cameras[0], imported.comparison.bounds)
-            return picture
+                sheet.draw(image, self.cameras[0], imported.comparison.bounds)
+            return image
 
-        screen.blit(self._picture.get(imported, look, render_maps), (0, 0))
+        screen.blit(self._image.get(imported, look, render_maps), (0, 0))
         captions = _list_captions(imported, theme, has_own_colors=sheet is not None)
         for camera, caption in zip(self.cameras, captions, strict=True):
             self._draw_caption(screen, camera, caption, scale, theme)
@@ -176,35 +176,35 @@ def _draw_comparison(
     size: tuple[int, int], comparison: ImportComparison, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
     """Draw the free space before and after the import, with the differences, on a transparent image."""
-    picture = Surface(size, pygame.SRCALPHA)
+    image = Surface(size, pygame.SRCALPHA)
     before, after = cameras
-    _draw_map(picture, before, comparison, comparison.before, theme)
-    _draw_marked_area(picture, before, comparison.lost, theme.error)
-    _draw_map(picture, after, comparison, comparison.after, theme)
-    _draw_marked_area(picture, after, comparison.opened, theme.start)
+    _draw_map(image, before, comparison, comparison.before, theme)
+    _draw_marked_area(image, before, comparison.lost, theme.error)
+    _draw_map(image, after, comparison, comparison.after, theme)
+    _draw_marked_area(image, after, comparison.opened, theme.start)
     if comparison.gap is not None:
         ends = after.to_pixels(np.array(comparison.gap.between))
         width = round(2 * scale)
-        pygame.draw.line(picture, theme.accent, ends[0].tolist(), ends[1].tolist(), width)
+        pygame.draw.line(image, theme.accent, ends[0].tolist(), ends[1].tolist(), width)
         if math.dist(*ends) < MIN_GAP_LENGTH_PX * scale:
-            pygame.draw.circle(picture, theme.accent, ends.mean(axis=0).tolist(), 10 * scale, width)
-    return picture
+            pygame.draw.circle(image, theme.accent, ends.mean(axis=0).tolist(), 10 * scale, width)
+    return image
 
 
 def _draw_map(
-    picture: Surface, camera: Camera, comparison: ImportComparison, free: shapely.Geometry, theme: Theme
+    image: Surface, camera: Camera, comparison: ImportComparison, free: shapely.Geometry, theme: Theme
 ) -> None:
-    _fill_polygons(picture, camera, comparison.region, theme.obstacle, theme.obstacle)
-    _fill_polygons(picture, camera, free, theme.background, theme.obstacle)
+    _fill_polygons(image, camera, comparison.region, theme.obstacle, theme.obstacle)
+    _fill_polygons(image, camera, free, theme.background, theme.obstacle)
     for ring in shapely.get_rings(shapely.get_parts(free)):
         points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
-        pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
+        pygame.draw.aalines(image, theme.obstacle_edge, True, points)
 
 
-def _draw_marked_area(picture: Surface, camera: Camera, area: shapely.Geometry, color: Color) -> None:
-    layer = Surface(picture.get_size(), pygame.SRCALPHA)
+def _draw_marked_area(image: Surface, camera: Camera, area: shapely.Geometry, color: Color) -> None:
+    layer = Surface(image.get_size(), pygame.SRCALPHA)
     _fill_polygons(layer, camera, area, (*color, MARK_OPACITY), _CLEAR)
-    picture.blit(layer, (0, 0))
+    image.blit(layer, (0, 0))
 
 
 def _fill_polygons(

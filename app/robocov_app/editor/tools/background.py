@@ -1,4 +1,4 @@
-"""The tool for the image under the map: two clicked points scale or level it, and a drag moves it."""
+"""The tool for the background image: two clicked points scale or level it, and a drag moves it."""
 
 from dataclasses import replace
 
@@ -12,11 +12,11 @@ from robocov_app.editor.tools.context import EditorContext
 from robocov_app.editor.tools.tool import EditorPointerEvent, EditorTool
 from robocov_app.editor.tools.tool_overlay import EditorToolOverlay
 
-CORNER_DECIMALS = 4  # decimal places of the position of a picture, m
+CORNER_DECIMALS = 4  # decimal places of the position of the image, m
 
 
-class ReferenceImageTool(EditorTool):
-    """Scales, levels and moves the reference image.
+class BackgroundTool(EditorTool):
+    """Scales, levels and moves the background image.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class ReferenceImageTool(EditorTool):
         The image at the position to which it is being dragged.
     """
 
-    name = "picture"
+    name = "background"
     title = "Image"
     key = "i"
     hint = "click two points; type their distance, or Enter to make their line level; drag moves it"
@@ -35,8 +35,8 @@ class ReferenceImageTool(EditorTool):
         self.moved: Background | None = None
 
     def press(self, context: EditorContext, event: EditorPointerEvent) -> None:
-        """Start a click or a drag; raise MapError if there is no picture."""
-        require(context.sketch.background is not None, "there is no image under the map: Ctrl+B chooses one")
+        """Start a click or a drag; raise MapError if there is no background image."""
+        require(context.sketch.background is not None, "there is no background image: Ctrl+B chooses one")
         self.pressed = event
 
     def double_click(self, context: EditorContext, event: EditorPointerEvent) -> None:
