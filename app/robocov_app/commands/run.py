@@ -133,7 +133,13 @@ def _print_branch(answer: dict[str, Any]) -> None:
 
 
 def save_branches(options: Arguments, interruption: Interruption) -> Iterator[dict[str, Any]]:
-    """Simulate the selected branches of a session, save each in its own folder, and yield their results."""
+    """Simulate the selected branches of a session, save each in its own folder, and yield their results.
+
+    Raises
+    ------
+    InputError
+        If the session cannot be read, or a branch cannot be simulated.
+    """
     from robocov.errors import InputError
     from robocov.files.result_folder import create_result
     from robocov.files.result_names import SESSION_FILE

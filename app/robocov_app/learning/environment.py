@@ -139,6 +139,7 @@ class _RandomValues(NamedTuple):
 
 
 def _parse_positions(positions: Any) -> FloatArray:
+    """Convert positions to an array; raise StartError if that is impossible."""
     try:
         return np.asarray(positions, dtype=float)
     except (TypeError, ValueError):
@@ -259,6 +260,7 @@ class EpisodeEnv:
             self._clock = None
 
     def _get_painter(self, episode: Episode) -> Painter:
+        """Return the painter of an episode's map, which is reused as long as the map stays the same."""
         from robocov_app.look.theme import get_theme
         from robocov_app.render.painter import Painter
 
@@ -310,6 +312,7 @@ class EpisodeEnv:
 
 
 def _check_rendering(render_mode: str | None, size: tuple[int, int], theme: str) -> None:
+    """Raise a ParameterError unless the options for rendering are valid."""
     if render_mode is not None and render_mode not in RENDER_MODES:
         raise ParameterError(f"render_mode: {describe_unknown_name('mode', str(render_mode), RENDER_MODES)}")
     if len(size) != 2 or not all(MIN_SIDE_PX <= side <= MAX_SIDE_PX for side in size):

@@ -139,12 +139,14 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[Float32Array, Float32Array]):
         return self._build_rows(), reward, is_terminated, is_truncated, info
 
     def _build_rows(self) -> Float32Array:
+        """Return the current observation, with zeros for robots that do not work."""
         episode = self.get_episode()
         rows = episode.build_rows()
         rows[~episode.is_working] = 0.0
         return rows
 
     def _build_info(self, contact_time: FloatArray) -> dict[str, Any]:
+        """Build the info dictionary; `contact_time`, (n,) s, is that of the last action."""
         episode = self.get_episode()
         return {
             **episode.summarize(),

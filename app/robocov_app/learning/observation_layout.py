@@ -178,6 +178,7 @@ class ObservationLayout:
         return nearest
 
     def _check_scans(self, scans: Scans | None) -> Scans:
+        """Return the scans; raise a ParameterError unless they have as many rays as the layout."""
         if scans is None or scans.rays != self.rays:
             actual = "none" if scans is None else scans.rays
             raise ParameterError(f"observation.rays: expected {self.rays} rays in a scan, got {actual}")

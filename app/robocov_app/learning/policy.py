@@ -179,6 +179,7 @@ class PolicyController:
         return seen.time >= memory.next_time - _TIME_TOLERANCE_S
 
     def _compute_actions(self, seen: Observations, team: Team) -> FloatArray:
+        """Call the policy for each robot, and return the actions, (n, 2)."""
         rows = self.layout.build_rows(seen, team)
         actions = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
         for action in actions:
@@ -260,6 +261,7 @@ class ControllerPolicy:
         return self._actions
 
     def _start(self, episode: Episode) -> None:
+        """Reset the memory of the controller for a new episode."""
         self._episode = episode
         self._decision_cycle = -1
         self._next_scan_step = 0

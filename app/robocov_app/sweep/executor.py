@@ -172,6 +172,11 @@ class Executor(ABC):
             How the worker ended.
         had_others : bool
             Whether other tasks were running at the same time.
+
+        Raises
+        ------
+        OutputError
+            If too many workers have ended in a row.
         """
         self.lost_workers += 1
         self._consecutive_ends += 1

@@ -390,11 +390,13 @@ def _describe_file(content: bytes) -> tuple[int, str]:
 
 
 def _require_undamaged(is_valid: bool) -> None:
+    """Raise DamagedRunError if a check of a run has failed."""
     if not is_valid:
         raise DamagedRunError
 
 
 def _read_file(path: Path) -> bytes:
+    """Return the content of a regular file; raise FileNotFoundError for anything else."""
     # Reading something else, such as a pipe, might never end.
     if not path.is_file():
         raise FileNotFoundError(path)
@@ -406,6 +408,7 @@ def _compute_file_checksum(content: bytes) -> str:
 
 
 def _compute_row_checksum(row: Mapping[str, Any]) -> str:
+    """Return the checksum of a row, which does not depend on the order of its entries."""
     return _compute_file_checksum(json.dumps(row, sort_keys=True, allow_nan=False).encode())
 
 

@@ -316,6 +316,7 @@ class _RowWriter:
             self._advance(task)
 
     def _advance(self, task: Task) -> None:
+        """Continue with the next task, and forget the given one."""
         self.finished.discard(task.name)
         self._next_task = next(self._tasks, None)
 

@@ -55,16 +55,19 @@ def _describe_choices(text: str) -> str:
 
 
 def _explain_invalid_choice(match: re.Match[str]) -> str:
+    """Return the message for a value that is not one of the choices of an option."""
     value, option, choices = match.groups()
     return f"{option}: expected {_describe_choices(choices)}, got {value}"
 
 
 def _explain_missing_choice(match: re.Match[str]) -> str:
+    """Return the message for a missing positional argument with choices."""
     command, choices = match.groups()
     return f"{command}: expected {_describe_choices(choices.replace(',', ', '))}, got nothing"
 
 
 def _explain_invalid_number(match: re.Match[str]) -> str:
+    """Return the message for a value that is not a number of the expected kind."""
     option, kind, value = match.groups()
     number = "whole number" if kind == "INT" else "number"
     return f"{option}: expected a {number}, got {value}"
@@ -180,6 +183,7 @@ def _list_option_names(kind: Any) -> list[str]:
 
 
 def _is_controller(word: str) -> bool:
+    """Return whether a word is the name of a controller or ``file.py:Class``."""
     from robocov.controllers import CONTROLLERS
 
     return word in CONTROLLERS or bool(re.search(r"\.py:\w+$", word))
@@ -432,6 +436,7 @@ def parse_gains(texts: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _parse_gain_value(name: str, text: str) -> Any:
+    """Parse the value of a gain: a word, or JSON; raise a ParameterError for anything else."""
     if re.fullmatch(_WORD, text) and text not in _JSON_CONSTANTS:
         return text
     try:

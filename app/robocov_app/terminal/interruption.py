@@ -67,6 +67,7 @@ class Interruption:
             signal.signal(number, handler)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal: note the first one, and raise KeyboardInterrupt at the second."""
         _received_signals.add(number)
         if self.requested:
             raise KeyboardInterrupt

@@ -100,7 +100,13 @@ def show(window: BaseWindow, options: Any, folder: Path) -> None:
 
 
 def serve_each(command: Callable[[Any], int], options: Any) -> int:
-    """Serve a window of a command to each visitor, each in its own process, until the server is stopped."""
+    """Serve a window of a command to each visitor, each in its own process, until the server is stopped.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When SIGINT or SIGTERM stops the server.
+    """
     import asyncio
 
     from robocov_app.web.visitor_server import VisitorServer

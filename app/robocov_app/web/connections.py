@@ -144,6 +144,7 @@ class Listener:
         await closed
 
     def _add_connection(self, connection: ServerConnection) -> None:
+        """Limit the time until a request arrives, and the number of connections that wait for one."""
         self._connections.add(connection)
         timer = asyncio.get_running_loop().call_later(REQUEST_TIMEOUT_S, self._abort_silent, connection)
         self._unanswered[connection] = timer
@@ -151,15 +152,18 @@ class Listener:
             next(iter(self._unanswered)).transport.abort()
 
     def _abort_silent(self, connection: ServerConnection) -> None:
+        """Abort a connection that has not sent a request."""
         if connection.request is None:
             connection.transport.abort()
 
     def _remove_connection(self, connection: ServerConnection) -> None:
+        """Forget a connection that has ended."""
         self._connections.discard(connection)
         self._files.pop(connection, None)
         self._stop_request_timer(connection)
 
     def _stop_request_timer(self, connection: ServerConnection) -> None:
+        """Cancel the timer of a connection whose request has been answered or that has ended."""
         timer = self._unanswered.pop(connection, None)
         if timer is not None:
             timer.cancel()
@@ -194,6 +198,7 @@ class Listener:
         asyncio.get_running_loop().call_later(RESPONSE_TIMEOUT_S, connection.transport.abort)
 
     async def _handle_socket(self, connection: ServerConnection) -> None:
+        """Serve a page until its socket is closed; report unexpected errors."""
         self._stop_request_timer(connection)
         try:
             await self._serve_page(connection)

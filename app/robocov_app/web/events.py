@@ -54,15 +54,19 @@ def _strip_lines(text: str) -> str:
 _Line = AfterValidator(strip_controls)
 _Lines = AfterValidator(_strip_lines)
 _Pixel = Annotated[float, Field(ge=-1e5, le=1e5)]
-_Turn = Annotated[float, Field(ge=-100.0, le=100.0)]
+_Notches = Annotated[float, Field(ge=-100.0, le=100.0)]
 
 
 class _Message(BaseModel):
+    """A message from a page; unknown fields and numbers that are not finite are rejected."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 class _HeldMessage(_Message):
-    held: int = Field(default=0, ge=0, le=15)  # Shift 1, Ctrl 2, Alt 4, Meta 8
+    """A message with the modifier keys that are held."""
+
+    held: int = Field(default=0, ge=0, le=15)  # sum of Shift 1, Ctrl 2, Alt 4, Meta 8
 
 
 class PointerMessage(_HeldMessage):
@@ -91,8 +95,8 @@ class WheelTurned(PointerMessage):
     """The wheel is turned by a number of notches."""
 
     kind: Literal["wheel"]
-    right: _Turn = 0.0
-    up: _Turn
+    right: _Notches = 0.0
+    up: _Notches
 
 
 class KeyChanged(_HeldMessage):
@@ -291,6 +295,7 @@ class EventTranslator:
                 yield Event(pygame.WINDOWFOCUSLOST)
 
     def _change_button(self, message: ButtonChanged) -> Iterator[Event]:
+        """Yield the motion to the pointer, and the press or release of a button there."""
         if message.down:
             yield self._move(message.x, message.y, 0)
             self._pressed_button = message.button
@@ -308,6 +313,7 @@ class EventTranslator:
             self._pressed_button = 0
 
     def _move(self, x: float, y: float, button: int) -> Event:
+        """Return the motion of the pointer to a position, px, with the number of the held button, or 0."""
         previous_x, previous_y = self._position
         self._position = (round(x), round(y))
         return Event(

@@ -139,6 +139,7 @@ def list_saved(
 
 
 def _is_offered(path: Path) -> bool:
+    """Return whether a path is a result folder or a file of a kind that pages may download."""
     if path.name.startswith("."):
         return False
     if path.is_dir():
@@ -171,6 +172,7 @@ def read_saved(path: Path) -> tuple[str, bytes]:
 
 
 def _zip_files(members: list[Path], root: Path) -> bytes:
+    """Return a zip archive of files with their paths relative to a root folder."""
     archive = BytesIO()
     with ZipFile(archive, "w", ZIP_DEFLATED) as target:
         for path in members:

@@ -132,12 +132,14 @@ class FrameDelivery:
         controlling = self._pages.controlling
         self._controlling_was_last = page is controlling
         for receiver in self._pages:
+            # The controlling page only gets frames on its own turn; those of other pages may be older.
             is_due = receiver is page or receiver is not controlling
             has_same_base = receiver.base_number == base_number and receiver.shown_map == shown_map
             if has_same_base and is_due and receiver.is_ready_for(frame):
                 receiver.add_frame(frame.number, message)
 
     async def _wait_for_work(self) -> None:
+        """Wait until there is something to do, or until the next frame for the other pages is due."""
         timeout = None
         if self._shared_frame is not self.newest and len(self._pages) > 1:
             timeout = max(self._next_shared_time - monotonic(), _MIN_TIMEOUT_S)

@@ -75,6 +75,7 @@ class LiveWindow:
             self.link = line.removeprefix(CONTROL_LABEL).strip()
 
     def _repr_html_(self) -> str:
+        """Return the iframe that shows the window in the notebook."""
         link = self.link
         prefix = os.environ.get("JUPYTERHUB_SERVICE_PREFIX")
         if prefix:

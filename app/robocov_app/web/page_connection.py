@@ -130,7 +130,7 @@ class PageConnection:
         finally:
             sender.cancel()
 
-    # Messages from the page
+    # Messages from the page.
 
     async def _receive_messages(self) -> None:
         """Handle the messages of the page; pause while it sends too many, or the window cannot keep up."""
@@ -180,6 +180,7 @@ class PageConnection:
         self._shared.delivery.has_work.set()
 
     def _handle_passed_control(self, message: events.ControlPassed) -> None:
+        """Pass control to another page; 0 makes or withdraws a request for control."""
         if message.to == 0:
             self._shared.pages.toggle_request(self._page)
         else:
@@ -189,6 +190,7 @@ class PageConnection:
         self._shared.pages.rename(self._page, message.name)
 
     def _handle_page(self, message: events.PageChanged) -> None:
+        """Adopt the size and the preferences of the page; raise ValueError if it has too many pixels."""
         if message.width * message.height > events.MAX_PAGE_PIXELS:
             raise ValueError("page too large")
         self._page.settings = message
@@ -197,6 +199,7 @@ class PageConnection:
     # Files from the page.
 
     async def _start_upload(self, message: events.UploadStarted) -> None:
+        """Prepare to receive a file; notify the page if it cannot be opened."""
         problem = "" if self._is_controlling else "Only the page that controls the window can open files."
         try:
             check_name(message.name)
@@ -208,6 +211,7 @@ class PageConnection:
         await self._finish_upload()
 
     async def _add_piece(self, piece: bytes) -> None:
+        """Add a piece to the current upload; raise ValueError if there is none or the piece is too large."""
         if self._page.upload is None:
             raise ValueError("a piece without a file")
         self._page.upload.add(piece)

@@ -158,7 +158,7 @@ class Pages:
         self.controlling: Page | None = None
         self.participants: list[dict[str, Any]] = []
         self._on_control_change = on_control_change
-        self._window_settings: PageChanged | None = None  # of the page that the window has fitted last
+        self._window_settings: PageChanged | None = None  # of the page to which the window was last fitted
         self._pages: list[Page] = []
 
     def __iter__(self) -> Iterator[Page]:
@@ -292,6 +292,7 @@ class Pages:
             page.has_updates.set()
 
     def _find(self, page_id: str, *, may_control: bool) -> Page | None:
+        """Return the page with an identity that was opened with the same link; None if there is none."""
         for page in self._pages:
             if page_id and page.page_id == page_id and page.may_control == may_control:
                 return page

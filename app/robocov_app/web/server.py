@@ -138,6 +138,7 @@ class WebDisplay:
         )
         self.saved_files: tuple[str, ...] = ()
         self._visitor_link = visitor_link
+        # The file that was last offered for download. A new number tells the page that it is a new offer.
         self._offer: dict[str, Any] = {"number": 0, "name": ""}
         self._status = ""
         self._controls: dict[str, Any] | None = None
@@ -234,6 +235,7 @@ class WebDisplay:
     # Called in the server's thread.
 
     def _run(self) -> None:
+        """Run the server; the target of its thread."""
         try:
             asyncio.run(self._serve())
         finally:
@@ -285,6 +287,7 @@ class WebDisplay:
         return respond_with_page(connection, may_be_framed=has_link, cookie=cookie)
 
     async def _download(self, connection: ServerConnection, name: str) -> Response:
+        """Return a saved file, or a result folder as a zip archive."""
         path = self.shared.folder / name
         try:
             file_name, body = await self._loop.run_in_executor(self._file_executor, read_saved, path)
@@ -294,6 +297,7 @@ class WebDisplay:
         return respond_with(connection, HTTPStatus.OK, body, "application/octet-stream", headers)
 
     def _read_cookie(self, request: Request) -> str:
+        """Return the token in this server's cookie; empty if the request has none."""
         return parse_cookies(request.headers.get_all("Cookie")).get(self._cookie_name, "")
 
     def _read_token(self, request: Request) -> str:
@@ -301,6 +305,7 @@ class WebDisplay:
         return get_token(request.path) or self._read_cookie(request)
 
     def _is_known(self, token: str) -> bool:
+        """Return whether a token grants access."""
         return are_equal(token, self.token) or are_equal(token, self.watch_token)
 
     async def _talk(self, connection: ServerConnection) -> None:
@@ -335,6 +340,7 @@ class WebDisplay:
             self.shared.window_input.put(events.FocusLost(kind="blur"))
 
     def _start_in_background(self, work: Coroutine[Any, Any, None]) -> None:
+        """Start a coroutine, and keep a reference to its task until it has ended."""
         task = asyncio.create_task(work)
         self._background.add(task)
         task.add_done_callback(self._background.discard)

@@ -216,6 +216,7 @@ class VisitorServer:
         return response
 
     def _read_cookie(self, request: Request) -> str:
+        """Return the token in the visitors' cookie; empty if the request has none."""
         return parse_cookies(request.headers.get_all("Cookie")).get(self._folders.cookie, "")
 
     def _read_token(self, request: Request) -> str:
@@ -394,4 +395,5 @@ def _cancel_on_signals() -> None:
 
 
 def _shorten_reason(text: str) -> str:
+    """Shorten the reason for closing a socket to `MAX_REASON_BYTES` without splitting a character."""
     return text.encode()[:MAX_REASON_BYTES].decode(errors="ignore")

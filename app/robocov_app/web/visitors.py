@@ -40,6 +40,7 @@ def is_signed(token: str, key: str) -> bool:
 
 
 def _compute_signature(visitor: str, key: str) -> str:
+    """Return the first 128 bits of the HMAC of an identity, as hexadecimal digits."""
     return hmac.new(key.encode(), visitor.encode(errors="replace"), sha256).hexdigest()[:32]
 
 
@@ -90,6 +91,7 @@ class VisitorFolders:
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _read(self) -> dict[str, Any]:
+        """Return the content of the file; empty if it cannot be read."""
         with suppress(OSError, ValueError):
             content = json.loads((self._folder / FILE_NAME).read_text("utf-8"))
             if isinstance(content, dict):
@@ -98,6 +100,7 @@ class VisitorFolders:
 
 
 def _hash(visitor: str) -> str:
+    """Return the hash under which the folder of a visitor's identity is stored."""
     return sha256(visitor.encode(errors="replace")).hexdigest()
 
 

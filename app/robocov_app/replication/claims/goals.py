@@ -96,6 +96,7 @@ def judge_goals(
 
 
 def _build_goal(name: str, text: str, criterion: Criterion, explanation: str, outcomes: Outcomes) -> Claim:
+    """Build a goal with its only criterion, and judge it."""
     goal = Claim(f"goal-{name}", GOALS, text)
     return goal.judge((criterion,), explanation, outcomes, runs_per_instance=1)
 
@@ -267,6 +268,7 @@ def estimate_worst_ratio(pairs: PairedComparison) -> Interval:
 
 
 def _describe_highest(values: Mapping[str, float], bound: float) -> str:
+    """Return a sentence with the map of the highest value, and the number of maps above a bound."""
     above = sum(value > bound for value in values.values())
     highest = max(values, key=values.__getitem__)
     return f"Highest on {highest}; above the bound on {above} of {len(values)} maps."
@@ -279,6 +281,7 @@ def is_goal_met(goal: Claim) -> bool:
 
 
 def _describe_miss(goal: Claim) -> str:
+    """Return the measured value of a missed goal and its bound, such as "1.8% instead of at most 1.4%"."""
     (criterion,) = goal.criteria
     estimate = format_amount(criterion.interval.estimate, criterion.unit)
     return f"{estimate} instead of {criterion.range_text}"

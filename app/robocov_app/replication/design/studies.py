@@ -150,6 +150,7 @@ def build_contest(
 
 
 def _build_common_options(plan: Plan) -> dict[str, Any]:
+    """Return the options that all sweeps of contenders and gain grids have in common."""
     return {
         "robots": (ROBOTS,),
         "cost_hz": _COST_RATE_HZ,

@@ -83,7 +83,13 @@ def replace_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> En
 
 
 def _build_start(environment: Environment, kind: str) -> StartSpec:
-    """Build a start: anywhere, or in a free disc as near as possible to the lower left corner or middle."""
+    """Build a start: anywhere, or in a free disc as near as possible to the lower left corner or middle.
+
+    Raises
+    ------
+    StartError
+        If no disc fits into the free space.
+    """
     if kind == "uniform":
         return UniformStart()
     min_x, min_y, max_x, max_y = environment.region.bounds

@@ -115,10 +115,12 @@ def _guess_paper_contenders(plan: Plan) -> tuple[Contender, ...]:
 
 
 def _count_gain_sets(participants: tuple[Contender, ...]) -> int:
+    """Return the number of different combinations of a controller and its gains."""
     return sum(len(sets) for sets in contenders.collect_gain_sets(participants).values())
 
 
 def _count_runs_left(folder: Path, name: str, study: Study) -> int:
+    """Return the number of runs of a sweep that have no folder yet."""
     finished = list((get_study_folder(folder, name) / RUNS_FOLDER).glob("[!.]*"))
     return max(len(study) - len(finished), 0)
 

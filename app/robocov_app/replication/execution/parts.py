@@ -358,6 +358,7 @@ def _get_placements(outcomes: Outcomes) -> FloatArray:
 
 
 def _read_single_run(folder: Path) -> FigureRun:
+    """Read the only run of a sweep."""
     ((_, run),) = _read_figure_runs(folder)
     return run
 

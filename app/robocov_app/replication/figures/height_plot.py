@@ -93,16 +93,19 @@ def _find_optimum(cell: VoronoiPartition, height: float) -> SensorOptimum:
 
 
 def _compute_cost(cell: VoronoiPartition, position: FloatArray, height: float) -> float:
+    """Compute the cost of a cell for a sensor at a position, (2,) m, and a height, m."""
     offsets = position[None] - cell.generators
     return float(compute_locational_costs(cell.edges, offsets, Sensing(height))[0])
 
 
 def _build_optimum(cell: VoronoiPartition, height: float, position: FloatArray, loss: float) -> SensorOptimum:
+    """Build the optimum at a position, (2,) m, with its distance from the centroid."""
     x, y = position.tolist()
     return SensorOptimum(height, x, y, float(np.hypot(*(position - cell.centroids[0]))), loss)
 
 
 def _build_cell() -> VoronoiPartition:
+    """Return the pentagon as the only cell of a partition."""
     region = Region(np.array(PENTAGON))
     return partition(region.centroid[None], region)
 
@@ -310,6 +313,7 @@ def _get_distance_curve(optima: Sequence[SensorOptimum]) -> tuple[list[float], l
 
 
 def _simplify_axes(axes: Axes, theme: Theme, label: str = "", grid: Literal["y", ""] = "") -> None:
+    """Style axes with short ticks and no minor ones."""
     style_axes(axes, theme, label, grid=grid)
     axes.tick_params(length=3.0, left=True)
     axes.minorticks_off()

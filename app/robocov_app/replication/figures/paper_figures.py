@@ -129,6 +129,7 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], partition_run: R
 
 
 def _describe_partition(run: Record) -> str:
+    """Return a sentence with the mean distance of the robots from the centroids of their cells."""
     positions = run.positions[0]
     centroids = partition(positions, run.environment.region).centroids
     mean_distance = float(np.hypot(*(centroids - positions).T).mean())
@@ -158,6 +159,7 @@ def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
 
 
 def _describe_final_costs(rapf: FigureRun, other: FigureRun) -> str:
+    """Return a sentence that compares the final costs of two runs."""
     rapf_cost = float(rapf.history.mean_distance[-1])
     other_cost = float(other.history.mean_distance[-1])
     return (
@@ -167,6 +169,7 @@ def _describe_final_costs(rapf: FigureRun, other: FigureRun) -> str:
 
 
 def _describe_other_starts(runs: Mapping[str, FigureRun]) -> str:
+    """Return a sentence on the distances between the final positions from two different starts."""
     distances = []
     for controller in ("rapf", "rpf"):
         first = runs[f"b/{controller}"].record.positions[-1]

@@ -399,6 +399,7 @@ def format_span(numbers: Sequence[int]) -> str:
 
 
 def _format_hundredths(value: float) -> str:
+    """Format a number with two decimals; a dash if it is not finite."""
     return f"{value:.2f}" if math.isfinite(value) else NO_VALUE
 
 

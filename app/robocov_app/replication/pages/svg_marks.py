@@ -40,6 +40,8 @@ _MIN_HIGHEST_GAP = 0.01
 
 
 class _Range(NamedTuple):
+    """The lowest and the highest value on the axis of a bar."""
+
     low: float
     high: float
 
@@ -192,9 +194,11 @@ def _compute_dot_offset(rank: int) -> float:
 
 
 def _build_svg(kind: str, width: float, height: float, description: str, parts: Sequence[str]) -> Markup:
+    """Build an SVG element of a CSS class and a size, px, with a description for screen readers."""
     head = f'<svg class="{kind}" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{description}">'
     return Markup(f"{head}{''.join(parts)}</svg>")
 
 
 def _compute_signed_root(value: float) -> float:
+    """Return the square root of the absolute value, with the sign of the value."""
     return math.copysign(math.sqrt(abs(value)), value)

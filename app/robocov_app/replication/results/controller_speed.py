@@ -171,6 +171,7 @@ def _load_entries(path: Path) -> dict[str, Any]:
 
 
 def _save_entries(path: Path, entries: Mapping[str, Any], plan: Plan) -> None:
+    """Write the measurements by the number of robots, with their common settings."""
     document = {
         **_HEAD,
         "map": TIMING_MAP,

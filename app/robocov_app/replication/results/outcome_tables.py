@@ -181,4 +181,5 @@ def _read_rows(folder: Path, instances: Iterable[ProblemInstance]) -> Iterator[t
 
 
 def _identify_controller(controller: str, gains: Mapping[str, Any]) -> _ControllerKey:
+    """Return a key for a controller and all its gains, which are among the given values by name."""
     return (controller, *(gains[name] for name in get_gains(CONTROLLERS.get(controller))))

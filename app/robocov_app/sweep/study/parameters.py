@@ -173,6 +173,7 @@ def parse_parameter(name: str, value: object, path: JsonPath) -> ParameterValue:
 
 
 def _parse_choice(name: str, value: object, path: JsonPath) -> str:
+    """Check that a value is one of the texts in `CHOICES`."""
     if value not in CHOICES[name]:
         expected = " or ".join(CHOICES[name])
         raise ParameterError(f"{format_path(path)}: expected {expected}, got {quote(value)}")

@@ -406,6 +406,11 @@ def _load_maps(entries: list[str], folder: Path) -> list[StudyMap]:
         Names of bundled maps, and paths or patterns of map files relative to the folder; or `ALL_MAPS` alone.
     folder : Path
         Folder of the study file.
+
+    Raises
+    ------
+    InputError
+        If a map is unknown or cannot be read, or two maps have the same name.
     """
     bundled = list_bundled_maps()
     if entries == [ALL_MAPS]:
