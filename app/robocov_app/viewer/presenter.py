@@ -90,7 +90,7 @@ class Presenter(ViewerModel):
     def resize_tool(self, factor: float) -> None:
         """Change the size of the tool in use by a factor; if it has none, the width of walls.
 
-        The hand changes the selected wall. If no wall is selected, it is the width of new walls.
+        With the hand, this is the width of the selected wall or, if no wall is selected, that of new walls.
         """
         if self.tool is self.toolbox.hand and self.selection.has_wall:
             self.show_message(self.selection.scale_wall_width(factor))

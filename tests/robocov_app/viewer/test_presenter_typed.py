@@ -220,6 +220,11 @@ def test_invalid_commands_are_reported_in_one_line_and_change_nothing(text: str)
     ) == before
 
 
+def test_a_speed_that_is_too_small_is_answered_with_the_limits() -> None:
+    with pytest.raises(ParameterError, match=r"speed: expected a number from 0.01 to 1000, got '0.001'"):
+        run_text(build_presenter(), "speed 0.001")
+
+
 def test_a_misspelled_command_is_answered_with_the_nearest_name() -> None:
     with pytest.raises(InputError, match="robots"):
         run_text(build_presenter(), "robts 3")

@@ -53,7 +53,7 @@ class SelectionActions:
 
     def duplicate(self) -> str:
         """Add a copy of each selected obstacle next to it, and select the copies; return a message."""
-        copies = self._move(*DUPLICATE_OFFSET_M)
+        copies = self._build_moved_copies(*DUPLICATE_OFFSET_M)
         name = describe_obstacles(copies)
         message = add_obstacles(self._viewer.session, copies, f"{name} duplicated")
         self._viewer.inspection.select_obstacles(copies)
@@ -62,7 +62,7 @@ class SelectionActions:
     def nudge(self, dx: float, dy: float) -> str:
         """Move the selected obstacles by dx and dy, m; return a message."""
         before = self._require_obstacles()
-        moved = self._move(dx, dy)
+        moved = self._build_moved_copies(dx, dy)
         name = describe_obstacles(moved)
         message = exchange_obstacles(self._viewer.session, before, moved, f"{name} moved")
         self._viewer.inspection.select_obstacles(moved)
@@ -92,7 +92,7 @@ class SelectionActions:
         viewer.attempt(lambda: self.nudge(length * direction[0], length * direction[1]))
         return True
 
-    def _move(self, dx: float, dy: float) -> tuple[Obstacle, ...]:
+    def _build_moved_copies(self, dx: float, dy: float) -> tuple[Obstacle, ...]:
         """Return copies of the selected obstacles, moved by dx and dy, m."""
         return tuple(map_edits.move_obstacle(obstacle, dx, dy) for obstacle in self._require_obstacles())
 

@@ -152,9 +152,9 @@ class BranchPart:
         step : int
             Step in which it is dragged or placed.
         """
-        for time in self.handled:
-            if time.robot == robot and time.end_step >= step - 1:
-                time.end_step = step + 1
+        for period in self.handled:
+            if period.robot == robot and period.end_step >= step - 1:
+                period.end_step = step + 1
                 return
         self.handled.append(HandledTime(robot, step, step + 1))
 
@@ -227,7 +227,7 @@ def build_part_records(part: BranchPart, root: Node) -> list[Record]:
 
 
 def _describe_origin(part: BranchPart, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
-    """Return entries for ``run.json`` on the origin of a record; none if it is like any other run."""
+    """Return entries for ``run.json`` on the origin of a record; empty if it is that of an ordinary run."""
     origin = {**_describe_start(part, setup, record, dt), **_describe_user_actions(part, dt)}
     is_repeatable = _is_repeatable(part, setup, record)
     if not origin and is_repeatable:
@@ -254,7 +254,7 @@ def _describe_user_actions(part: BranchPart, dt: float) -> dict[str, Any]:
     """Return the robots that the user dragged or placed, with times since the start of the part, s."""
     origin: dict[str, Any] = {}
     if part.handled:
-        origin["edits"] = [_describe_handled(time, part.first_step, dt) for time in part.handled]
+        origin["edits"] = [_describe_handled(period, part.first_step, dt) for period in part.handled]
     if part.placed:
         origin["placements"] = [
             {"time_s": (step - part.first_step) * dt, "robots": [robot]} for step, robot in part.placed
@@ -270,10 +270,10 @@ def _is_repeatable(part: BranchPart, setup: PaneSetup, record: Record) -> bool:
     return has_known_memory and has_all_robots and not part.handled and not is_turned
 
 
-def _describe_handled(time: HandledTime, first_step: int, dt: float) -> dict[str, Any]:
-    start = (time.first_step - first_step) * dt
-    end = (time.end_step - first_step) * dt
-    return {"from_s": start, "to_s": end, "robots": [time.robot]}
+def _describe_handled(period: HandledTime, first_step: int, dt: float) -> dict[str, Any]:
+    start = (period.first_step - first_step) * dt
+    end = (period.end_step - first_step) * dt
+    return {"from_s": start, "to_s": end, "robots": [period.robot]}
 
 
 def build_pane_scene(pane: Pane, costs: list[PartCost] | None = None, name: str = "") -> Scene:

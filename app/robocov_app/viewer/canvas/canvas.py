@@ -179,6 +179,7 @@ class ViewerCanvas:
         hits = [(float(distances[row]), scene.get_number(row)) for row in rows]
         for number, position in scene.failed.items():
             distance = float(np.hypot(*(np.array(position) - point))) * canvas.camera.zoom
+            # `FAILED_RADIUS_PX` includes the margin for the mouse.
             failed_radius_px = FAILED_RADIUS_PX + margin_px - _HIT_MARGIN_PX
             if distance <= max(failed_radius_px * self.layout.scale, min_radius):
                 hits.append((distance, number))

@@ -25,7 +25,8 @@ UNLIMITED_SCAN_RANGE_M = 12.0  # length of rays if the sensing range is unlimite
 MAX_COST_LAG_S = 0.25  # if the displayed cost is older than this, its caption states its time
 
 _COLOR_LIMIT_MARGIN = 1.1  # so that the color scale does not have to change again soon
-_COLOR_LIMIT_RANGE = (0.55, 1.0)  # the color scale stays while the largest distance is in this fraction of it
+_COLOR_LIMIT_RANGE = (0.55, 1.0)
+"""The color scale stays while the largest distance, as a fraction of its end, is between these."""
 
 
 class SceneBuilder:

@@ -149,8 +149,8 @@ def find_branch_line(
     reach = _REACH_PX * frame.scale
     for line in lines:
         left, right = _get_columns(frame, line)
-        is_beside = left - reach <= pixel[0] <= right + reach
-        if is_beside and abs(pixel[1] - _get_row(frame, line.lane)) < reach:
+        is_in_columns = left - reach <= pixel[0] <= right + reach
+        if is_in_columns and abs(pixel[1] - _get_row(frame, line.lane)) < reach:
             return line
     return None
 

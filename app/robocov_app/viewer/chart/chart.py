@@ -108,7 +108,7 @@ class Chart:
         return self._branch_lines
 
     def find_branch(self, pixel: tuple[int, int]) -> int | None:
-        """Return the last node of the branch at a pixel, in the tree or as a curve; None without one."""
+        """Return the last node of the branch at a pixel, in the tree or as a curve; None if there is none."""
         line = find_branch_line(self._frame, self._branch_lines, pixel)
         if line is not None:
             return line.node
@@ -152,12 +152,12 @@ class Chart:
         return self.switch_box is not None and is_inside(self.switch_box, pixel)
 
     def find_ghost(self, pixel: tuple[int, int]) -> int | None:
-        """Return the number of the last node of the branch whose curve is at a pixel; None without one."""
+        """Return the last node of the branch whose curve is at a pixel; None if there is none."""
         point = np.array([pixel[0], pixel[1] - self.layout.chart.top])
         return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self.layout.scale)
 
     def _describe_ghost(self, pixel: tuple[int, int]) -> str:
-        """Describe the branch at a pixel, in the tree or as a curve; empty without one."""
+        """Describe the branch at a pixel, in the tree or as a curve; empty if there is none."""
         line = find_branch_line(self._frame, self._branch_lines, pixel)
         if line is not None:
             return line.text

@@ -138,7 +138,7 @@ def _list_time_commands(viewer: Presenter) -> list[Command]:
     go_to_start = partial(playback.show_time, 0.0)
     previous_branch = partial(playback.go_to_next_branch, -1)
     next_branch = partial(playback.go_to_next_branch, 1)
-    time_argument = Argument("seconds", partial(_read_positive_number, "time"))
+    time_argument = Argument("seconds", _read_time)
     branch_argument = Argument("branch", list_values=playback.list_branch_names)
     group = CommandGroup("Time")
     group.add("back", "Step back", step_back, "left", repeats=True)
@@ -285,14 +285,22 @@ def _read_path(text: str) -> Path | None:
 def _read_speed(text: str) -> float:
     if text in ("max", "inf"):
         return math.inf
-    return _read_positive_number("speed", text, MIN_SPEED, MAX_SPEED)
-
-
-def _read_positive_number(name: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
-    try:
-        value = float(text.rstrip("×x"))
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        raise ParameterError(f"{name}: expected a positive number, got {text!r}")
+    value = _parse_number(text.rstrip("×x"))
+    if not MIN_SPEED <= value <= MAX_SPEED:
+        raise ParameterError(f"speed: expected a number from {MIN_SPEED:g} to {MAX_SPEED:g}, got {text!r}")
     return value
+
+
+def _read_time(text: str) -> float:
+    value = _parse_number(text)
+    if not 0.0 <= value < math.inf:
+        raise ParameterError(f"time: expected a number of at least 0, got {text!r}")
+    return value
+
+
+def _parse_number(text: str) -> float:
+    """Convert typed text to a number; nan if it is not one."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

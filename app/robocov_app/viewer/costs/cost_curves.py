@@ -146,6 +146,7 @@ class CostCurves:
         curve = pane.distance_curve
         if curve.first_time > TIME_TOLERANCE_S:
             state = self._get_state(pane.number, 0.0)
+            # The cost of the displayed step is requested anyway.
             is_requested = state is not None and state.time == self._viewer.session.displayed.time
             return None if is_requested else state
         min_length = max(MAX_GAP_S, MAX_GAP_FRACTION * curve.last_time)

@@ -132,7 +132,7 @@ class Costs:
         self._map_number = 0
         self._is_prepared = False
         self._queued: dict[int, CostRequest] = {}
-        self._pending_pane: int | None = None  # None if the pending answer is no longer wanted
+        self._pending_pane: int | None = None  # None for a map, or if the answer is no longer needed
 
     def set_environment(self, environment: Environment, radius: float = DEFAULT_RADIUS_M) -> None:
         """Start to prepare the computation of costs on another map, or for another size of robots.

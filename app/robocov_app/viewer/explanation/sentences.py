@@ -180,9 +180,9 @@ def _list_limits(situation: RobotSituation) -> list[str]:
     limit = situation.max_acceleration
     if acceleration > _FAST_ACCELERATION * limit:
         allowed = format_number(limit)
-        wanted = format_number(acceleration)
-        if wanted != allowed:
-            texts.append(f"acceleration limited to {allowed} m/s² (the forces ask for {wanted} m/s²)")
+        requested = format_number(acceleration)
+        if requested != allowed:
+            texts.append(f"acceleration limited to {allowed} m/s² (the forces ask for {requested} m/s²)")
     max_speed = situation.max_speed
     low, high = _FULL_SPEED
     if situation.speed >= low * max_speed:

@@ -179,6 +179,7 @@ class RobotSituation:
         return [item for item in nearby if item.gap <= MAX_CONTACT_GAP_M]
 
     def _name_pressed_objects(self) -> str:
+        """Return the names of the touched objects against which the resultant presses the robot."""
 
         def is_pressed(item: NearbyObject) -> bool:
             return compute_alignment(self.resultant, item.offset) > _MIN_PRESSING_ALIGNMENT

@@ -74,7 +74,7 @@ _ROBOTS_AND_SEED_PX = (49, 44, 24, 24, 8, 36, 60, 26)
 _SLIDER_ROW_PX = 20
 _FINGER_SLIDER_ROW_PX = 30
 _FINGER_SCALE = 1.2
-"""Size of widgets on a phone, in sizes elsewhere."""
+"""Factor of the size of widgets on a phone."""
 _MARK_PX = 4  # bar next to the controller of the active pane
 _SAMPLE_PX = 24
 _SAMPLE_LINE_PX = 3.0
@@ -498,7 +498,9 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
 
 
 def describe_controllers(names: Iterable[str], shown: Iterable[str]) -> dict[str, str]:
-    """Return a line about each controller, by name; empty for those in use, as in `label_controllers`.
+    """Return a line about each controller, by name; empty for those in use, which are not loaded.
+
+    See `label_controllers` for the parameters.
 
     Examples
     --------

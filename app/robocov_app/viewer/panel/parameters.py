@@ -15,8 +15,6 @@ from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 SLIDER_SPAN = 30.0  # a slider ranges from 1 / 30 of the default to 30 times the default
 NO_LIMIT_POSITION = 0.985  # beyond this position the slider of an optional parameter means "no limit"
 NO_LIMIT_TEXTS = ("unlimited", "none", "null", "no limit", "inf", "∞", "")
-
-
 MAX_BASIC_GAINS = 4
 """Number of numeric gains of a controller that are always visible; the others are advanced."""
 GAIN_LABELS: Mapping[str, str] = MappingProxyType(

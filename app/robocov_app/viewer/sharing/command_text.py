@@ -55,7 +55,7 @@ def can_be_command(run: SharedRun) -> bool:
 
 
 def build_command(run: SharedRun) -> str:
-    """Return the command that simulates a run, or a line for each controller that is in it twice.
+    """Return the command that simulates a run; one line per controller if a controller is in it twice.
 
     Parameters
     ----------

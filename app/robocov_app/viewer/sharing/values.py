@@ -5,7 +5,7 @@ import math
 
 
 def format_number(value: float) -> str:
-    """Return the shortest text from which a number is read again; ``inf`` for infinity.
+    """Return a short text that is read back as exactly the same number; ``inf`` for infinity.
 
     Parameters
     ----------

@@ -82,6 +82,7 @@ class ItemFocus:
             dy = item.box.centery - current.box.centery
             along = dx * x + dy * y
             across = abs(dx * y) + abs(dy * x)
+            # Items far to the side of the direction are left out, and others count as farther away.
             if along > 0 and along >= across / 2 and (best is None or along + 2 * across < best[0]):
                 best = (along + 2 * across, item.name)
         if best is not None:

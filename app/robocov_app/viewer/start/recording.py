@@ -118,7 +118,7 @@ def _build_owner_grid(environment: Environment, result: Any) -> IntArray:
 
 
 def _choose_hues(owners: IntArray, robots: int) -> IntArray:
-    """Choose the hue of each robot so that cells that ever share an edge differ if possible."""
+    """Choose the hue of each robot so that cells that share an edge in the last frame differ if possible."""
     if robots <= MAX_OWN_HUES:
         return choose_robot_hues(robots)
     pairs: list[tuple[int, int]] = []
@@ -129,9 +129,9 @@ def _choose_hues(owners: IntArray, robots: int) -> IntArray:
 
 def _list_neighbors(grid: IntArray) -> Sequence[tuple[int, int]]:
     """Return the owners of all adjacent cells of a grid that have different owners."""
-    beside = np.column_stack([grid[:, 1:].ravel(), grid[:, :-1].ravel()])
-    below = np.column_stack([grid[1:].ravel(), grid[:-1].ravel()])
-    pairs = np.concatenate([beside, below])
+    horizontal = np.column_stack([grid[:, 1:].ravel(), grid[:, :-1].ravel()])
+    vertical = np.column_stack([grid[1:].ravel(), grid[:-1].ravel()])
+    pairs = np.concatenate([horizontal, vertical])
     return [(int(first), int(second)) for first, second in pairs if first != second]
 
 

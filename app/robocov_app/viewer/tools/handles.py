@@ -112,6 +112,7 @@ def drag_handle(
     if isinstance(obstacle, PolygonObstacle) and handle.kind == "corner":
         return _resize_polygon(obstacle, handle, point, keeps_proportions=shift, is_centered=alt)
     if isinstance(obstacle, WallObstacle):
+        # The edge from the point before or, for the first point, from the second one.
         origin = obstacle.points[handle.index - 1 if handle.index else 1]
         points = _move_point(obstacle.points, handle.index, origin, point, is_constrained=shift)
         return replace(obstacle, points=points)
@@ -126,6 +127,7 @@ def _move_point(
     """Return points with one of them moved; its edge from `origin` may be constrained to a round angle."""
     if is_constrained:
         point = constrain_angle(origin, point)
+    # `map_points` rounds the coordinates.
     moved = map_points((point,), lambda coordinates: coordinates)
     return (*points[:index], *moved, *points[index + 1 :])
 

@@ -228,7 +228,7 @@ def describe_obstacles(obstacles: tuple[Obstacle, ...]) -> str:
 
 
 def _remove_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return the map without an obstacle, for snapping; if it is the same map, with it."""
+    """Return the map without an obstacle, for snapping; the whole map if it cannot be removed."""
     with suppress(RobocovError):
         return map_edits.replace_obstacles(environment, environment.obstacles.index(obstacle), 1)
     return environment

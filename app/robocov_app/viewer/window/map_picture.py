@@ -15,7 +15,7 @@ from robocov_app.viewer.lessons.sheet import draw_lesson_sheet
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.window.status_display import StatusDisplay
 
-_UNUSED_PIXEL = (1.0, 1.0)  # of the window, in the margin of its bar
+_UNUSED_PIXEL = (1.0, 1.0)  # of the window, in the margin of its bar, where a press has no effect
 
 
 class _LayoutKey(NamedTuple):

@@ -90,7 +90,7 @@ def _find_center_components(environment: Environment, radius: float) -> np.ndarr
 
 
 def _describe_narrow_gap(before: Environment, after: Environment, radius: float) -> list[str]:
-    """Return the description of the first gap that an edit has made too narrow; empty without one."""
+    """Return the description of the first gap that an edit has made too narrow; empty if there is none."""
     width = 2 * radius * (1 - _WIDTH_TOLERANCE)
     old_gaps = {gap.between for gap in find_narrow_gaps(before.free, width)}
     for gap in find_narrow_gaps(after.free, width):

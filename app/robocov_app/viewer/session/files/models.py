@@ -70,7 +70,7 @@ class NodeModel(_Model):
         description="Description of the edit in the window",
         validation_alias=AliasChoices("description", "words"),
     )
-    name: Text = Field("", description="Name of the branch that starts here")
+    name: Text = Field("", description="Name of the branch that ends here")
     end: Step = Field(description="Last step of the time span")
     changes: Annotated[list[_FileEdit], Field(min_length=1, description="What the edit changes, in order")]
     curves: dict[str, list[list[Coordinate]]] = Field(
