@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from color_vision import find_min_difference
+from color_vision import find_min_difference, measure_difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
@@ -115,6 +115,15 @@ class TestDifferentColors:
         cells = list_cell_colors(theme)
         assert find_min_difference(cells[:N_SHARED_HUES]) >= 8.0
         assert find_min_difference(cells) >= 4.5
+
+    def test_cells_differ_clearly_for_normal_vision(self, theme):
+        cells = list_cell_colors(theme)[:N_SHARED_HUES]
+        differences = [measure_difference(first, second) for first, second in combinations(cells, 2)]
+        assert min(differences) >= 9.0
+
+    def test_cells_differ_from_the_background(self, theme):
+        for cell in list_cell_colors(theme):
+            assert find_min_difference([cell, theme.background]) >= 5.5
 
     def test_controllers_of_the_paper_differ_for_all_color_visions(self, theme):
         assert find_min_difference(list(theme.controllers.values())) >= 18.0
