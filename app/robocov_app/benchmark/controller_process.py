@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import secrets
+import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 import numpy as np
 
+from robocov.compiled import open_cache_folder
 from robocov.controllers.base import Information
 from robocov.errors import ParameterError, RobocovError, quote
 from robocov.observation import Decision, Observations, Scanning
@@ -31,6 +36,8 @@ from robocov_app.jobs.messages import send
 from robocov_app.jobs.processes import end_process, start_python
 
 _PROGRAM = "from robocov_app.benchmark.controller_program import run_controller_program as run; run()"
+CACHE_PREFIX = "robocov-verify-"
+"""Beginning of the names of temporary folders for machine code."""
 _MAX_LISTED = 20
 """Maximum number of violations, and of files, that are listed."""
 Measure: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
@@ -44,6 +51,11 @@ class ControllerFaultError(RobocovError):
 class ControllerProcess:
     """A process that executes a controller, and from which only plain values are accepted.
 
+    Parameters
+    ----------
+    folder : Path
+        Folder for the machine code that processes compile. Each has a folder of its own in it.
+
     Attributes
     ----------
     violations : list of str
@@ -52,11 +64,14 @@ class ControllerProcess:
         Files that the controller has read, apart from those of Python and installed packages.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
         self.violations: list[str] = []
         self.read_files: list[str] = []
         # Processes must not share a file, through which robots could exchange what they know.
-        self._process = start_python(_PROGRAM, stderr=subprocess.DEVNULL)
+        self._cache = _create_cache(folder)
+        self._process = start_python(
+            _PROGRAM, stderr=subprocess.DEVNULL, variables={"NUMBA_CACHE_DIR": str(self._cache)}
+        )
         self._step_encoder = StepEncoder()
         self._robot_count = 0
 
@@ -115,9 +130,10 @@ class ControllerProcess:
             raise ControllerFaultError(str(error)) from None
 
     def end(self) -> None:
-        """End the process."""
+        """End the process, and remove its machine code."""
         self._process.kill()
         end_process(self._process)
+        shutil.rmtree(self._cache, ignore_errors=True)
 
     def _send(self, message: object) -> None:
         assert self._process.stdin is not None
@@ -168,6 +184,22 @@ class ControllerProcess:
             return str(error)
 
 
+def _create_cache(folder: Path) -> Path:
+    """Create a cache folder for one process, with a copy of the machine code of robocov.
+
+    Controllers must not write to the cache that other processes read. No process can guess the name of the
+    folder of another.
+    """
+    cache = folder / secrets.token_hex(16)
+    cache.mkdir(mode=0o700)
+    shared_cache = open_cache_folder()
+    if shared_cache is not None:
+        # Other programs may replace files at the same time. What is missing in the copy is compiled again.
+        with suppress(shutil.Error):
+            shutil.copytree(shared_cache, cache / shared_cache.name)
+    return cache
+
+
 def _add_once(texts: list[str], text: str) -> None:
     """Add a text to a list that does not contain it, unless the list is full."""
     if text not in texts and len(texts) < _MAX_LISTED:
@@ -194,11 +226,12 @@ def describe_controller(code: ControllerCode) -> tuple[Description, list[str]]:
     ControllerFaultError
         If the controller cannot be built.
     """
-    process = ControllerProcess()
-    try:
-        return process.describe(code), process.violations
-    finally:
-        process.end()
+    with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX) as folder:
+        process = ControllerProcess(Path(folder))
+        try:
+            return process.describe(code), process.violations
+        finally:
+            process.end()
 
 
 def read_description(values: Any) -> Description:

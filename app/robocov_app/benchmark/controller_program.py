@@ -167,6 +167,7 @@ def run_controller_program() -> None:
         lambda action: connection.send(VIOLATION, action),
         lambda path: connection.send(READING, path),
         _list_own_modules(code),
+        _list_own_files(code),
     )
     with provide_modules(modules):
         try:
@@ -185,6 +186,13 @@ def _list_own_modules(code: ControllerCode) -> set[str]:
         return set(code.source.modules)
     entries = entry_points(group=ENTRY_POINT_GROUP, name=code.name)
     return {entry.module for entry in entries}
+
+
+def _list_own_files(code: ControllerCode) -> set[str]:
+    """Return the paths of the source files of a controller in a file of the user."""
+    if code.source is None:
+        return set()
+    return {code.source.path, *[module.path for module in code.source.modules.values() if module.path]}
 
 
 def _decide_steps(setup: Setup, connection: _Connection) -> None:

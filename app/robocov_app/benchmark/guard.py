@@ -1,21 +1,25 @@
 """Detection of a user's controller that uses channels that no robot has: files, connections or processes.
 
 The guard is for a process that does nothing but call a controller. It uses the audit events of Python, and
-forbids the actions in `_FORBIDDEN_PREFIXES`, writing files, and reading the data of the benchmark or the
-memory of other processes. They are allowed only to a compiler, and to other packages while they are imported.
+replaces functions that cause none. It forbids the actions in `_FORBIDDEN_PREFIXES` and
+`_FUNCTIONS_WITHOUT_EVENTS`, writing files, listing folders, and reading the data of the benchmark or the
+memory of other processes. Packages may do so while they are imported. A compiler may write machine code, but
+only to the cache folder of this process, of which no other process knows.
 
-Python code can change its own process, so this is a tripwire and not a sandbox: only verify controllers that
-you would also run.
+Python code can change its own process, and compiled code can call the system without any event, so this is a
+tripwire and not a sandbox: only verify controllers that you would also run.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import re
 import sys
 import sysconfig
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import CodeType, FrameType
@@ -23,10 +27,11 @@ from typing import Any
 
 import robocov.compiled
 import robocov_app
+from robocov.compiled import open_cache_folder
 from robocov.controllers.user_modules import find_own_modules
 
 _COMPILERS = ("numba", "llvmlite")
-"""Packages that, like `robocov.compiled`, may write files and load libraries when they compile functions."""
+"""Packages that, like `robocov.compiled`, may write machine code and look up functions of libraries."""
 _IMPORT_FILE = "<frozen importlib._bootstrap>"
 """Name in place of a file for the code of Python that imports modules."""
 _IMPORT_FUNCTION = "_find_and_load"
@@ -37,15 +42,22 @@ _PROCESS_PATTERN = re.compile(r"/proc/(\d+)/")
 """Beginning of the paths of files that give access to a process."""
 _FROZEN_PATTERN = re.compile(r"<frozen (.+)>")
 """Name in place of a file for a module that is part of the Python executable."""
+_LISTING_EVENTS = ("os.listdir", "os.scandir")
+"""Audit events of listing a folder."""
 _FORBIDDEN_PREFIXES = (
+    *_LISTING_EVENTS,
     "ctypes.dlopen",
+    "ctypes.dlsym",
     "fcntl.",
     "mmap.",
+    "os.chdir",
     "os.chmod",
+    "os.chown",
     "os.exec",
     "os.fork",
     "os.kill",
     "os.link",
+    "os.lockf",
     "os.mkdir",
     "os.posix_spawn",
     "os.remove",
@@ -57,22 +69,69 @@ _FORBIDDEN_PREFIXES = (
     "os.system",
     "os.truncate",
     "os.utime",
+    "resource.",
     "shutil.",
     "socket.",
     "sqlite3.",
     "subprocess.",
+    "syslog.",
     "_thread.start_new_thread",
     "_posixsubprocess.",
 )
 """Beginnings of the names of audit events that a controller must not cause."""
+_FUNCTIONS_WITHOUT_EVENTS = {
+    "os": (
+        "memfd_create",
+        "mkfifo",
+        "mknod",
+        "nice",
+        "openpty",
+        "posix_openpt",
+        "sched_setaffinity",
+        "sched_setparam",
+        "sched_setscheduler",
+        "setpgid",
+        "setpriority",
+        "setsid",
+    ),
+    "signal": ("pidfd_send_signal",),
+    "_multiprocessing": ("SemLock", "sem_unlink"),
+    "_posixshmem": ("shm_open", "shm_unlink"),
+}
+"""Functions by module that a controller must not call, and that cause no audit event. Each changes something
+that another process can see."""
+_COMPILER_EVENTS = ("ctypes.dlsym", "ctypes.dlsym/handle")
+"""Audit events that a compiler may cause, in addition to those in its cache folder."""
+_CACHE_EVENTS = ("open", "os.mkdir", "os.remove", "os.rename", "os.utime", *_LISTING_EVENTS)
+"""Audit events that a compiler may cause in its cache folder."""
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 """Flags with which a file is opened for writing."""
+
+
+@dataclass(frozen=True)
+class _Action:
+    """Something that code in this process is about to do.
+
+    Attributes
+    ----------
+    event : str
+        Name of the audit event, or of a function without one.
+    paths : tuple of str
+        Absolute paths of the files and folders that it concerns.
+    prohibition : str
+        Description of an action that is forbidden; empty if a file is only read.
+    """
+
+    event: str
+    paths: tuple[str, ...]
+    prohibition: str
 
 
 def install_guard(
     report_violation: Callable[[str], object],
     report_reading: Callable[[str], object],
     own_packages: Collection[str] = (),
+    own_files: Collection[str] = (),
 ) -> None:
     """Guard this process until it ends, because audit hooks cannot be removed.
 
@@ -84,37 +143,70 @@ def install_guard(
         Receives the path of each file that is read, apart from those of Python and installed packages.
     own_packages : collection of str
         Names of the modules and packages that belong to the controller.
+    own_files : collection of str
+        Paths of the source files of the controller.
     """
     # Importing the user's modules must not write bytecode files.
     sys.dont_write_bytecode = True
-    callers = _Callers(own_packages)
-
+    callers = _Callers(own_packages, own_files)
     is_checking = False
 
-    def audit(event: str, arguments: tuple[Any, ...]) -> None:
+    def check(action: _Action | None) -> None:
         nonlocal is_checking
-        action = _describe_action(event, arguments)
-        path = _find_opened_file(event, arguments)
         # The check itself reads files.
-        if is_checking or (action is None and path is None):
+        if is_checking or action is None:
             return
         is_checking = True
         try:
-            if callers.is_trusted_call(sys._getframe(1)):
+            if callers.may_cause(action, sys._getframe(2)):
                 return
         finally:
             is_checking = False
-        if action is not None:
-            report_violation(action)
-            raise PermissionError(f"a controller must not do this: {action}")
-        if path is not None and not callers.is_library_file(path):
-            report_reading(path)
+        if action.prohibition:
+            report_violation(action.prohibition)
+            raise PermissionError(f"a controller must not do this: {action.prohibition}")
+        report_reading(action.paths[0])
 
+    def audit(event: str, arguments: tuple[Any, ...]) -> None:
+        check(_describe_event(event, arguments))
+
+    _replace_functions(check)
     sys.addaudithook(audit)
 
 
+def _replace_functions(check: Callable[[_Action], None]) -> None:
+    """Replace functions that cause no audit event by functions that check each call first."""
+    for module_name, names in _FUNCTIONS_WITHOUT_EVENTS.items():
+        try:
+            module = importlib.import_module(module_name)
+        except ImportError:
+            # Some modules do not exist on all systems.
+            continue
+        for name in names:
+            if hasattr(module, name):
+                _replace_function(module, name, check)
+
+
+def _replace_function(module: Any, name: str, check: Callable[[_Action], None]) -> None:
+    """Replace a function of a module, and of the module in which it is implemented."""
+    function = getattr(module, name)
+    full_name = f"{module.__name__}.{name}"
+
+    def call_after_check(*arguments: Any, **options: Any) -> Any:
+        check(_Action(full_name, (), f"calling {full_name}"))
+        return function(*arguments, **options)
+
+    # Python's own modules read constants of some classes that are replaced.
+    for attribute in ("SEM_VALUE_MAX", "_rebuild"):
+        if hasattr(function, attribute):
+            setattr(call_after_check, attribute, getattr(function, attribute))
+    for owner in (module, sys.modules.get(function.__module__ or "")):
+        if owner is not None and getattr(owner, name, None) is function:
+            setattr(owner, name, call_after_check)
+
+
 class _Callers:
-    """Decides whether an action was caused by a compiler, or by the import of an installed package.
+    """Decides whether an action is allowed, because of a compiler or of the import of an installed package.
 
     A frame is recognized by its code, which must be in the file of the package. The name of a module or of a
     file would not be enough, because a controller can execute its own code under any name.
@@ -123,9 +215,11 @@ class _Callers:
     ----------
     own_packages : collection of str
         Names of the modules and packages that belong to the controller.
+    own_files : collection of str
+        Paths of the source files of the controller.
     """
 
-    def __init__(self, own_packages: Collection[str]) -> None:
+    def __init__(self, own_packages: Collection[str], own_files: Collection[str]) -> None:
         self._own_packages = frozenset(name.partition(".")[0] for name in own_packages)
         own_folders = [_find_folder(name) for name in self._own_packages]
         self._own_folders = tuple(folder for folder in own_folders if folder is not None)
@@ -135,23 +229,66 @@ class _Callers:
         folders += [str(Path(path).parent) for path in (robocov.__file__, robocov_app.__file__)]
         self._library_folders = tuple(os.path.realpath(folder) + os.sep for folder in folders)
 
-    def is_trusted_call(self, frame: FrameType | None) -> bool:
-        """Return whether a compiler or an import called a frame, without own code in between."""
+        self._importlib_folder = os.path.realpath(Path(importlib.__file__).parent) + os.sep
+        self._own_files = frozenset(map(os.path.realpath, own_files))
+        # Later changes of sys.path are ignored.
+        search_folders = [*map(Path, sys.path), *[Path(file).parent for file in self._own_files]]
+        self._search_folders = tuple(os.path.realpath(folder) + os.sep for folder in search_folders)
+        self._cache_folder = _find_cache_folder()
+
+    def may_cause(self, action: _Action, frame: FrameType | None) -> bool:
+        """Return whether an action in a frame is allowed.
+
+        Everybody may read and list the files of Python and of installed packages, and Python looks for
+        modules in the folders on ``sys.path``. Further actions are allowed to compilers and imports without
+        own code between them and the action.
+        """
+        is_listing = action.event in _LISTING_EVENTS
+        may_be_seen = is_listing or not action.prohibition
+        if may_be_seen and action.paths and all(map(self._is_library_path, action.paths)):
+            return True
+        if not action.prohibition and f"{action.paths[0]}{os.sep}" in self._search_folders:
+            # An entry of sys.path may be an archive of modules.
+            return True
+        if is_listing and action.paths and self._is_search(action.paths[0], frame):
+            return True
         while frame is not None:
             code = frame.f_code
             file = _find_file(code)
-            if not self.is_library_file(file) or code not in _load_codes(file):
+            if not self._is_library_path(file) or code not in _load_codes(file):
                 return False
-            if file.startswith(self._compiler_paths):
+            if file.startswith(self._compiler_paths) and self._may_compiler_cause(action):
                 return True
             if (code.co_filename, code.co_name) == (_IMPORT_FILE, _IMPORT_FUNCTION):
                 return not self._is_own_module(frame.f_locals["name"])
             frame = frame.f_back
         return False
 
-    def is_library_file(self, file: str) -> bool:
-        """Return whether a file belongs to Python or to an installed package other than the controller's."""
-        return file.startswith(self._library_folders) and not file.startswith(self._own_folders)
+    def _is_search(self, folder: str, frame: FrameType | None) -> bool:
+        """Return whether Python lists a folder on ``sys.path``, or below, in order to find a module."""
+        if frame is None or not f"{folder}{os.sep}".startswith(self._search_folders):
+            return False
+        file = _find_file(frame.f_code)
+        return file.startswith(self._importlib_folder) and frame.f_code in _load_codes(file)
+
+    def _may_compiler_cause(self, action: _Action) -> bool:
+        """Return whether an action is one that a compiler needs."""
+        if action.event in _COMPILER_EVENTS:
+            return True
+        if not action.prohibition:
+            # The compiler reads the functions that it compiles.
+            return action.paths[0] in self._own_files or self._is_in_cache(action.paths[0])
+        is_in_cache = bool(action.paths) and all(map(self._is_in_cache, action.paths))
+        return action.event in _CACHE_EVENTS and is_in_cache
+
+    def _is_in_cache(self, path: str) -> bool:
+        """Return whether a path is that of the cache folder, or of something in it."""
+        return self._cache_folder is not None and f"{path}{os.sep}".startswith(self._cache_folder)
+
+    def _is_library_path(self, path: str) -> bool:
+        """Return whether a path belongs to Python or to an installed package other than the controller's."""
+        folder = f"{path}{os.sep}"
+        return folder.startswith(self._library_folders) and not folder.startswith(self._own_folders)
 
     def _is_own_module(self, name: str) -> bool:
         """Return whether a module belongs to the controller."""
@@ -164,6 +301,13 @@ def _find_folder(package: str) -> str | None:
     if spec is None or not spec.submodule_search_locations:
         return None
     return os.path.realpath(spec.submodule_search_locations[0]) + os.sep
+
+
+def _find_cache_folder() -> str | None:
+    """Return the folder for machine code of this process, with a separator at its end; None without one."""
+    configured = os.environ.get("NUMBA_CACHE_DIR")
+    folder = Path(configured) if configured else open_cache_folder()
+    return None if folder is None else os.path.realpath(folder) + os.sep
 
 
 def _find_file(code: CodeType) -> str:
@@ -193,36 +337,43 @@ def _list_codes(code: CodeType) -> Iterator[CodeType]:
             yield from _list_codes(constant)
 
 
-def _describe_action(event: str, arguments: tuple[Any, ...]) -> str | None:
-    """Describe the action of an audit event; return None if the action is allowed."""
+def _describe_event(event: str, arguments: tuple[Any, ...]) -> _Action | None:
+    """Describe the action of an audit event; return None if it neither is forbidden nor reads a file."""
     if event == "open":
         return _describe_opening(*arguments[:3])
-    if event.startswith(_FORBIDDEN_PREFIXES):
-        detail = next((str(value) for value in arguments if isinstance(value, str | bytes | Path)), "")
-        return f"{event} {detail}".strip()
-    return None
-
-
-def _find_opened_file(event: str, arguments: tuple[Any, ...]) -> str | None:
-    """Return the path of the file that an audit event opens; None if it opens no file."""
-    if event != "open" or isinstance(arguments[0], int):
+    if not event.startswith(_FORBIDDEN_PREFIXES):
         return None
-    return os.path.realpath(os.fsdecode(arguments[0]))
+    names = [_convert_path(value) for value in arguments if isinstance(value, str | bytes | os.PathLike)]
+    if event in _LISTING_EVENTS and arguments[0] is None:
+        names = [os.curdir]
+    paths = tuple(os.path.realpath(name) for name in names)
+    return _Action(event, paths, " ".join([event, *names[:1]]))
 
 
-def _describe_opening(path: Any, mode: Any, flags: Any) -> str | None:
-    """Describe the opening of a file; return None if it is allowed."""
+def _convert_path(path: Any) -> str:
+    """Return a path as a plain string, whatever methods its class has."""
+    name = os.fspath(path)
+    if isinstance(name, bytes):
+        return os.fsdecode(b"".join([name]))
+    return str.__str__(name)
+
+
+def _describe_opening(path: Any, mode: Any, flags: Any) -> _Action | None:
+    """Describe the opening of a file; return None if it has already been opened, and is only a number."""
     if isinstance(path, int):
         return None
-    name = os.path.realpath(os.fsdecode(path))
+    name = os.path.realpath(_convert_path(path))
     writes = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
     if isinstance(mode, str):
         writes = writes or any(character in mode for character in "wax+")
-    if writes:
-        return f"writing {name}"
-    if name.startswith(_DATA_FOLDER) and not name.endswith((".py", ".pyc")):
-        return f"reading {name}"
     process = _PROCESS_PATTERN.match(name)
-    if process is not None and int(process[1]) != os.getpid():
-        return f"reading {name}"
-    return None
+    is_other_process = process is not None and int(process[1]) != os.getpid()
+    prohibition = ""
+    if not isinstance(path, str | bytes):
+        # Such an object could return a different path than to the function that opens the file.
+        prohibition = f"opening {name} by an object"
+    elif writes:
+        prohibition = f"writing {name}"
+    elif is_other_process or (name.startswith(_DATA_FOLDER) and not name.endswith((".py", ".pyc"))):
+        prohibition = f"reading {name}"
+    return _Action("open", (name,), prohibition)

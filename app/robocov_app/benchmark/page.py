@@ -612,7 +612,11 @@ def _build_entries_table(labeled_results: Iterable[tuple[str, Mapping[str, Any]]
         source = "built in"
         if entry["source_sha256"]:
             source = f"source {entry['source_sha256'][:12]}"
-        origin = "robocov" if result["is_bundled"] else "a file, not verified here"
+        origin = "robocov"
+        if not result["is_bundled"]:
+            # A file can contain any name and any hash.
+            source = f"according to the file: {source}"
+            origin = "a file, not verified here"
         versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
         rows.append((label, entry["controller"], source, origin, gains or ratings.NO_VALUE, versions))
     head = ("Controller", "Name", "Code", "Result from", "Gains", "Versions")

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -42,6 +43,8 @@ class RepeatedRun:
         Rows of the robots whose decisions are repeated in processes of their own.
     seed : sequence of int
         Seed of the placeholders for other robots; see `robocov_app.benchmark.isolation`.
+    cache_folder : Path
+        Folder for the machine code that the processes of controllers compile.
     """
 
     task: Task
@@ -49,6 +52,7 @@ class RepeatedRun:
     description: Description
     robots: Sequence[int]
     seed: Sequence[int]
+    cache_folder: Path
 
 
 @dataclass(frozen=True)
@@ -83,8 +87,8 @@ class RefereeService:
         """Repeat a run while other processes execute its controller. There is only one question."""
         (run,) = questions
         with ExitStack() as stack:
-            team_process = _start_controller_process(stack)
-            robot_processes = {robot: _start_controller_process(stack) for robot in run.robots}
+            team_process = _start_controller_process(run, stack)
+            robot_processes = {robot: _start_controller_process(run, stack) for robot in run.robots}
             environment = None
             if run.description.information == "whole map":
                 environment = run.task.hide_unknown_density().build_environment().static
@@ -109,9 +113,9 @@ class RefereeService:
         )
 
 
-def _start_controller_process(stack: ExitStack) -> ControllerProcess:
-    """Start a process for a controller. It ends when the stack is closed."""
-    process = ControllerProcess()
+def _start_controller_process(run: RepeatedRun, stack: ExitStack) -> ControllerProcess:
+    """Start a process for the controller of a run. It ends when the stack is closed."""
+    process = ControllerProcess(run.cache_folder)
     stack.callback(process.end)
     return process
 

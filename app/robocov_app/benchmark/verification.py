@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass, field
@@ -29,10 +30,12 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from robocov.errors import InputError, format_count
+from robocov.kernel_compilation import ALL_EXAMPLES, compile_kernels
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.controller_messages import ControllerCode, Description, describe
 from robocov_app.benchmark.controller_process import (
+    CACHE_PREFIX,
     ControllerFaultError,
     describe_controller,
     read_description,
@@ -115,6 +118,8 @@ class Verification:
         Seed of all choices, with which the verification can be repeated.
     rows : int
         Number of rows of the result.
+    failed_rows : int
+        Number of rows of runs that failed.
     runs : int
         Number of runs of the suite that were repeated.
     robots : int
@@ -133,6 +138,7 @@ class Verification:
 
     seed: int
     rows: int
+    failed_rows: int = 0
     runs: int = 0
     robots: int = 0
     teams: int = 0
@@ -162,6 +168,27 @@ class Verification:
         self.robots += check.robots
         self.read_files += [file for file in check.read_files if file not in self.read_files]
 
+    @property
+    def is_successful(self) -> bool:
+        """Whether at least one run was repeated, and there are no differences."""
+        return self.runs > 0 and not self.differences
+
+    def describe_verdict(self) -> str:
+        """Return a sentence that says whether the result is verified, and what was left out."""
+        if self.differences:
+            return f"Not verified: {format_count(len(self.differences), 'difference')}."
+        if not self.runs:
+            return "Nothing verified: no run was repeated."
+        omissions = []
+        if not self.robots and not self.teams:
+            omissions.append("no robot was checked")
+        if not self.new_maps:
+            omissions.append("new maps were not tried")
+        if not omissions:
+            return "Verified: no difference."
+        runs = format_count(self.runs, "run")
+        return f"Verified: no difference in {runs}; {', and '.join(omissions)}."
+
     def compute_miss_probability(self, changed_count: int) -> float:
         """Compute the probability that none of the changed rows was among the repeated runs.
 
@@ -184,7 +211,14 @@ class Verification:
         repeated = f"{self.runs} of {format_count(self.rows, 'run')} repeated."
         if self.runs < self.rows:
             repeated += f" {self._describe_missing()}"
-        lines = [repeated, *self._describe_isolation()]
+        lines = [repeated]
+        if self.failed_rows:
+            lines.append(
+                f"{self.failed_rows} of {format_count(self.rows, 'run')} "
+                f"({self.failed_rows / self.rows:.0%}) failed in the result. A run that fails again is no "
+                "difference: look for the reason in the code."
+            )
+        lines += self._describe_isolation()
         if self.comparison is not None:
             lines.append(self._describe_new_maps(self.comparison))
         elif not self.new_maps:
@@ -287,7 +321,8 @@ def verify_result(
     studies = dict(stand_in.build_studies(_get_selection(result)))
     tasks = _index_tasks(studies)
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
-    verification = Verification(seed, rows=len(rows))
+    failed_count = sum("error" in row for row in rows.values())
+    verification = Verification(seed, rows=len(rows), failed_rows=failed_count)
     verification.differences += [f"its controller tried {violation}" for violation in violations]
     verification.differences += _compare_descriptions(result["entry"], {**identity, **asdict(description)})
     verification.differences += _compare_without_running(result, rows, tasks)
@@ -297,20 +332,23 @@ def verify_result(
     )
     new_maps = _sample_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
     new_tasks = _index_new_tasks(stand_in, new_maps)
-    checker = _RunChecker(
-        code,
-        description,
-        is_joint=rated.controller == ORACLE,
-        robots=options.robots,
-        seed=seed,
-    )
     chosen_tasks = {key: tasks[key] for key in sampled} | new_tasks
     new_outcomes: dict[RunKey, Outcome | None] = {}
-    for key, check in _check_runs(checker, chosen_tasks, options.workers, quiet=quiet, stop=stop):
-        verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
-        verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
-        if key in new_tasks:
-            new_outcomes[key] = check.outcome
+    # A process that is killed may still write to the folder.
+    with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX, ignore_cleanup_errors=True) as cache_folder:
+        checker = _RunChecker(
+            code,
+            description,
+            is_joint=rated.controller == ORACLE,
+            robots=options.robots,
+            seed=seed,
+            cache_folder=Path(cache_folder),
+        )
+        for key, check in _check_runs(checker, chosen_tasks, options.workers, quiet=quiet, stop=stop):
+            verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
+            verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
+            if key in new_tasks:
+                new_outcomes[key] = check.outcome
     if new_outcomes and not stop.requested:
         gaps = _compute_gaps_on_new_maps(new_maps, new_outcomes, options.workers, stop)
         verification.comparison = compare_gaps(result["rows"], gaps)
@@ -411,10 +449,19 @@ class _RunChecker:
         Number of robots that are isolated in each run.
     seed : int
         Seed of the choice of robots.
+    cache_folder : Path
+        Folder for the machine code that the processes of controllers compile.
     """
 
     def __init__(
-        self, code: ControllerCode, description: Description, *, is_joint: bool, robots: int, seed: int
+        self,
+        code: ControllerCode,
+        description: Description,
+        *,
+        is_joint: bool,
+        robots: int,
+        seed: int,
+        cache_folder: Path,
     ) -> None:
         self.is_joint = is_joint
         self.referees = Referees()
@@ -422,12 +469,15 @@ class _RunChecker:
         self._description = description
         self._robots = 0 if is_joint else robots
         self._seed = seed
+        self._cache_folder = cache_folder
 
     def check(self, key: RunKey, task: Task) -> tuple[RunKey, RunCheck]:
         """Repeat a run and isolate some robots; return the key and the check. Called in several threads."""
         seed = [self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16)]
         robots = np.random.default_rng(seed).permutation(task.robots)[: self._robots].tolist()
-        run = RepeatedRun(task, self._code, self._description, sorted(robots), seed)
+        run = RepeatedRun(
+            task, self._code, self._description, sorted(robots), seed, cache_folder=self._cache_folder
+        )
         return key, self.referees.repeat(run)
 
 
@@ -435,6 +485,9 @@ def _check_runs(
     checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, *, quiet: bool, stop: Interruption
 ) -> Iterator[tuple[RunKey, RunCheck]]:
     """Check runs in parallel, and report the progress; yield each check as soon as it is finished."""
+    if tasks:
+        # The processes of controllers start with a copy of this machine code, and share nothing later.
+        compile_kernels(ALL_EXAMPLES)
     progress = SweepProgress(len(tasks))
     with report_progress("verify", progress, quiet=quiet) as reporter:
         for key, check in _check_in_threads(checker, tasks, workers, stop):

@@ -13,7 +13,7 @@ from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import BOLD, RIGHT, echo, print_answer, print_table
 
 FAILED = 1
-"""Exit status if runs failed, or a result could not be verified."""
+"""Exit status if runs failed, a result differs from its verification, or no run was repeated."""
 _OPTIONS_BY_ACTION = {
     "run": ("controller", "set", "track", "maps", "quick", "out", "workers", "scheduler"),
     "suite": (),
@@ -241,18 +241,13 @@ def _verify(options: Arguments) -> int:
         if interruption.requested:
             return INTERRUPTED
     differences = verification.differences
-    verdict = "Verified: no difference."
-    if not verification.new_maps:
-        runs = format_count(verification.runs, "run")
-        verdict = f"Verified: no difference in {runs}; new maps were not tried."
-    if differences:
-        verdict = f"Not verified: {format_count(len(differences), 'difference')}."
     comparison = verification.comparison
     answer = {
         "path": str(path),
         "seed": verification.seed,
         "runs": verification.runs,
         "rows": verification.rows,
+        "failed_rows": verification.failed_rows,
         "probability_to_miss_one_row": verification.compute_miss_probability(1),
         "robots": verification.robots,
         "teams": verification.teams,
@@ -261,8 +256,8 @@ def _verify(options: Arguments) -> int:
         "read_files": verification.read_files,
         "differences": differences,
     }
-    print_answer(options, answer, *differences, *verification.describe(), verdict)
-    return FAILED if differences else 0
+    print_answer(options, answer, *differences, *verification.describe(), verification.describe_verdict())
+    return 0 if verification.is_successful else FAILED
 
 
 def _write_page(options: Arguments) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import IO
 
@@ -37,7 +38,9 @@ def start_process(service: str, *, stderr: IO[bytes] | None = None) -> subproces
     return start_python(f"from robocov_app.jobs.serving import serve; serve({service!r})", stderr=stderr)
 
 
-def start_python(program: str, *, stderr: IO[bytes] | int | None = None) -> subprocess.Popen[bytes]:
+def start_python(
+    program: str, *, stderr: IO[bytes] | int | None = None, variables: Mapping[str, str] | None = None
+) -> subprocess.Popen[bytes]:
     """Start a process of Python that can import the same modules as this one.
 
     Parameters
@@ -46,6 +49,8 @@ def start_python(program: str, *, stderr: IO[bytes] | int | None = None) -> subp
         Code that the process executes.
     stderr : binary file, int or None
         File for the standard error of the process, or `subprocess.DEVNULL`; by default, that of this process.
+    variables : mapping of str to str, optional
+        Environment variables that differ from those of this process.
 
     Returns
     -------
@@ -57,7 +62,8 @@ def start_python(program: str, *, stderr: IO[bytes] | int | None = None) -> subp
     OSError
         If the process cannot be started.
     """
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    search_path = os.pathsep.join(path for path in sys.path if path)
+    environment = {**os.environ, "PYTHONPATH": search_path, **(variables or {})}
     # Linear algebra uses one thread in each process, unless the user has chosen another number.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(name, "1")

@@ -48,7 +48,7 @@ from robocov_app.benchmark.results import (
     read_result,
 )
 from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
-from robocov_app.benchmark.verification import VerificationOptions, verify_result
+from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
 from robocov_app.cli import main
 from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.terminal.interruption import Interruption
@@ -242,6 +242,17 @@ def test_forged_results_are_detected(tmp_path: Path) -> None:
         change_result(out, change)
         _, differences = verify(out, sample=9 if "work_J" in message else 0)
         assert any(message in difference for difference in differences), message
+
+
+@pytest.mark.parametrize(("runs", "status"), [(0, 1), (1, 0)])
+def test_a_verification_without_runs_has_the_exit_status_of_a_failure(
+    runs: int, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "robocov_app.benchmark.verification.verify_result",
+        lambda *_, **__: Verification(seed=0, rows=1, runs=runs),
+    )
+    assert main(["benchmark", "verify", "entry"]) == status
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -650,6 +661,17 @@ def test_other_entries_do_not_replace_a_bundled_one() -> None:
     assert gaps == {"RAPF": "30.0", "RAPF #2": "10.0", "RAPF #3": "20.0"}
     # Only the bundled entry is a yardstick.
     assert [row[0] for row in tables.incomplete] == ["Few", "RAPF"]
+
+
+@pytest.mark.usefixtures("short_ideal_track", "without_plots")
+def test_the_code_of_an_entry_in_a_file_is_a_claim() -> None:
+    forged = build_result("\u0410tlas", 0.1, controller="atlas", source_sha256=None)
+    page = build_page([forged, build_result("Mine", 0.1), build_bundled_rapf()], "Test")
+    entries = page.partition("<span>Entries</span>")[2].partition("</table>")[0]
+    codes = re.findall(r"<td[^>]*>((?:according|built|source).*?)</td>", entries)
+    # In alphabetical order: Mine, RAPF, and a label that begins with a Cyrillic letter.
+    claim = "according to the file:"
+    assert codes == [f"{claim} source 111111111111", "built in", f"{claim} built in"]
 
 
 @pytest.mark.usefixtures("short_ideal_track")

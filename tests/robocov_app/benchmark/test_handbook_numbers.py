@@ -96,6 +96,13 @@ def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
     assert gaps == expected
 
 
+def test_values_of_rapf_with_one_robot_agree_with_the_entry() -> None:
+    rows = [row for row in read_result(ENTRIES / "rapf.json.gz")["rows"] if row["track"] == "one-robot"]
+    rating = Rating("rapf", "one-robot", rows)
+    values = f"{rating.gap.estimate:.1%}, {rating.compute_median('path_length_m'):.1f} m"
+    assert f"(`rapf`: {values})" in PAGE.read_text(encoding="utf-8")
+
+
 def test_the_goals_in_the_handbook_are_the_thresholds_of_the_study() -> None:
     expected = {}
     for row in PAGE.read_text(encoding="utf-8").split("## The goals of atlas")[1].splitlines():

@@ -507,6 +507,28 @@ def test_the_probability_to_miss_changed_rows_is_omitted_if_all_runs_are_repeate
     assert replace(some, runs=10).describe()[0] == "10 of 10 runs repeated."
 
 
+def test_a_result_is_verified_only_if_runs_were_repeated() -> None:
+    nothing = Verification(seed=0, rows=10, new_maps=5, robots=10)
+    assert nothing.describe_verdict() == "Nothing verified: no run was repeated."
+    assert not nothing.is_successful
+    differing = replace(nothing, runs=2, differences=["a difference"])
+    assert differing.describe_verdict() == "Not verified: 1 difference."
+    assert not differing.is_successful
+    complete = replace(nothing, runs=2)
+    assert complete.describe_verdict() == "Verified: no difference."
+    assert complete.is_successful
+    short = replace(complete, robots=0, new_maps=0)
+    assert short.describe_verdict() == (
+        "Verified: no difference in 2 runs; no robot was checked, and new maps were not tried."
+    )
+
+
+def test_the_number_of_failed_runs_is_reported() -> None:
+    some = Verification(seed=0, rows=10, failed_rows=4, runs=3)
+    assert some.describe()[1].startswith("4 of 10 runs (40%) failed in the result.")
+    assert not any("failed" in line for line in replace(some, failed_rows=0).describe())
+
+
 def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
     rng = np.random.default_rng(0)
     names = [name for names in suite.FAMILIES.values() for name in names]

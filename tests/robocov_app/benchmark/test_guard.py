@@ -1,0 +1,141 @@
+"""The guard of controllers: channels to other processes are reported, and what Python needs is allowed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CODE = """
+import importlib.util
+import json
+import os
+import sys
+from importlib.machinery import FileFinder, SourceFileLoader
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from robocov.compiled import import_numba
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.guard import install_guard
+
+import_numba()
+from numba.core.caching import IndexDataCacheFile
+from numba.core.ir import Loc
+
+FOLDER = sys.argv[1]
+CACHE = os.environ["NUMBA_CACHE_DIR"]
+REFERENCES = str(suite.SUITE_FILE)
+violations = []
+readings = []
+
+class Text(str):
+    def startswith(self, *arguments):
+        return True
+
+class TwoPaths:
+    calls = 0
+
+    def __fspath__(self):
+        self.calls += 1
+        return REFERENCES if self.calls == 1 else os.__file__
+
+def list_open_folder():
+    folder = os.open(FOLDER, os.O_RDONLY)
+    os.listdir(folder)
+
+def list_by_import():
+    FileFinder(FOLDER, (SourceFileLoader, [".py"])).find_spec("x")
+
+def create_semaphore():
+    import _multiprocessing
+    _multiprocessing.SemLock(1, 1, 1, "/robocov-test", True)
+
+def create_shared_memory():
+    import _posixshmem
+    _posixshmem.shm_open("/robocov-test", os.O_CREAT | os.O_RDWR, 0o600)
+
+def create_fifo_by_posix():
+    import posix
+    posix.mkfifo(f"{FOLDER}/b")
+
+def look_up_a_function():
+    import ctypes
+    ctypes.pythonapi.mkfifo
+
+def open_by_an_object():
+    import io
+    io.FileIO(TwoPaths())
+
+def import_missing_module():
+    try:
+        import robocov_has_no_such_module
+    except ImportError:
+        pass
+
+ATTEMPTS = {
+    "write by the cache of numba": lambda: IndexDataCacheFile(FOLDER, "a", 1).save("k", b"data"),
+    "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
+    "read references by a special string": lambda: open(Text(REFERENCES)),
+    "read references by an object": open_by_an_object,
+    "create a FIFO": lambda: os.mkfifo(f"{FOLDER}/a"),
+    "create a FIFO by another module": create_fifo_by_posix,
+    "create a node": lambda: os.mknod(f"{FOLDER}/c"),
+    "set the priority": lambda: os.setpriority(os.PRIO_PROCESS, 0, 1),
+    "set the affinity": lambda: os.sched_setaffinity(0, os.sched_getaffinity(0)),
+    "create a semaphore": create_semaphore,
+    "create shared memory": create_shared_memory,
+    "list a folder": lambda: os.listdir(FOLDER),
+    "scan a folder": lambda: os.scandir(FOLDER),
+    "list an open folder": list_open_folder,
+    "list a folder by Python's import": list_by_import,
+    "look up a function": look_up_a_function,
+    "list an installed package": lambda: os.listdir(Path(suite.__file__).parent),
+    "look for installed packages": lambda: entry_points(group="robocov"),
+    "look for a module": lambda: importlib.util.find_spec("robocov.no_such_module"),
+    "import a missing module": import_missing_module,
+    "write to the own cache by numba": lambda: IndexDataCacheFile(CACHE, "a", 1).save("k", b"data"),
+}
+install_guard(violations.append, readings.append)
+found = {}
+for name, attempt in ATTEMPTS.items():
+    violations.clear()
+    try:
+        attempt()
+    except PermissionError:
+        pass
+    found[name] = violations[:1]
+print(json.dumps({"violations": found, "readings": readings}))
+"""
+ALLOWED = (
+    "list an installed package",
+    "look for installed packages",
+    "look for a module",
+    "import a missing module",
+    "write to the own cache by numba",
+)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="calls functions that only Linux has")
+def test_channels_are_reported(tmp_path: Path) -> None:
+    for name in ("shared", "cache"):
+        (tmp_path / name).mkdir()
+    process = subprocess.run(
+        [sys.executable, "-c", CODE, str(tmp_path / "shared")],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    found = json.loads(process.stdout)
+    for name, violations in found["violations"].items():
+        assert bool(violations) != (name in ALLOWED), (name, violations)
+    assert list((tmp_path / "shared").iterdir()) == []
+    # Opening a folder for reading is no violation, but is reported.
+    assert str(tmp_path / "shared") in found["readings"]
+    assert all(reading.startswith(str(tmp_path)) for reading in found["readings"])
