@@ -365,7 +365,7 @@ class Scenario:
         simulation : Simulation or None
             The simulation to run; by default a new one.
         every : int
-            Number of steps from one recorded step to the next. The last step is always recorded.
+            Number of steps from one recorded step to the next, at least 1. The last step is always recorded.
         should_stop : callable or None
             Called with the number of each step; if it returns True, the run ends with this step.
 

@@ -24,6 +24,7 @@ from robocov.simulation.checks import check_dt, check_team, count_steps
 from robocov.simulation.controller_caller import ControllerCaller
 from robocov.simulation.sensing import build_observations, is_scan_due
 from robocov.simulation.simulation import MAX_START_OVERLAP_M
+from robocov.simulation.team_state import TeamState
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray
 from robocov.world import World
@@ -349,10 +350,15 @@ class SimulationBatch:
         Raises
         ------
         StartError
-            If a robot would start in a wall or in another robot.
+            If there is not one start for each robot, or a robot would start in a wall or in another robot.
         """
-        require_free_starts(self.environment, starts, self.team, MAX_START_OVERLAP_M)
-        self._world.place(run, starts)
+        positions = TeamState(starts).positions
+        if len(positions) != len(self.team):
+            raise StartError(
+                f"starts: expected one for each of {len(self.team)} robots, got {len(positions)}"
+            )
+        require_free_starts(self.environment, positions, self.team, MAX_START_OVERLAP_M)
+        self._world.place(run, positions)
         if not self._decides_jointly:
             self._memories = [*self._memories[:run], self._begin_run(), *self._memories[run + 1 :]]
             self._inboxes = [*self._inboxes[:run], None, *self._inboxes[run + 1 :]]

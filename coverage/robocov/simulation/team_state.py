@@ -33,7 +33,8 @@ class TeamState:
     Raises
     ------
     StartError
-        If there is no robot, or an array does not contain two finite numbers for each robot.
+        If there is no robot, an array does not contain two numbers for each robot, or velocities or steering
+        are not finite. A simulation checks whether positions are finite when it is built.
 
     See Also
     --------

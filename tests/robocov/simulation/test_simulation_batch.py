@@ -183,6 +183,8 @@ def test_a_batch_has_runs_of_equal_size_that_fit() -> None:
     batch = SimulationBatch(ROOMS, Rapf(), [positions, positions])
     with pytest.raises(StartError, match="the robots overlap"):
         batch.restart(1, np.repeat(positions[:1], 3, axis=0))
+    with pytest.raises(StartError, match="starts: expected one for each of 3 robots, got 1"):
+        batch.restart(1, positions[:1])
     with pytest.raises(ParameterError, match="seeds: expected 2, one for each run, got 1"):
         batch.run(0.1, seeds=[1])
     assert len(batch) == 2
