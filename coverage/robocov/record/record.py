@@ -350,7 +350,8 @@ class Record(Drawable):
         Parameters
         ----------
         summary : mapping or None
-            The summary of the run; see `summarize`.
+            The summary of the run; see `summarize`. JSON has no nan, which `summarize` returns if no robot
+            works at the end, so that `save` fails unless such numbers are replaced by None.
         lattice : int or None
             Number of lattice sites along each side of the map with which the cost was computed, from 2 to
             2048. A record that was saved with another number cannot be loaded.

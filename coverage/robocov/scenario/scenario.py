@@ -12,6 +12,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from robocov.conditions import PARAMETERS as CONDITION_PARAMETERS
 from robocov.conditions import Conditions
 from robocov.controllers import CONTROLLERS, Controller, IndividualController, make_controller
 from robocov.controllers.gains import Value, get_gain_values
@@ -695,8 +696,10 @@ def _read_conditions(content: Mapping[str, Any] | None) -> Conditions | None:
     """Return the conditions of a document, in which every key may be missing."""
     if content is None:
         return None
-    ideal = Conditions().to_dict()
+    # `Conditions.to_dict` leaves out the bandwidth and the density if they have no effect.
+    keys = [parameter.json_key for parameter in CONDITION_PARAMETERS.values()]
+    keys += ["failures", "joins", "seed", "density"]
     for key in content:
-        if key not in ideal:
-            raise ParameterError(f"conditions: {describe_unknown_name('key', key, ideal)}")
-    return Conditions.from_dict({**ideal, **content})
+        if key not in keys:
+            raise ParameterError(f"conditions: {describe_unknown_name('key', key, keys)}")
+    return Conditions.from_dict({**Conditions().to_dict(), **content})

@@ -174,6 +174,25 @@ def test_a_scenario_survives_json(
     assert rc.Scenario.from_json(document).to_json() == scenario.to_json()
 
 
+def test_all_conditions_survive_json() -> None:
+    conditions = Conditions(
+        loss=0.1,
+        delay=0.2,
+        message_rate=5.0,
+        bandwidth=200.0,
+        forget_after=2.0,
+        position_noise=0.01,
+        sensing_noise=0.02,
+        failure_rate=0.001,
+        failures=((1, 2.0),),
+        joins=((2, 1.0, (1.0, 1.0)), (3, 1.5)),
+        seed=4,
+        density="sensed",
+    )
+    scenario = rc.Scenario(ROOM, robots=3, conditions=conditions)
+    assert rc.Scenario.from_json(scenario.to_json()).conditions == conditions
+
+
 def test_a_file_gives_the_same_run(tmp_path: Path) -> None:
     scenario = rc.Scenario("gaps", "lloyd", robots=2, duration=0.2)
     scenario.save(tmp_path / "scenario.json")
