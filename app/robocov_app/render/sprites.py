@@ -334,7 +334,7 @@ def render_cross(
     Parameters
     ----------
     arm : float, px
-        Length of the arms of a plus sign; an x has a slightly smaller size.
+        Length of the arms of a plus sign; those of an x extend `_DIAGONAL_ARM` times as far along each axis.
     shift : Shift
     color, halo : Color
     width : float, px

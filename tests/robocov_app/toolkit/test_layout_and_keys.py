@@ -4,7 +4,7 @@ import pytest
 
 from robocov_app.toolkit.commands.command import split_command
 from robocov_app.toolkit.window.input import format_key
-from robocov_app.toolkit.window.layout import build_layout, find_max_scale, is_inside
+from robocov_app.toolkit.window.layout import build_layout, explain_reduced_scale, find_max_scale, is_inside
 
 
 def test_the_panel_is_to_the_right_of_the_map() -> None:
@@ -24,6 +24,11 @@ def test_a_box_does_not_contain_its_right_edge() -> None:
 )
 def test_the_scale_is_limited_by_the_window_size(size: tuple[int, int], scale: float) -> None:
     assert find_max_scale(size) == scale
+
+
+def test_a_window_in_portrait_orientation_needs_less_width_for_a_scale() -> None:
+    assert explain_reduced_scale(2.0, (700, 1000)) == "scale 2 needs a window of 720 × 1200; using 1.625"
+    assert explain_reduced_scale(2.0, (720, 1200)) == ""
 
 
 @pytest.mark.parametrize(

@@ -221,7 +221,10 @@ class CommandTable:
         return self._attempt(command.execute)
 
     def take_command(self, event: pygame.event.Event) -> Command | None:
-        """Record a pressed key, and return its command; None if it is already held and does not repeat."""
+        """Record a pressed key, and return its command.
+
+        None is returned if the key has no command, or is already held and its command does not repeat.
+        """
         command = self._by_key.get(get_key_name(event))
         is_held = event.key in self._held_keys
         self._held_keys.add(event.key)

@@ -53,7 +53,8 @@ class DrawnOutline:
         closing_reach : float, m
             Distance from the first point within which a press completes a closed outline.
         same_point : float, m
-            Distance from the last point within which a press completes the outline.
+            Distance from the last point within which a press adds no point, but completes the outline if it
+            has enough points.
 
         Returns
         -------

@@ -118,7 +118,7 @@ def choose_scale(requested: float | None, *, has_display: bool) -> float | None:
     requested : float or None
         Scale from an option or the settings.
     has_display : bool
-        Whether the window is visible. By default, the scale of others is 1.
+        Whether the window is visible. An invisible window has scale 1 by default.
     """
     if requested is None and not has_display:
         return 1.0

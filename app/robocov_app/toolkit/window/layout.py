@@ -311,11 +311,15 @@ def find_max_scale(size: tuple[int, int], *, is_compact: bool = False) -> float:
     width, height = size
     if is_compact:
         return max(floor(_SCALE_STEPS * min(size) / MIN_COMPACT_SIDE_PX) / _SCALE_STEPS, _MIN_SCALE)
-    min_width, min_height = MIN_SIZE_PX
-    if width < height:
-        min_width, min_height = MIN_PORTRAIT_SIZE_PX
+    min_width, min_height = _get_min_size(size)
     scale = floor(_SCALE_STEPS * min(width / min_width, height / min_height)) / _SCALE_STEPS
     return max(scale, _MIN_SCALE)
+
+
+def _get_min_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the minimum width and height, at scale 1, of a window with the orientation of a given size."""
+    width, height = size
+    return MIN_PORTRAIT_SIZE_PX if width < height else MIN_SIZE_PX
 
 
 def explain_reduced_scale(requested: float | None, size: tuple[int, int]) -> str:
@@ -335,7 +339,7 @@ def explain_reduced_scale(requested: float | None, size: tuple[int, int]) -> str
     max_scale = find_max_scale(size)
     if requested is None or requested <= max_scale:
         return ""
-    min_width, min_height = MIN_SIZE_PX
+    min_width, min_height = _get_min_size(size)
     width = round(min_width * requested)
     height = round(min_height * requested)
     return f"scale {requested:g} needs a window of {width} × {height}; using {max_scale:g}"

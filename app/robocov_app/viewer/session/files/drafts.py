@@ -22,7 +22,7 @@ def _check_draft(draft: Draft) -> Draft | None:
     """Return a draft; None if it contains no unsaved session. A damaged draft raises a KeyError."""
     if "session" not in draft.content:
         return None
-    describe_draft(draft)
+    describe_draft(draft)  # raises if the draft is damaged
     return draft
 
 

@@ -161,7 +161,8 @@ class Trail:
         Returns
         -------
         (n, 2) array, m
-            The same array object as in the last call, unless starts have changed.
+            nan for robots without a known start. The same array object as in the last call, unless starts
+            have changed.
         """
         trail = self._find_trail(time)
         key = tuple(numbers)
