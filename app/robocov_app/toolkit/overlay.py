@@ -27,14 +27,16 @@ _MIN_MESSAGE_WIDTH_PX = 150
 _MAX_MESSAGE_WIDTH_PX = 900
 _MESSAGE_MARGIN_PX = 14
 """Distance of the text of a message from the left and right edges of its box."""
-_MESSAGE_HEIGHT_PX = 14
+_MESSAGE_HEIGHT_PX = 10
 """Height of the box of a message in addition to that of its lines."""
-_FIRST_LINE_PX = 16
+_FIRST_LINE_PX = 14
 """Distance of the middle of the first line of a message from the top of its box."""
 _MESSAGE_SIDE_PX = 10
 """Minimum distance of a message from the left and right edges of the arena."""
-_MESSAGE_BOTTOM_PX = 34
-"""Distance of a message from the bottom of the arena, which leaves the strip with the scale bar visible."""
+_MESSAGE_STRIP_PX = 34
+"""Height of the strip at the bottom of the arena, with the scale bar, over which messages are centered."""
+_MAX_MESSAGE_OVERHANG_PX = 6
+"""Distance by which messages may extend below the arena, which is free of text."""
 _MESSAGE_TOP_PX = 40
 """Distance of a message from the top of the arena, which leaves the chips of layers visible."""
 _TAG_MARGIN_PX = 6
@@ -215,10 +217,11 @@ def draw_message(
     *,
     is_error: bool,
     is_at_top: bool = False,
-) -> None:
-    """Draw a message above the strip at the bottom of the arena; nothing if the text is empty.
+) -> Rect | None:
+    """Draw a message over the strip at the bottom of the arena; nothing if the text is empty.
 
-    In an arena that is too narrow for words, the message extends beyond the arena, but not beyond the screen.
+    The strip is below the map, so that messages of one or two lines leave the map visible. In an arena that
+    is too narrow for words, the message extends beyond the arena, but not beyond the screen.
 
     Parameters
     ----------
@@ -233,9 +236,14 @@ def draw_message(
         Whether it is drawn in the color of errors.
     is_at_top : bool
         Whether it is at the top of the arena instead, below the chips of layers.
+
+    Returns
+    -------
+    pygame.Rect or None
+        The box of the message, px; None if the text is empty.
     """
     if not text:
-        return
+        return None
     size = round(_MESSAGE_TEXT_PX * scale)
     left, top, width, height = arena
     free_width = width - 2 * (_MESSAGE_SIDE_PX + _MESSAGE_MARGIN_PX) * scale
@@ -251,7 +259,9 @@ def draw_message(
     if is_at_top:
         box.midtop = middle, round(top + _MESSAGE_TOP_PX * scale)
     else:
-        box.midbottom = middle, round(top + height - _MESSAGE_BOTTOM_PX * scale)
+        bottom = top + height
+        box.center = middle, round(bottom - _MESSAGE_STRIP_PX * scale / 2)
+        box.bottom = min(box.bottom, round(bottom + _MAX_MESSAGE_OVERHANG_PX * scale))
     box.clamp_ip(screen.get_rect())
     fill = theme.panel
     edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
@@ -264,3 +274,4 @@ def draw_message(
         image = render_text(line, size, theme.ink)
         y = round(box.top + (_FIRST_LINE_PX + _MESSAGE_LINE_PX * number) * scale)
         screen.blit(image, image.get_rect(center=(box.centerx, y)))
+    return box

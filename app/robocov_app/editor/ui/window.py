@@ -337,7 +337,9 @@ class EditorWindow(CommandWindow):
             self.panel.draw(self.screen)
         self.sheet_handle.draw(self.screen, layout, theme)
         is_error = editor.has_error_message
-        draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error)
+        self.message_box = draw_message(
+            self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error
+        )
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)
             self.top_bar.draw(self.screen)

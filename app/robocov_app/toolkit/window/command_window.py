@@ -14,7 +14,7 @@ from robocov_app.toolkit.commands.palette import create_palette
 from robocov_app.toolkit.dialogs import Dialogs
 from robocov_app.toolkit.panel import CommandPanel
 from robocov_app.toolkit.sheet_handle import SheetHandle
-from robocov_app.toolkit.tools.pointer import Pointer
+from robocov_app.toolkit.tools.pointer import LEFT_BUTTON, Pointer
 from robocov_app.toolkit.window.display import find_suitable_scale
 from robocov_app.toolkit.window.input import COMMAND_EVENT, MOUSE_EVENTS
 from robocov_app.toolkit.window.layout import Layout
@@ -88,6 +88,8 @@ class CommandWindow(BaseWindow):
         The mouse over the map.
     sheet_handle : SheetHandle
         Closes the panel of a narrow window.
+    message_box : pygame.Rect or None
+        Box of the status message in the last frame, px; None without one. A click on it removes the message.
     layout : Layout
         Boxes of the window.
     theme : Theme
@@ -119,6 +121,7 @@ class CommandWindow(BaseWindow):
         self.scale = scale
         self.help_page = HelpPage(self.groups, self.keys_hint)
         self.sheet_handle = SheetHandle(self.close_sheet)
+        self.message_box: pygame.Rect | None = None
 
     @property
     def suitable_scale(self) -> float:
@@ -144,11 +147,22 @@ class CommandWindow(BaseWindow):
     # Commands
 
     def do(self, name: str) -> None:
-        """Run the command with this name; while the help page is open, "cancel" only closes that."""
+        """Run the command with this name; while the help page is open, "cancel" only closes that.
+
+        Otherwise, "cancel" also removes the status message.
+        """
         if name == "cancel" and self.help_page.is_open:
             self.help_page.close()
-        else:
-            self.commands.run(name)
+            return
+        message = self.model.message
+        self.commands.run(name)
+        if name == "cancel" and self.model.message == message:
+            self.dismiss_message()
+
+    def dismiss_message(self) -> None:
+        """Remove the status message."""
+        self.model.clear_message()
+        self.model.revision += 1
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window."""
@@ -228,6 +242,8 @@ class CommandWindow(BaseWindow):
             pass
         elif event.type == pygame.KEYDOWN:
             self.press_key(event)
+        elif self._is_press_on_message(event):
+            self.dismiss_message()
         elif event.type in MOUSE_EVENTS:
             self.handle_mouse(event)
         elif event.type == pygame.WINDOWLEAVE:
@@ -236,6 +252,12 @@ class CommandWindow(BaseWindow):
                 part.ui.leave()
         else:
             offer_event(self.parts, event)
+
+    def _is_press_on_message(self, event: pygame.event.Event) -> bool:
+        """Return whether an event presses the left button on the status message."""
+        if event.type != pygame.MOUSEBUTTONDOWN or event.button != LEFT_BUTTON or self.message_box is None:
+            return False
+        return self.message_box.collidepoint(event.pos)
 
     def press_key(self, event: pygame.event.Event) -> None:
         """Handle a key press: as input for the panel, or by running the command of that key."""

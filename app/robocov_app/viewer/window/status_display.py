@@ -34,6 +34,8 @@ class StatusDisplay:
         self._lesson = lesson
         self._hint = hint
         self.can_suggest = can_suggest
+        self._dismissed_suggestion = ""
+        self._suggestion = ""
 
     @property
     def seek_progress(self) -> float | None:
@@ -56,8 +58,12 @@ class StatusDisplay:
             hint = hint.replace("Space: pause", "Space: play")
         draw_status(screen, layout.status, theme, layout.scale, facts=facts, hint=hint)
 
-    def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> None:
-        """Draw the progress of a seek, the status message, or a suggestion."""
+    def dismiss_suggestion(self) -> None:
+        """Hide the suggestion that is shown, until there is another one."""
+        self._dismissed_suggestion = self._suggestion
+
+    def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> pygame.Rect | None:
+        """Draw the progress of a seek, the status message, or a suggestion; return the box, if any."""
         viewer = self._viewer
         message = viewer.message
         is_error = bool(message) and viewer.has_error_message
@@ -65,10 +71,10 @@ class StatusDisplay:
         if progress is not None and not is_error:
             message = f"Recomputing the session: {100 * progress:.0f}%"
         if not message and self.can_suggest and self._lesson.shown is None:
-            message = suggest_actions(viewer)
+            message = self._choose_suggestion()
         # Without a panel, the text of a lesson is at the bottom of the map.
         is_at_top = self._lesson.shown is not None and not layout.has_panel
-        draw_message(
+        return draw_message(
             screen,
             message,
             layout.arena,
@@ -77,3 +83,11 @@ class StatusDisplay:
             is_error=is_error,
             is_at_top=is_at_top,
         )
+
+    def _choose_suggestion(self) -> str:
+        """Return the suggestion for the present state; empty without one or if it was dismissed."""
+        self._suggestion = suggest_actions(self._viewer)
+        if self._suggestion != self._dismissed_suggestion:
+            self._dismissed_suggestion = ""
+            return self._suggestion
+        return ""

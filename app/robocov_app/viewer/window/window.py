@@ -234,6 +234,11 @@ class ViewerWindow(CommandWindow):
 
         return roll_back
 
+    def dismiss_message(self) -> None:
+        """Remove the status message or the suggestion."""
+        super().dismiss_message()
+        self._status.dismiss_suggestion()
+
     def restore_view(self) -> None:
         """Close everything that may have caused an exception while drawing."""
         super().restore_view()
@@ -370,7 +375,7 @@ class ViewerWindow(CommandWindow):
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
         self.sheet_handle.draw(self.screen, layout, self.theme)
-        self._status.draw_message(self.screen, layout, self.theme)
+        self.message_box = self._status.draw_message(self.screen, layout, self.theme)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)
