@@ -247,6 +247,7 @@ def _choose_height(
     count = contents.map_count
     columns = count
     if count > _MAX_MAPS_IN_ROW:
+        # With c columns and count / c rows, the aspect of the grid is c² aspect / count.
         columns = min(count, max(1, round(np.sqrt(count * _GRID_ASPECT / contents.aspect))))
     slot_width = (maps_width - (columns - 1) * _PANEL_GAP_PX * scale) / columns
     map_height = min(slot_width / contents.aspect, MAX_MAP_HEIGHT_PX)

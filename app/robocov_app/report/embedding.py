@@ -254,6 +254,7 @@ def _embed_team(record: Record) -> dict[str, Any]:
     }
     if record.has_travel_time_cells:
         content["speeds"] = record.team.max_speed.tolist()
+    # The embedded times start at 0, but the positions of moving obstacles depend on the simulation time.
     if start and record.environment.has_moving_obstacles:
         content["begin"] = start
     if record.conditions is not None:

@@ -305,6 +305,7 @@ def _draw_moving_obstacle(obstacle: MovingObstacle, environment: Environment, fr
     visible = shapely.intersection(obstacle.polygon, environment.region.polygon)
     rings = [frame.to_pixels(ring) for ring in extract_rings(visible)]
     middle = frame.to_pixels(obstacle.middle)
+    # In pixels, y points down.
     along = _ARROW_HALF_LENGTH_PX * obstacle.heading * np.array([1.0, -1.0])
     across = _ARROW_HEAD_WIDTH * along[::-1] * np.array([-1.0, 1.0])
     tip = middle + along

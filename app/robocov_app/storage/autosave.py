@@ -162,6 +162,7 @@ class Autosaver:
         with self._changed:
             self._skips_pause = True
             self._changed.notify_all()
+            # A draft that could not be written is pending again without `_skips_pause`, which ends the wait.
             self._changed.wait_for(
                 lambda: not (self._is_writing or (self._pending and self._skips_pause)), timeout
             )

@@ -146,14 +146,14 @@ def read_gain_outcomes(folder: Path, study: Study, references: References) -> di
     instances = list_instances(study)
     gain_sets = {name: study.get_gains(name).choices for name in study.controllers}
     relative_costs = {name: np.full((len(sets), len(instances)), np.nan) for name, sets in gain_sets.items()}
-    cells = {}
+    indices_by_key = {}
     for name, sets in gain_sets.items():
         for gains_index, gains in enumerate(sets):
-            cells[_identify_controller(name, gains)] = (name, gains_index)
+            indices_by_key[_identify_controller(name, gains)] = (name, gains_index)
     for instance_index, row in _read_rows(folder, instances):
-        cell = cells.get(_identify_controller(row["controller"], row))
-        if cell is not None and row["map"] in references:
-            name, gains_index = cell
+        indices = indices_by_key.get(_identify_controller(row["controller"], row))
+        if indices is not None and row["map"] in references:
+            name, gains_index = indices
             relative_costs[name][gains_index, instance_index] = (
                 row["mean_distance_m"] / references[row["map"]].mean_distance
             )

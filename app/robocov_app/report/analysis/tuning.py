@@ -49,6 +49,8 @@ class _Tuning(NamedTuple):
     folds : list
     get_fold : callable
         Returns the fold of a run.
+    has_several_maps : bool
+        Whether the folds are maps; otherwise, each is a start and seed.
     scales : Scales
     runs : dict of (controller, gains) to list of ReportedRun
         All runs of each variant, including failed ones.
@@ -56,6 +58,7 @@ class _Tuning(NamedTuple):
 
     folds: list[_Fold]
     get_fold: Callable[[ReportedRun], _Fold]
+    has_several_maps: bool
     scales: Scales
     runs: dict[tuple[str, Gains], list[ReportedRun]]
 
@@ -91,6 +94,7 @@ def choose_compared_groups(result: ReportedResult) -> ComparedGroups:
     tuning = _Tuning(
         folds=folds,
         get_fold=get_fold,
+        has_several_maps=has_several_maps,
         scales=compute_medians(result),
         runs=group_by(result.runs, lambda run: (run.controller, run.gains)),
     )
@@ -161,8 +165,7 @@ def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]
     first_label = variants[0].runs[0].label
     group = RunGroup(first_label + TUNED_SUFFIX, variants[0].controller, None, tuple(runs))
     counts = Counter(labels).most_common(_MAX_LISTED_GAINS)
-    # If there are several maps, each is a fold; otherwise each start and seed is one.
-    unit = "maps" if tuning.get_fold is _get_map else "starts"
+    unit = "maps" if tuning.has_several_maps else "starts"
     choice = ", ".join(f"{label} on {count} of {len(tuning.folds)} {unit}" for label, count in counts)
     return group, choice
 

@@ -67,16 +67,16 @@ def _load_runs(folder: Path) -> ReportedResult:
     """Load a run, or the runs of a comparison; runs that cannot be read are listed as damaged."""
     kind: ResultKind = "run"
     run_folders = [folder]
-    started_folders = run_folders
+    is_unfinished = False
     path = folder / COMPARISON_FILE
     if path.is_file():
         kind = "comparison"
         document = read_document(path, ComparisonDocument, "robocov-comparison", 1)
         run_folders = [folder / name for name in document.folders]
-        started_folders = run_folders
         is_unfinished = not document.runs
-        if is_unfinished:
-            started_folders = [path for path in run_folders if (path / RUN_FILE).is_file()]
+    started_folders = run_folders
+    if is_unfinished:
+        started_folders = [run_folder for run_folder in run_folders if (run_folder / RUN_FILE).is_file()]
     saved_runs, damaged_runs = _read_runs(started_folders)
     if not saved_runs and not damaged_runs:
         raise InputError(f"{path}: there is no run in it")
