@@ -100,8 +100,8 @@ _FUNCTIONS_WITHOUT_EVENTS = {
 }
 """Functions by module that a controller must not call, and that cause no audit event. Each changes something
 that another process can see."""
-_COMPILER_EVENTS = ("ctypes.dlsym", "ctypes.dlsym/handle")
-"""Audit events that a compiler may cause, in addition to those in its cache folder."""
+_COMPILER_EVENTS = ("_multiprocessing.SemLock", "ctypes.dlopen", "ctypes.dlsym", "ctypes.dlsym/handle")
+"""Events that a compiler may cause, such as for parallel loops, in addition to those in its cache folder."""
 _CACHE_EVENTS = ("open", "os.mkdir", "os.remove", "os.rename", "os.utime", *_LISTING_EVENTS)
 """Audit events that a compiler may cause in its cache folder."""
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND

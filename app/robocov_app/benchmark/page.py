@@ -306,7 +306,8 @@ def _build_overview_cells(
     suite_run_count = sum(len(ratings.list_run_keys(name)) for name in tracks)
     contacts = sum(row["contacts"] > 0 for row in rows)
     at_rest = sum(row["settled_at_s"] is not None for row in rows)
-    cells = [ratings.format_run_count(run_count, suite_run_count, run_count - len(rows))]
+    run_text = ratings.format_run_count(run_count, suite_run_count, run_count - len(rows))
+    cells = [_break_lines(run_text)]
     cells.append(f"{contacts / len(rows):.0%}" if rows else ratings.NO_VALUE)
     cells.append(f"{at_rest / run_count:.0%}" if run_count else ratings.NO_VALUE)
     for name in tracks:
@@ -369,8 +370,14 @@ def _build_rating_table(caption: str, track_ratings: Sequence[Rating], entries: 
     rows = []
     for rating in track_ratings:
         cells = ratings.build_rating_cells(rating, entries.information[rating.label])
+        cells["Runs"] = _break_lines(cells["Runs"])
         rows.append(tuple(cells[column] for column in ratings.HEAD))
     return PageTable(caption, ratings.HEAD, rows, text_columns=frozenset({1}))
+
+
+def _break_lines(text: str) -> str:
+    """Return a text with a new line after each comma, so that a column of a wide table stays narrow."""
+    return text.replace(", ", ",\n")
 
 
 def _select_ratings_to_plot(track_ratings: Sequence[Rating], entries: _Entries) -> list[Rating]:

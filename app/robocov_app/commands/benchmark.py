@@ -84,7 +84,7 @@ class Arguments(JsonOption):
     scheduler: str | None = None
     """Address of a Dask scheduler whose workers execute the runs."""
     sample: int = 10
-    """Number of runs that verify repeats."""
+    """Number of runs that verify repeats; with 0, nothing counts as verified, and the exit status is 1."""
     robots: int = 2
     """Number of robots that verify checks in each repeated run."""
     new_maps: int = 5

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from robocov_app.benchmark import controller_process
+
 CODE = """
 import importlib.util
 import json
@@ -98,6 +100,7 @@ ATTEMPTS = {
     "look for installed packages": lambda: entry_points(group="robocov"),
     "look for a module": lambda: importlib.util.find_spec("robocov.no_such_module"),
     "import a missing module": import_missing_module,
+    "prepare parallel loops": lambda: import_numba().set_num_threads(1),
     "write to the own cache by numba": lambda: IndexDataCacheFile(CACHE, "a", 1).save("k", b"data"),
 }
 install_guard(violations.append, readings.append)
@@ -116,6 +119,7 @@ ALLOWED = (
     "look for installed packages",
     "look for a module",
     "import a missing module",
+    "prepare parallel loops",
     "write to the own cache by numba",
 )
 
@@ -139,3 +143,16 @@ def test_channels_are_reported(tmp_path: Path) -> None:
     # Opening a folder for reading is no violation, but is reported.
     assert str(tmp_path / "shared") in found["readings"]
     assert all(reading.startswith(str(tmp_path)) for reading in found["readings"])
+
+
+def test_each_process_has_a_copy_of_the_machine_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that changes a file in its cache changes that of no other process."""
+    shared = tmp_path / "robocov-1"
+    shared.mkdir()
+    (shared / "kernel.nbi").write_text("code")
+    monkeypatch.setattr(controller_process, "open_cache_folder", lambda: shared)
+    first, second = (controller_process._create_cache(tmp_path) for _ in range(2))
+    assert first != second
+    (first / "robocov-1" / "kernel.nbi").write_text("changed")
+    assert (second / "robocov-1" / "kernel.nbi").read_text() == "code"
+    assert (shared / "kernel.nbi").read_text() == "code"
