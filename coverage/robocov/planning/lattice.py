@@ -393,10 +393,9 @@ def find_clear_lines(
     """
     # All lines are sampled at the same number of points, at most half a cell apart.
     lengths = np.empty(len(ends))
-    for k in range(len(ends)):
-        lengths[k] = math.sqrt((ends[k, 0] - position[0]) ** 2 + (ends[k, 1] - position[1]) ** 2)
     max_length = 0.0
     for k in range(len(ends)):
+        lengths[k] = math.sqrt((ends[k, 0] - position[0]) ** 2 + (ends[k, 1] - position[1]) ** 2)
         max_length = max(max_length, lengths[k])
     step_count = math.ceil(max_length / (_SIGHT_STEP_CELLS * frame.cell_size)) + 1
     cells_per_meter = 1.0 / frame.cell_size
