@@ -210,7 +210,7 @@ def _set_number_axis(axes: Axes, gains: FloatArray) -> float | None:
     Returns
     -------
     float or None
-        Position on the axis for "no limit"; None if no gain is without limit.
+        Position on the axis for "no limit"; None if all gains are limited.
     """
     levels = np.unique(gains[np.isfinite(gains)])
     low = 0.0

@@ -158,7 +158,7 @@ class _SmallCopy:
     def _build_dotted_line(self, uses: Sequence[Element]) -> Element | None:
         """Combine equal round marks into one path, whose points a round pen draws as dots.
 
-        None is returned if there are few marks, or if they are not round or differ.
+        Return None if there are fewer than `_MIN_DOTS` marks, or if they differ or are not round.
         """
         if len(uses) < _MIN_DOTS:
             return None

@@ -139,7 +139,7 @@ class Page:
 
 
 class Pages:
-    """The pages that show a window. One page at a time controls it; at first, the first one that may.
+    """The pages that show a window. One page at a time controls it: initially, the first page that may.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ class Pages:
         self._update_participants()
 
     def pass_control(self, page: Page, number: int) -> None:
-        """Give control to the page with a number, if `page`, which asks for this, is allowed to."""
+        """Give control to the page with a number, if the requesting `page` is allowed to."""
         if page is not self.controlling and not page.may_control:
             return
         receivers = (other for other in self._pages if other.number == number)

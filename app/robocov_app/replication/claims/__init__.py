@@ -6,7 +6,7 @@ open if it extends over an end of the range. The p-value of a claim is the highe
 (intersection-union test). Those of the registered claims are adjusted by Holm.
 
 All thresholds (`thresholds`) were set before the study was run. Statistics are medians over problem
-instances; their 95% bootstrap intervals draw whole maps.
+instances; the bootstrap samples for their 95% intervals consist of whole maps.
 
 `convex_claims`, `nonconvex_claims`, `gain_claims` and `start_claims` judge the paper's claims, `goals`,
 `rivals` and `extensions` those beyond it.

@@ -16,9 +16,9 @@ def judge_convex_final(outcomes: Outcomes, gains: GainChoice = "shared") -> Clai
     """Judge whether RAPF ends at the same cost as Lloyd's algorithm in convex regions."""
     claim = Claim(
         f"convex-final-{gains}",
-        1,
-        "In a convex region RAPF ends at the same cost as Lloyd's algorithm.",
-        "VI-A, figures 2 and 3",
+        question=1,
+        text="In a convex region RAPF ends at the same cost as Lloyd's algorithm.",
+        source="VI-A, figures 2 and 3",
         gains=GAIN_CHOICES[gains],
     )
     pairs = outcomes.compare(f"rapf-{gains}", "lloyd")
@@ -55,9 +55,9 @@ def judge_convex_spreading(outcomes: Outcomes, gains: GainChoice = "shared") -> 
     return judge_pairs(
         Claim(
             f"convex-spreading-{gains}",
-            1,
-            "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm.",
-            "VI-A",
+            question=1,
+            text="From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm.",
+            source="VI-A",
             gains=GAIN_CHOICES[gains],
         ),
         outcomes.select_starts(*CLUSTERED).compare(f"rapf-{gains}", "lloyd", "early"),

@@ -29,9 +29,9 @@ def judge_gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     """
     claim = Claim(
         "gains-result",
-        3,
-        "RAPF's final cost barely depends on the gains, RPF's does.",
-        "VI-B: “by using the RAPF, it is almost independent”",
+        question=3,
+        text="RAPF's final cost barely depends on the gains, RPF's does.",
+        source="VI-B: “by using the RAPF, it is almost independent”",
     )
     if not rapf.instances:
         return claim
@@ -80,10 +80,12 @@ def judge_gains_every(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     """
     claim = Claim(
         "gains-every",
-        2,
-        "In a non-convex environment RAPF ends at a lower cost than RPF with the same potential parameters, "
-        "whichever set of the grid is used.",
-        "VI, “the same values for the parameters of the potentials”",
+        question=2,
+        text=(
+            "In a non-convex environment RAPF ends at a lower cost than RPF with the same potential "
+            "parameters, whichever set of the grid is used."
+        ),
+        source="VI, “the same values for the parameters of the potentials”",
         gains="every set of the grid",
     )
     if not rapf.instances:
@@ -143,9 +145,9 @@ def judge_gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     """
     claim = Claim(
         "gains-choice",
-        3,
-        "Which gains are best depends on the environment for RPF, but hardly for RAPF.",
-        "VI-B: “the best choice of the potential parameters is environment dependent”",
+        question=3,
+        text="Which gains are best depends on the environment for RPF, but hardly for RAPF.",
+        source="VI-B: “the best choice of the potential parameters is environment dependent”",
     )
     rapf_regrets, maps = compute_regrets(rapf)
     rpf_regrets, _ = compute_regrets(rpf)

@@ -64,10 +64,10 @@ def judge_against_rpf(
     return judge_pairs(
         _build_claim(
             f"nonconvex-{period}-{gains}",
-            2,
-            f"In a non-convex environment RAPF {result}.",
-            "VI-B, figures 4 to 7",
-            gains,
+            question=2,
+            text=f"In a non-convex environment RAPF {result}.",
+            source="VI-B, figures 4 to 7",
+            gains=gains,
             limited=limited,
         ),
         outcomes.compare(f"rapf-{gains}", f"rpf-{gains}", measure),
@@ -99,10 +99,10 @@ def judge_against_lloyd(outcomes: Outcomes, gains: GainChoice = "shared", *, lim
     return judge_pairs(
         _build_claim(
             f"nonconvex-lloyd-{gains}",
-            5,
-            "In a non-convex environment RAPF significantly outperforms Lloyd's algorithm too.",
-            "VII: “significantly outperforms other existing approaches”; the paper shows RPF only",
-            gains,
+            question=5,
+            text="In a non-convex environment RAPF significantly outperforms Lloyd's algorithm too.",
+            source="VII: “significantly outperforms other existing approaches”; the paper shows RPF only",
+            gains=gains,
             limited=limited,
         ),
         outcomes.compare(f"rapf-{gains}", "lloyd"),
@@ -130,9 +130,11 @@ def judge_lloyd_unusable(outcomes: Outcomes) -> Claim:
     """Judge whether Lloyd's robots run into obstacles, are blocked by them, and end at a high cost."""
     claim = Claim(
         "lloyd-unusable",
-        5,
-        "Lloyd's algorithm is unusable in the presence of obstacles: its robots run into them and get stuck.",
-        "I and IV",
+        question=5,
+        text=(
+            "Lloyd's algorithm is unusable in the presence of obstacles: its robots run into them and get stuck."
+        ),
+        source="I and IV",
     )
     finished = outcomes.select_finite("blocked", "lloyd")
     if not finished.instances:
@@ -186,7 +188,7 @@ def judge_gap(
     """
     text, source = _GAP_CLAIMS[controller]
     key = f"{controller}-{gains}" if gains else controller
-    claim = _build_claim(f"gap-{key}", 6, text, source, gains, limited=limited)
+    claim = _build_claim(f"gap-{key}", question=6, text=text, source=source, gains=gains, limited=limited)
     finished = outcomes.select_finite("gap", key)
     if not finished.instances:
         return claim

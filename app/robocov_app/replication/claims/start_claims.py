@@ -19,9 +19,9 @@ def judge_starts_cost(outcomes: Outcomes, gains: GainChoice = "shared") -> Claim
     """Judge whether RAPF's final cost depends less on the starts than RPF's."""
     claim = Claim(
         f"starts-cost-{gains}",
-        4,
-        "RAPF's final cost barely depends on where the robots start, RPF's does.",
-        "VI-B, figures 6 and 8",
+        question=4,
+        text="RAPF's final cost barely depends on where the robots start, RPF's does.",
+        source="VI-B, figures 6 and 8",
         gains=GAIN_CHOICES[gains],
     )
     keys = (f"rapf-{gains}", f"rpf-{gains}")
@@ -45,9 +45,9 @@ def judge_starts_placement(outcomes: Outcomes, gains: GainChoice = "shared") -> 
     """Judge whether RAPF's final placement depends less on the starts than RPF's."""
     claim = Claim(
         f"starts-placement-{gains}",
-        4,
-        "RAPF's final placement varies little with where the robots start, RPF's strongly.",
-        "VI-B, figures 6 and 8",
+        question=4,
+        text="RAPF's final placement varies little with where the robots start, RPF's strongly.",
+        source="VI-B, figures 6 and 8",
         gains=GAIN_CHOICES[gains],
     )
     keys = (f"rapf-{gains}", f"rpf-{gains}")

@@ -184,7 +184,7 @@ def build_figure_studies(plan: Plan) -> dict[str, Study]:
 
 
 def build_best_figure_studies(plan: Plan, paper_contenders: Sequence[Contender]) -> dict[str, Study]:
-    """Build the sweeps of figures 4 to 8 with the best gains; none if these are unknown.
+    """Build the sweeps of figures 4 to 8 with the best gains; empty if these are unknown.
 
     Returns
     -------
@@ -289,9 +289,9 @@ def build_beyond_contests(
     beyond = plan.beyond
     maps = build_generated_maps(beyond.maps)
     contests = {}
-    sides = {"rivals": contenders.build_baselines(best)}
-    sides |= {f"ours-{contender.key}": (contender,) for contender in OWN}
-    for name, participants in sides.items():
+    participants_by_sweep = {"rivals": contenders.build_baselines(best)}
+    participants_by_sweep |= {f"ours-{contender.key}": (contender,) for contender in OWN}
+    for name, participants in participants_by_sweep.items():
         seeds = beyond.get_seeds(participants[0].controller)
         contests[name] = build_contest(plan, build_baseline_maps(plan), participants, beyond.starts, seeds)
     if beyond.unseen:

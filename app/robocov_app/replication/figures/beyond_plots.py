@@ -91,7 +91,7 @@ def _list_target_rows(results: BeyondResults) -> list[PairsRow]:
 def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
     """Compare, for each controller of mixed teams, cells by time with cells by distance."""
     rows = []
-    # `TEAMS` contains both kinds of cells of each controller in turn, first those by distance.
+    # `TEAMS` lists each controller with cells by distance, followed by the same one with cells by time.
     for by_distance, by_time in zip(TEAMS[::2], TEAMS[1::2], strict=True):
         pairs = results.teams.compare(by_time.key, by_distance.key, "time")
         rows.append(PairsRow(by_time.label, pairs, by_time.controller))
@@ -99,7 +99,7 @@ def _list_team_rows(results: BeyondResults) -> list[PairsRow]:
 
 
 def _plan_density_figure(results: BeyondResults, theme: Theme) -> Draw:
-    """Return a function that draws runs with and without knowledge of the density, both on its background."""
+    """Return a function that draws runs with and without knowledge of the density, on a map that shows it."""
     known, ignored = results.density.figure_runs
     weighted = known.record.environment
     records = [replace(run.record, environment=weighted) for run in (known, ignored)]
