@@ -240,7 +240,8 @@ def draw_message(
     Returns
     -------
     pygame.Rect or None
-        The box of the message, px; None if the text is empty.
+        The part of its box, px, that is outside the map: where a click removes the message; None if the text
+        is empty.
     """
     if not text:
         return None
@@ -274,4 +275,7 @@ def draw_message(
         image = render_text(line, size, theme.ink)
         y = round(box.top + (_FIRST_LINE_PX + _MESSAGE_LINE_PX * number) * scale)
         screen.blit(image, image.get_rect(center=(box.centerx, y)))
-    return box
+    if is_at_top:
+        return box
+    strip_top = round(top + height - _MESSAGE_STRIP_PX * scale)
+    return box.clip((box.left, strip_top, box.width, box.height))

@@ -56,7 +56,9 @@ def judge_convex_spreading(outcomes: Outcomes, gains: GainChoice = "shared") -> 
         Claim(
             f"convex-spreading-{gains}",
             question=1,
-            text="From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm.",
+            text=(
+                "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm."
+            ),
             source="VI-A",
             gains=GAIN_CHOICES[gains],
         ),

@@ -132,7 +132,8 @@ def judge_lloyd_unusable(outcomes: Outcomes) -> Claim:
         "lloyd-unusable",
         question=5,
         text=(
-            "Lloyd's algorithm is unusable in the presence of obstacles: its robots run into them and get stuck."
+            "Lloyd's algorithm is unusable in the presence of obstacles: its robots run into them and "
+            "get stuck."
         ),
         source="I and IV",
     )

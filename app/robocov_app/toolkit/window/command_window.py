@@ -89,7 +89,7 @@ class CommandWindow(BaseWindow):
     sheet_handle : SheetHandle
         Closes the panel of a narrow window.
     message_box : pygame.Rect or None
-        Box of the status message in the last frame, px; None without one. A click on it removes the message.
+        Where a click removes the status message of the last frame, px; None without a message.
     layout : Layout
         Boxes of the window.
     theme : Theme

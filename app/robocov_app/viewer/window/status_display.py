@@ -63,7 +63,13 @@ class StatusDisplay:
         self._dismissed_suggestion = self._suggestion
 
     def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> pygame.Rect | None:
-        """Draw the progress of a seek, the status message, or a suggestion; return the box, if any."""
+        """Draw the progress of a seek, the status message, or a suggestion.
+
+        Returns
+        -------
+        pygame.Rect or None
+            Where a click removes it, px; None if nothing is drawn.
+        """
         viewer = self._viewer
         message = viewer.message
         is_error = bool(message) and viewer.has_error_message
