@@ -52,11 +52,11 @@ REPLACEMENTS = {
 
 @pytest.fixture(autouse=True)
 def working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, sweeps in this process, and tracks of the benchmark of half a second."""
+    """An empty working folder, sweeps in this process, and quick tracks of the benchmark with one map."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
     for name in suite.QUICK_TRACKS:
-        track = replace(suite.TRACKS[name], duration=0.5, maps=suite.TRACKS[name].maps[:1])
+        track = replace(suite.TRACKS[name], maps=suite.TRACKS[name].maps[:1])
         monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
     return tmp_path
 
