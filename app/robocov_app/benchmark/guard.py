@@ -2,8 +2,8 @@
 
 The guard is for a process that does nothing but call a controller. It uses the audit events of Python, and
 replaces functions that cause none. It forbids the actions in `_FORBIDDEN_PREFIXES` and
-`_FUNCTIONS_WITHOUT_EVENTS`, writing files, listing folders, and reading the data of the benchmark or the
-memory of other processes. Packages may do so while they are imported. A compiler may write machine code, but
+`_FUNCTIONS_WITHOUT_EVENTS`, writing files, listing folders, reading the data of the benchmark, and looking at
+other processes. Packages may do so while they are imported. A compiler may write machine code, but
 only to the cache folder of this process, of which no other process knows.
 
 Python code can change its own process, and compiled code can call the system without any event, so this is a
@@ -38,8 +38,8 @@ _IMPORT_FUNCTION = "_find_and_load"
 """Function in `_IMPORT_FILE` that imports the module in its variable ``name``."""
 _DATA_FOLDER = str(Path(__file__).parent)
 """Folder of the suite's references and of the bundled results, which a controller must not read."""
-_PROCESS_PATTERN = re.compile(r"/proc/(\d+)/")
-"""Beginning of the paths of files that give access to a process."""
+_PROCESS_PATTERN = re.compile(r"/proc/(\d+)(?=/|$)")
+"""Part of the paths of files that give access to a process, also below ``/proc/self/root``."""
 _FROZEN_PATTERN = re.compile(r"<frozen (.+)>")
 """Name in place of a file for a module that is part of the Python executable."""
 _LISTING_EVENTS = ("os.listdir", "os.scandir")
@@ -100,6 +100,9 @@ _FUNCTIONS_WITHOUT_EVENTS = {
 }
 """Functions by module that a controller must not call, and that cause no audit event. Each changes something
 that another process can see."""
+_LOOKUP_FUNCTIONS = ("access", "lstat", "open", "readlink", "stat")
+"""Functions of the module os that look up a path. Audit events do not contain their argument ``dir_fd``, and
+only that of ``open`` exists. Without these checks, a process could see which files another one has opened."""
 _COMPILER_EVENTS = ("_multiprocessing.SemLock", "ctypes.dlopen", "ctypes.dlsym", "ctypes.dlsym/handle")
 """Events that a compiler may cause, such as for parallel loops, in addition to those in its cache folder."""
 _CACHE_EVENTS = ("open", "os.mkdir", "os.remove", "os.rename", "os.utime", *_LISTING_EVENTS)
@@ -174,8 +177,8 @@ def install_guard(
     sys.addaudithook(audit)
 
 
-def _replace_functions(check: Callable[[_Action], None]) -> None:
-    """Replace functions that cause no audit event by functions that check each call first."""
+def _replace_functions(check: Callable[[_Action | None], None]) -> None:
+    """Replace functions without sufficient audit events by functions that check each call first."""
     for module_name, names in _FUNCTIONS_WITHOUT_EVENTS.items():
         try:
             module = importlib.import_module(module_name)
@@ -184,11 +187,13 @@ def _replace_functions(check: Callable[[_Action], None]) -> None:
             continue
         for name in names:
             if hasattr(module, name):
-                _replace_function(module, name, check)
+                _forbid_function(module, name, check)
+    for name in _LOOKUP_FUNCTIONS:
+        _check_lookups(name, check)
 
 
-def _replace_function(module: Any, name: str, check: Callable[[_Action], None]) -> None:
-    """Replace a function of a module, and of the module in which it is implemented."""
+def _forbid_function(module: Any, name: str, check: Callable[[_Action | None], None]) -> None:
+    """Replace a function that a controller must not call."""
     function = getattr(module, name)
     full_name = f"{module.__name__}.{name}"
 
@@ -200,9 +205,29 @@ def _replace_function(module: Any, name: str, check: Callable[[_Action], None]) 
     for attribute in ("SEM_VALUE_MAX", "_rebuild"):
         if hasattr(function, attribute):
             setattr(call_after_check, attribute, getattr(function, attribute))
+    _replace_function(module, name, call_after_check)
+
+
+def _check_lookups(name: str, check: Callable[[_Action | None], None]) -> None:
+    """Replace a function of the module os that looks up a path."""
+    function = getattr(os, name)
+
+    def call_after_check(path: Any, *arguments: Any, **options: Any) -> Any:
+        if not isinstance(path, int):
+            # The path of an object is requested only once, because the next one could be different.
+            path = os.fspath(path)
+        check(_describe_lookup(name, path, options.get("dir_fd")))
+        return function(path, *arguments, **options)
+
+    _replace_function(os, name, call_after_check)
+
+
+def _replace_function(module: Any, name: str, replacement: Callable[..., Any]) -> None:
+    """Replace a function of a module, and of the module in which it is implemented."""
+    function = getattr(module, name)
     for owner in (module, sys.modules.get(function.__module__ or "")):
         if owner is not None and getattr(owner, name, None) is function:
-            setattr(owner, name, call_after_check)
+            setattr(owner, name, replacement)
 
 
 class _Callers:
@@ -350,6 +375,27 @@ def _describe_event(event: str, arguments: tuple[Any, ...]) -> _Action | None:
     return _Action(event, paths, " ".join([event, *names[:1]]))
 
 
+def _describe_lookup(name: str, path: Any, folder: int | None) -> _Action | None:
+    """Describe the lookup of a path; return None unless it is forbidden."""
+    if folder is not None:
+        return _Action(f"os.{name}", (), f"calling os.{name} with dir_fd")
+    if isinstance(path, int):
+        return None
+    absolute_path = os.path.normpath(Path.cwd() / _convert_path(path))
+    if _refers_to_other_process(absolute_path):
+        return _Action(f"os.{name}", (absolute_path,), f"looking up {absolute_path}")
+    return None
+
+
+def _is_data_of_benchmark(path: str) -> bool:
+    return path.startswith(_DATA_FOLDER) and not path.endswith((".py", ".pyc"))
+
+
+def _refers_to_other_process(path: str) -> bool:
+    """Return whether a path leads to a file that gives access to another process."""
+    return any(int(number) != os.getpid() for number in _PROCESS_PATTERN.findall(path))
+
+
 def _convert_path(path: Any) -> str:
     """Return a path as a plain string, whatever methods its class has."""
     name = os.fspath(path)
@@ -366,14 +412,12 @@ def _describe_opening(path: Any, mode: Any, flags: Any) -> _Action | None:
     writes = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
     if isinstance(mode, str):
         writes = writes or any(character in mode for character in "wax+")
-    process = _PROCESS_PATTERN.match(name)
-    is_other_process = process is not None and int(process[1]) != os.getpid()
     prohibition = ""
     if not isinstance(path, str | bytes):
         # Such an object could return a different path than to the function that opens the file.
         prohibition = f"opening {name} by an object"
     elif writes:
         prohibition = f"writing {name}"
-    elif is_other_process or (name.startswith(_DATA_FOLDER) and not name.endswith((".py", ".pyc"))):
+    elif _refers_to_other_process(name) or _is_data_of_benchmark(name):
         prohibition = f"reading {name}"
     return _Action("open", (name,), prohibition)

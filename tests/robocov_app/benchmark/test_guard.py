@@ -73,6 +73,10 @@ def open_by_an_object():
     import io
     io.FileIO(TwoPaths())
 
+def read_references_in_a_folder():
+    folder = os.open(Path(suite.__file__).parents[1], os.O_RDONLY)
+    os.open(f"benchmark/{suite.SUITE_FILE.name}", os.O_RDONLY, dir_fd=folder)
+
 def import_missing_module():
     try:
         import robocov_has_no_such_module
@@ -84,6 +88,10 @@ ATTEMPTS = {
     "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
     "read references by a special string": lambda: open(Text(REFERENCES)),
     "read references by an object": open_by_an_object,
+    "read references in an open folder": read_references_in_a_folder,
+    "look up an open file of another process": lambda: os.stat(f"/proc/{os.getppid()}/fd/0"),
+    "follow a link of another process": lambda: os.readlink(f"/proc/{os.getppid()}/cwd"),
+    "look up a process below a link": lambda: os.access(f"/proc/self/root/proc/{os.getppid()}", os.R_OK),
     "create a FIFO": lambda: os.mkfifo(f"{FOLDER}/a"),
     "create a FIFO by another module": create_fifo_by_posix,
     "create a node": lambda: os.mknod(f"{FOLDER}/c"),
@@ -96,6 +104,7 @@ ATTEMPTS = {
     "list an open folder": list_open_folder,
     "list a folder by Python's import": list_by_import,
     "look up a function": look_up_a_function,
+    "look up files": lambda: (os.stat(FOLDER), os.readlink("/proc/self/exe"), Path(FOLDER).exists()),
     "list an installed package": lambda: os.listdir(Path(suite.__file__).parent),
     "look for installed packages": lambda: entry_points(group="robocov"),
     "look for a module": lambda: importlib.util.find_spec("robocov.no_such_module"),
@@ -115,6 +124,7 @@ for name, attempt in ATTEMPTS.items():
 print(json.dumps({"violations": found, "readings": readings}))
 """
 ALLOWED = (
+    "look up files",
     "list an installed package",
     "look for installed packages",
     "look for a module",
