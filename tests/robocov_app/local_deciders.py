@@ -57,8 +57,9 @@ def run_isolated(
     """Run a task as a referee does; return the outcome, the differences and the deciders of the robots."""
     controller = make_controller(task.controller, task.gains, source=task.source)
     scanning: Scanning | None = getattr(controller, "scanning", None)
+    information = get_information(controller)
     environment = None
-    if get_information(controller) == "whole map":
+    if information == "whole map":
         environment = task.hide_unknown_density().build_environment().static
     deciders = {robot: LocalDecider() for robot in robots}
     team = IsolatedTeam(
@@ -67,6 +68,7 @@ def run_isolated(
         deciders,
         scanning=scanning,
         environment=environment,
+        may_send_messages=information != "own",
         rng=np.random.default_rng(0),
     )
 

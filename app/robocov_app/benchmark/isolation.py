@@ -187,13 +187,15 @@ class IsolatedTeam:
         Settings of the range scans that the controller needs.
     environment : Environment or None
         The map, if the controller may know it.
+    may_send_messages : bool
+        Whether the information that the controller declares includes messages.
     rng : Generator
         Random numbers for the placeholders.
 
     Attributes
     ----------
     differences : list of str
-        The first difference of each robot.
+        The first difference of each robot, and messages that the robots must not send.
     """
 
     name = label = "isolated"
@@ -207,10 +209,13 @@ class IsolatedTeam:
         *,
         scanning: Scanning | None,
         environment: Environment | None,
+        may_send_messages: bool,
         rng: np.random.Generator,
     ) -> None:
         self.scanning = scanning
         self.differences: list[str] = []
+        self._may_send_messages = may_send_messages
+        self._has_reported_messages = False
         self._code = code
         self._team = team
         self._robots = dict(robots)
@@ -241,6 +246,8 @@ class IsolatedTeam:
         sensor = seen.density_sensor
         team_decision = self._team.receive_decision(None if sensor is None else sensor.measure)
         self._team_decision = team_decision
+        if any(team_decision.messages):
+            self._report_messages(seen.time)
         self._own_decisions = {}
         for robot, decider in list(self._robots.items()):
             own_sensor = None if sensor is None else _OwnSensor(sensor, robot)
@@ -251,6 +258,13 @@ class IsolatedTeam:
             except RobocovError as error:
                 self._stop_checking(robot, f"in a separate process: {error}")
         return team_decision
+
+    def _report_messages(self, time: float) -> None:
+        """Note that robots send messages at a time, s, if they must not; the first time is enough."""
+        if self._may_send_messages or self._has_reported_messages:
+            return
+        self._has_reported_messages = True
+        self.differences.append(f"robots send messages from {time:.2f} s on, but declare the information own")
 
     def compare_decisions(self, snapshot: Snapshot) -> None:
         """Compare the decisions of the latest step. Those of failed robots have no effect and are ignored."""

@@ -98,6 +98,7 @@ class RefereeService:
                 robot_processes,
                 scanning=run.description.scanning,
                 environment=environment,
+                may_send_messages=run.description.information != "own",
                 rng=np.random.default_rng(run.seed),
             )
             outcome = perform(run.task, isolated_team.compare_decisions, isolated_team)

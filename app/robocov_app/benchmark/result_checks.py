@@ -10,7 +10,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
+from robocov.conditions.communication import POSITION_BYTES
 from robocov.controllers.base import Information
+from robocov.defaults import DEFAULT_DT_S
 from robocov.errors import InputError, format_bound, quote
 from robocov.metrics.clearance import MAX_CONTACT_GAP_M
 from robocov_app.benchmark import suite
@@ -166,8 +168,8 @@ def check_row(row: Any, location: str) -> None:
     """
     has_failed = isinstance(row, dict) and "error" in row
     _require_types(row, _FAILED_ROW_TYPES if has_failed else _ROW_TYPES, location)
-    if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
-        run = quote(f"{row['track']} on {row['map']}")
+    if not _is_run_of_suite(row):
+        run = quote(f"{row['track']} on {row['map']}, seed {row['seed']}")
         raise InputError(f"{location}: {run} is not a run of the suite")
     if has_failed:
         return
@@ -182,6 +184,37 @@ def check_row(row: Any, location: str) -> None:
     _check_range(row, "stuck_robots", location, maximum=track.robots)
     _check_costs(row, location)
     _check_clearance(row, location)
+
+
+def check_sent_bytes(row: Row, information: str, location: str) -> None:
+    """Raise InputError if robots send messages that the information of their controller excludes.
+
+    Parameters
+    ----------
+    row : dict
+        Row of a run, as checked by `check_row`.
+    information : str
+        Information that the controller declares.
+    location : str
+        Place of the row, for the message.
+    """
+    if "error" in row or information != "own":
+        return
+    track = suite.TRACKS[row["track"]]
+    message_rate = track.changes.get("conditions", {}).get("message_rate", 1.0 / DEFAULT_DT_S)
+    position_bytes = POSITION_BYTES * track.robots * message_rate * track.duration
+    if row["sent_bytes"] > position_bytes * (1.0 + _ROUNDING):
+        raise InputError(
+            f"{location}: sent_bytes: expected at most {format_bound(position_bytes)} for positions, "
+            f"got {row['sent_bytes']}. A controller whose robots send messages must declare "
+            'information = "shared map"'
+        )
+
+
+def _is_run_of_suite(row: Row) -> bool:
+    """Return whether the track of a row has runs on its map and with its seed."""
+    track = suite.TRACKS.get(row["track"])
+    return track is not None and row["map"] in track.maps and row["seed"] in track.seeds
 
 
 def _check_range(

@@ -2,6 +2,7 @@
 
 import gzip
 import hashlib
+import io
 import json
 import zlib
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ from typing import Any
 from robocov.controllers.registry import update_gain_names
 from robocov.errors import InputError
 from robocov.files.result_folder import require_result
-from robocov.files.strictjson import parse_json, read_bytes
+from robocov.files.strictjson import MAX_BYTES, parse_json, read_bytes
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.result_checks import (
     METRICS,
@@ -19,6 +20,7 @@ from robocov_app.benchmark.result_checks import (
     Row,
     check_head,
     check_row,
+    check_sent_bytes,
 )
 from robocov_app.runs.cost import AREA_TOLERANCE_M2
 from robocov_app.sweep.ledger import Entry
@@ -195,10 +197,7 @@ def read_result(path: Path) -> dict[str, Any]:
         path = path / RESULT_FILE
     content = read_bytes(path)
     if path.suffix == ".gz":
-        try:
-            content = gzip.decompress(content)
-        except (OSError, EOFError, zlib.error) as error:
-            raise InputError(f"{path}: cannot be unpacked: {error}") from None
+        content = _decompress(content, path)
     result = parse_json(content, str(path))
     if not isinstance(result, dict) or {name: result.get(name) for name in RESULT_FORMAT} != RESULT_FORMAT:
         raise InputError(f"{path}: expected a result of robocov benchmark")
@@ -215,6 +214,7 @@ def read_result(path: Path) -> dict[str, Any]:
         location = f"{path}: rows[{k}]"
         _update_row_names(row)
         check_row(row, location)
+        check_sent_bytes(row, result["entry"]["information"], location)
         run = (row["track"], row["map"], row["seed"])
         if run in runs:
             raise InputError(
@@ -223,6 +223,15 @@ def read_result(path: Path) -> dict[str, Any]:
             )
         runs.add(run)
     return result
+
+
+def _decompress(content: bytes, path: Path) -> bytes:
+    """Decompress the content of a file, up to one byte more than a JSON file may have."""
+    try:
+        with gzip.open(io.BytesIO(content)) as file:
+            return file.read(MAX_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: cannot be unpacked: {error}") from None
 
 
 def check_gaps(result: Mapping[str, Any], path: Path) -> None:

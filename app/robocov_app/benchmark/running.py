@@ -9,7 +9,7 @@ from robocov.errors import InputError, OutputError
 from robocov.files.result_names import RUNS_FOLDER
 from robocov.files.writing import replace_file
 from robocov_app.benchmark.rated_controller import RatedController, Selection
-from robocov_app.benchmark.result_checks import Row
+from robocov_app.benchmark.result_checks import Row, check_sent_bytes
 from robocov_app.benchmark.results import (
     RESULT_FILE,
     RESULT_FORMAT,
@@ -67,12 +67,14 @@ def run_benchmark(
     Raises
     ------
     InputError
-        If the folder contains anything other than a benchmark.
+        If the folder contains anything other than a benchmark, or if robots send messages although the
+        controller does not declare it.
     ParameterError
         If the controller, a track or a map is unknown.
     """
     _check_folder(out)
     studies = dict(controller.build_studies(selection))
+    entry = controller.describe(next(iter(studies.values())))
     rows: list[Row] = []
     for track, study in studies.items():
         folder = out / TRACKS_FOLDER / track
@@ -81,9 +83,11 @@ def run_benchmark(
         )
         if summary.interrupted:
             return None
-        rows.extend(_read_rows(track, study, folder))
-    any_study = next(iter(studies.values()))
-    result = _describe_result(controller.describe(any_study), selection)
+        track_rows = list(_read_rows(track, study, folder))
+        for row in track_rows:
+            check_sent_bytes(row, entry["information"], f"{track} on {row['map']}")
+        rows += track_rows
+    result = _describe_result(entry, selection)
     _write_result(out / RESULT_FILE, result, rows)
     return {**result, "rows": rows}
 

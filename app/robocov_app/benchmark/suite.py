@@ -137,7 +137,10 @@ TRACKS: Mapping[str, Track] = {
         seeds=(0, 1),
     ),
     "short-range": Track("communication range of 3 m", changes={"communication_range": 3.0}),
-    "lossy": Track("2 messages per second, delayed by 0.5 s, 30% lost", changes={"conditions": _LOSSY}),
+    "lossy": Track(
+        "positions and messages sent twice per second, delayed by 0.5 s, 30% lost",
+        changes={"conditions": _LOSSY},
+    ),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
     "unicycle": Track("robots on two wheels, which turn before driving", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),

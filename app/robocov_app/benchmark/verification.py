@@ -41,10 +41,9 @@ from robocov_app.benchmark.controller_process import (
     read_description,
 )
 from robocov_app.benchmark.new_maps import (
-    MIN_P_VALUE,
-    TRACK,
     NewMap,
     NewMapComparison,
+    choose_track,
     compare_gaps,
     sample_new_maps,
 )
@@ -128,6 +127,8 @@ class Verification:
         Number of runs in which a process received the observations of the whole team instead.
     new_maps : int
         Number of new maps that were tried.
+    new_map_track : str or None
+        Track of the runs on new maps; None if the result has no runs on generated maps.
     comparison : NewMapComparison or None
         Comparison of gaps on new maps with those on the suite.
     differences : list of str
@@ -143,6 +144,7 @@ class Verification:
     robots: int = 0
     teams: int = 0
     new_maps: int = 0
+    new_map_track: str | None = None
     comparison: NewMapComparison | None = None
     differences: list[str] = field(default_factory=list)
     read_files: list[str] = field(default_factory=list)
@@ -184,6 +186,8 @@ class Verification:
             omissions.append("no robot was checked")
         if not self.new_maps:
             omissions.append("new maps were not tried")
+        elif self.comparison is not None and not self.comparison.is_conclusive:
+            omissions.append("there were too few runs for a test on new maps")
         if not omissions:
             return "Verified: no difference."
         runs = format_count(self.runs, "run")
@@ -222,7 +226,7 @@ class Verification:
         if self.comparison is not None:
             lines.append(self._describe_new_maps(self.comparison))
         elif not self.new_maps:
-            lines.append(f"No new maps tried. They require runs on generated maps of the track {TRACK}.")
+            lines.append("No new maps tried. They require runs on maps of families that have a generator.")
         if self.read_files:
             lines.append(
                 f"The controller has read files that are not part of its source code, such as "
@@ -255,10 +259,11 @@ class Verification:
     def _describe_new_maps(self, comparison: NewMapComparison) -> str:
         """Return a sentence on the comparison with new maps."""
         text = (
-            f"{format_count(self.new_maps, 'new map')}: median gap {comparison.new_gap:.1%}, on the maps of "
-            f"the same families in the suite {comparison.suite_gap:.1%}, p = {comparison.p_value:.2g}"
+            f"{format_count(self.new_maps, 'new map')} on the track {self.new_map_track}: median gap "
+            f"{comparison.new_gap:.1%}, on the maps of the same families in the suite "
+            f"{comparison.suite_gap:.1%}, p = {comparison.p_value:.2g}"
         )
-        if comparison.min_p_value >= MIN_P_VALUE:
+        if not comparison.is_conclusive:
             text += " (too few runs in the result to show a difference)"
         return f"{text}."
 
@@ -278,8 +283,8 @@ def verify_result(
        (`robocov_app.benchmark.referee`).
     3. In these runs, the decisions of some robots are repeated in separate processes that each receive only
        the observations of one robot (`robocov_app.benchmark.isolation`).
-    4. The controller runs on new maps, where it must not be clearly worse than on the maps of the suite
-       (`robocov_app.benchmark.new_maps`).
+    4. The controller runs on new maps, under the conditions of one of its tracks, and must not be clearly
+       worse than on the maps of the suite (`robocov_app.benchmark.new_maps`).
 
     No code to which a result refers is executed: a controller in a file must be given by the caller, and the
     hash of its source code must be that in the result.
@@ -330,8 +335,10 @@ def verify_result(
     sampled = _sample_runs(
         rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
     )
-    new_maps = _sample_maps(rated, studies, options.new_maps, _create_generator(seed, _MAP_STREAM))
-    new_tasks = _index_new_tasks(stand_in, new_maps)
+    map_rng = _create_generator(seed, _MAP_STREAM)
+    new_map_track, new_maps = _sample_maps(rated, studies, options.new_maps, map_rng)
+    verification.new_map_track = new_map_track
+    new_tasks = _index_new_tasks(stand_in, new_map_track, new_maps)
     chosen_tasks = {key: tasks[key] for key in sampled} | new_tasks
     new_outcomes: dict[RunKey, Outcome | None] = {}
     # A process that is killed may still write to the folder.
@@ -349,9 +356,9 @@ def verify_result(
             verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
             if key in new_tasks:
                 new_outcomes[key] = check.outcome
-    if new_outcomes and not stop.requested:
-        gaps = _compute_gaps_on_new_maps(new_maps, new_outcomes, options.workers, stop)
-        verification.comparison = compare_gaps(result["rows"], gaps)
+    if new_map_track and new_outcomes and not stop.requested:
+        gaps = _compute_gaps_on_new_maps(new_map_track, new_maps, new_outcomes, options.workers, stop)
+        verification.comparison = compare_gaps(result["rows"], gaps, new_map_track, map_rng)
         verification.differences += _describe_comparison(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
     return verification
@@ -417,19 +424,30 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
 
 def _sample_maps(
     rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
-) -> list[NewMap]:
-    """Sample new maps of the families in a result; none for the oracle, which needs their best placements."""
-    if rated.controller == ORACLE or TRACK not in studies:
-        return []
-    families = dict.fromkeys(suite.FAMILY_OF[study_map.name] for study_map in studies[TRACK].maps)
-    return sample_new_maps(list(families), count, rng)
+) -> tuple[str | None, list[NewMap]]:
+    """Sample a track of a result, and new maps of the families on this track.
+
+    There are none for the oracle, which needs their best placements.
+    """
+    if rated.controller == ORACLE:
+        return None, []
+    maps_by_track = {track: [study_map.name for study_map in study.maps] for track, study in studies.items()}
+    track = choose_track(maps_by_track, count, rng)
+    if track is None:
+        return None, []
+    families = dict.fromkeys(suite.FAMILY_OF[name] for name in maps_by_track[track])
+    return track, sample_new_maps(list(families), count, rng)
 
 
-def _index_new_tasks(rated: RatedController, new_maps: Sequence[NewMap]) -> dict[RunKey, Task]:
+def _index_new_tasks(
+    rated: RatedController, track: str | None, new_maps: Sequence[NewMap]
+) -> dict[RunKey, Task]:
     """Return the tasks of the runs on new maps by their keys."""
-    tasks = {}
+    tasks: dict[RunKey, Task] = {}
+    if track is None:
+        return tasks
     for new_map in new_maps:
-        study = rated.build_study(TRACK, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed])
+        study = rated.build_study(track, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed])
         tasks[NEW_MAP, new_map.name, new_map.start_seed] = next(iter(generate_tasks(study)))
     return tasks
 
@@ -525,6 +543,7 @@ def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -
 
 
 def _compute_gaps_on_new_maps(
+    track: str,
     new_maps: Sequence[NewMap],
     outcomes: Mapping[RunKey, Outcome | None],
     workers: int,
@@ -536,7 +555,7 @@ def _compute_gaps_on_new_maps(
     user interrupted the search, are left out.
     """
     # As in the suite, the reference is a placement of the robots that are still working at the end.
-    robots = suite.TRACKS[TRACK].survivors
+    robots = suite.TRACKS[track].survivors
     queries = {
         new_map.name: ReferenceQuery(
             to_json(new_map.environment),

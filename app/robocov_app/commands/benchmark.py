@@ -252,6 +252,7 @@ def _verify(options: Arguments) -> int:
         "robots": verification.robots,
         "teams": verification.teams,
         "new_maps": verification.new_maps,
+        "new_maps_track": verification.new_map_track if verification.new_maps else None,
         "new_maps_p_value": None if comparison is None else comparison.p_value,
         "read_files": verification.read_files,
         "differences": differences,

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from robocov.errors import InputError
+from robocov.files.strictjson import MAX_BYTES
 from robocov_app.benchmark.results import ENTRIES, read_result
 
 Change = Callable[[dict[str, Any]], object]
@@ -80,6 +81,20 @@ def test_a_label_needs_only_one_visible_character(tmp_path: Path) -> None:
         ),
         (change_first_row(settled_at_s=61.0), "rows[0]: settled_at_s: expected at most 60, got 61.0"),
         (change_first_row(near_final_s=61.0), "rows[0]: near_final_s: expected at most 60, got 61.0"),
+        (change_first_row(seed=7), "rows[0]: 'ideal on blocks-a, seed 7' is not a run of the suite"),
+        (
+            change_first_row(map="tunnels-7001"),
+            "rows[0]: 'ideal on tunnels-7001, seed 0' is not a run of the suite",
+        ),
+        # The entry contains this metric under its former name.
+        (
+            change_first_row(told_bytes=432001.0),
+            "rows[0]: sent_bytes: expected at most 432000 for positions, got 432001.0",
+        ),
+        (
+            choose_row("lossy", told_bytes=14401.0),
+            "rows[0]: sent_bytes: expected at most 14400 for positions, got 14401.0",
+        ),
         (change_first_row(contacts=0.5), "rows[0]: contacts: expected a whole number, got 0.5"),
         (change_first_row(stuck_robots=0.5), "rows[0]: stuck_robots: expected a whole number or null, got"),
         (change_first_row(stuck_robots=7), "rows[0]: stuck_robots: expected at most 6, got 7"),
@@ -115,3 +130,14 @@ def test_impossible_results_are_rejected(change: Change, message: str, tmp_path:
     with pytest.raises(InputError) as caught:
         read_changed_entry(change, path)
     assert str(caught.value).startswith(f"{path}: {message}")
+
+
+def test_a_compressed_file_is_read_only_up_to_the_maximum_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "result.json.gz"
+    path.write_bytes(gzip.compress(bytes(4 * MAX_BYTES), compresslevel=1))
+    # Decompressing everything at once would need the memory for everything.
+    monkeypatch.setattr("gzip.decompress", lambda _: pytest.fail("decompressed without a limit"))
+    with pytest.raises(InputError, match="expected at most 50 MB, got more"):
+        read_result(path)

@@ -16,11 +16,18 @@ from local_deciders import run_isolated
 from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import CONTROLLERS
+from robocov.errors import InputError
 from robocov.generator import GENERATORS
 from robocov.observation import Snapshot
 from robocov_app.benchmark import suite, verification
 from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
-from robocov_app.benchmark.new_maps import MIN_P_VALUE, TRACK, compare_gaps, sample_new_maps
+from robocov_app.benchmark.new_maps import (
+    MIN_P_VALUE,
+    NewMapComparison,
+    choose_track,
+    compare_gaps,
+    sample_new_maps,
+)
 from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
 from robocov_app.benchmark.running import run_benchmark
@@ -90,17 +97,23 @@ class Mine:
 WITH_MESSAGES = """
 @dataclass(frozen=True)
 class Mine:
+    information = "shared map"
+
     def force(self, own):
         own.send([own.number, own.position], size=24)
         heard = [message.payload[1] for message in own.messages]
         return own.centroid - own.position + 0.1 * sum(own.position - position for position in heard)
 """
 
+UNDECLARED_MESSAGES = WITH_MESSAGES.replace('    information = "shared map"\n', "")
+
 FALSE_MESSAGES = """
 POSITIONS = {}
 
 @dataclass(frozen=True)
 class Mine:
+    information = "shared map"
+
     def force(self, own):
         POSITIONS[own.number] = own.position
         own.send([sum(POSITIONS.values())], size=16)
@@ -224,6 +237,15 @@ def test_messages_with_hidden_knowledge_are_detected(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
     (difference,) = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", [2])
     assert "decides differently" in difference
+
+
+def test_messages_that_are_not_declared_are_reported(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(IMPORTS + UNDECLARED_MESSAGES)
+    assert isolate(f"{tmp_path / 'mine.py'}:Mine", "ideal", [2]) == [
+        "robots send messages from 0.00 s on, but declare the information own"
+    ]
+    with pytest.raises(InputError, match="A controller whose robots send messages must declare"):
+        rate(tmp_path, UNDECLARED_MESSAGES, "ideal")
 
 
 def test_equal_payloads_have_equal_bytes() -> None:
@@ -471,6 +493,7 @@ def test_a_controller_that_knows_the_suite_is_not_verified(
     (folder / RESULT_FILE).write_text(json.dumps(result))
     verification = verify(folder, name, VerificationOptions(sample=0, robots=0, new_maps=4, workers=2))
     assert verification.comparison is not None and verification.comparison.suite_gap == 0.0
+    assert verification.new_map_track == "ideal"
     (difference,) = verification.differences
     assert difference.endswith("the controller or its gains are fitted to the maps of the suite")
 
@@ -517,6 +540,10 @@ def test_a_result_is_verified_only_if_runs_were_repeated() -> None:
     complete = replace(nothing, runs=2)
     assert complete.describe_verdict() == "Verified: no difference."
     assert complete.is_successful
+    inconclusive = replace(complete, comparison=NewMapComparison(0.0, 0.0, 0.5, min_p_value=0.01))
+    assert inconclusive.describe_verdict() == (
+        "Verified: no difference in 2 runs; there were too few runs for a test on new maps."
+    )
     short = replace(complete, robots=0, new_maps=0)
     assert short.describe_verdict() == (
         "Verified: no difference in 2 runs; no robot was checked, and new maps were not tried."
@@ -533,7 +560,7 @@ def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
     rng = np.random.default_rng(0)
     names = [name for names in suite.FAMILIES.values() for name in names]
     return [
-        {"track": TRACK, "map": name, "seed": seed, "gap": gap + spread * rng.random()}
+        {"track": "ideal", "map": name, "seed": seed, "gap": gap + spread * rng.random()}
         for name, seed in product(names, (0, 1))
     ]
 
@@ -541,18 +568,22 @@ def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
 @pytest.fixture
 def whole_track(monkeypatch: pytest.MonkeyPatch) -> None:
     maps = tuple(name for names in suite.FAMILIES.values() for name in names)
-    monkeypatch.setitem(suite.TRACKS, TRACK, replace(suite.TRACKS[TRACK], maps=maps))  # type: ignore[arg-type]
+    monkeypatch.setitem(suite.TRACKS, "ideal", replace(suite.TRACKS["ideal"], maps=maps))  # type: ignore[arg-type]
+
+
+def compare(rows: list[dict[str, Any]], new_gaps: list[tuple[str, float]]) -> NewMapComparison | None:
+    return compare_gaps(rows, new_gaps, "ideal", np.random.default_rng(0))
 
 
 @pytest.mark.usefixtures("whole_track")
 def test_a_larger_gap_on_new_maps_is_detected() -> None:
     families = list(GENERATORS)
-    known = compare_gaps(build_rows(0.0, 0.001), [(family, 0.02) for family in families])
+    known = compare(build_rows(0.0, 0.001), [(family, 0.02) for family in families])
     assert known is not None and known.is_worse
     assert known.new_gap == 0.02
-    failed = compare_gaps(build_rows(0.1, 0.1), [(family, math.inf) for family in families])
+    failed = compare(build_rows(0.1, 0.1), [(family, math.inf) for family in families])
     assert failed is not None and failed.is_worse
-    equal = compare_gaps(build_rows(0.1, 0.1), [(family, 0.15) for family in families])
+    equal = compare(build_rows(0.1, 0.1), [(family, 0.15) for family in families])
     assert equal is not None and not equal.is_worse
 
 
@@ -561,9 +592,7 @@ def test_equal_gaps_on_new_maps_are_accepted() -> None:
     rng = np.random.default_rng(1)
     p_values = []
     for _ in range(60):
-        comparison = compare_gaps(
-            build_rows(0.0, 1.0), [(family, float(rng.random(2).mean())) for family in GENERATORS]
-        )
+        comparison = compare(build_rows(0.0, 1.0), [(family, float(rng.random())) for family in GENERATORS])
         assert comparison is not None
         p_values.append(comparison.p_value)
     assert min(p_values) > MIN_P_VALUE
@@ -571,12 +600,58 @@ def test_equal_gaps_on_new_maps_are_accepted() -> None:
 
 
 def test_a_few_rows_are_not_enough_for_a_significant_difference() -> None:
-    rows = [{"track": TRACK, "map": MAP, "seed": 0, "gap": 0.0}]
-    assert compare_gaps(rows, [("polygons", 0.5)]) is None
-    comparison = compare_gaps(rows, [("bundled", 0.5)])
+    rows = [{"track": "ideal", "map": MAP, "seed": 0, "gap": 0.0}]
+    assert compare(rows, [("polygons", 0.5)]) is None
+    comparison = compare(rows, [("bundled", 0.5)])
     assert comparison is not None
     assert comparison.min_p_value == 0.5
-    assert not comparison.is_worse
+    assert not comparison.is_worse and not comparison.is_conclusive
+
+
+def test_p_values_are_the_probabilities_of_ranks() -> None:
+    """Two families with two maps each: of nine pairs of ranks, three have a sum of at most 1 + 2."""
+    rows = [
+        {"track": "lossy", "map": f"{family}-{seed}", "seed": 0, "gap": 0.1 * (seed - 7000)}
+        for family in ("blocks", "rooms")
+        for seed in (7001, 7002)
+    ]
+    # The first gap is the largest of three, the second one is in the middle.
+    comparison = compare_gaps(rows, [("blocks", 0.3), ("rooms", 0.15)], "lossy", np.random.default_rng(0))
+    assert comparison is not None
+    assert comparison.p_value == pytest.approx(3 / 9)
+    assert comparison.min_p_value == pytest.approx(1 / 9)
+
+
+def test_the_gap_on_a_map_is_that_of_a_single_run() -> None:
+    """The mean of several runs would vary less than the gap on a new map, where there is only one run."""
+    rows = [{"track": "ideal", "map": "blocks-7001", "seed": seed, "gap": float(seed)} for seed in (0, 1)]
+    gaps = set()
+    for seed in range(20):
+        comparison = compare_gaps(rows, [("blocks", 0.5)], "ideal", np.random.default_rng(seed))
+        assert comparison is not None
+        gaps.add(comparison.suite_gap)
+    assert gaps == {0.0, 1.0}
+
+
+@pytest.mark.usefixtures("whole_track")
+def test_the_track_of_new_maps_is_drawn_from_those_that_can_show_a_difference() -> None:
+    core = [name for names in suite.FAMILIES.values() for name in names[:3]]
+    maps_by_track = {
+        "ideal": suite.TRACKS["ideal"].maps,
+        "short-range": core,
+        "noisy": core[:18],
+        "density": suite.TRACKS["density"].maps,
+    }
+
+    def choose(tracks: Sequence[str], count: int) -> set[str | None]:
+        chosen = {name: maps_by_track[name] for name in tracks}
+        return {choose_track(chosen, count, np.random.default_rng(seed)) for seed in range(20)}
+
+    # Five maps of families with three maps each are just enough.
+    assert choose(list(maps_by_track), 5) == {"ideal", "short-range", "noisy"}
+    assert choose(list(maps_by_track), 4) == {"ideal"}
+    assert choose(["short-range", "density"], 1) == {"short-range"}
+    assert choose(["density"], 5) == {None}
 
 
 def test_new_maps_are_of_different_families_and_not_in_the_suite() -> None:
