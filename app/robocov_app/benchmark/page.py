@@ -174,6 +174,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         marks=MARKER_PATHS,
         styles=entries.styles,
         overviews=_build_overviews(labels, tracks, entries.information),
+        file_mark="" if all(result["is_bundled"] for result in results) else ratings.FILE_MARK,
         anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
@@ -238,19 +239,22 @@ def _build_overview(
     for name, track_ratings in tracks.items():
         for rating in track_ratings:
             by_label[rating.label][name] = rating
-    scores = _compute_mean_scores(by_label, tracks)
+    mean_scores = _compute_mean_scores(by_label, tracks)
+    scores = {label: mean_score.score for label, mean_score in mean_scores.items()}
     ranked = sorted(scores, key=lambda label: -scores[label])
     not_ranked = [label for label in labels if label not in scores and by_label[label]]
     not_ranked.sort(key=str.casefold)
     rows = []
-    for rank, label in enumerate(ranked, start=1):
+    for label in [*ranked, *not_ranked]:
+        rank = score = ratings.NO_VALUE
+        if label in scores:
+            rank = str(_compute_rank(scores[label], scores.values()))
+            margin = ratings.format_number(100.0 * mean_scores[label].margin, ".1f")
+            score = f"{100.0 * scores[label]:.1f} ± {margin}"
         cells = _build_overview_cells(by_label[label], tracks)
-        rows.append((label, str(rank), f"{100.0 * scores[label]:.1f}", *cells))
-    for label in not_ranked:
-        cells = _build_overview_cells(by_label[label], tracks)
-        rows.append((label, ratings.NO_VALUE, ratings.NO_VALUE, *cells))
+        rows.append((label, information[label], rank, score, *cells))
     headings = [suite.format_heading(name) for name in tracks]
-    head = ("Controller", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
+    head = ("Controller", "Knows", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
     notes = []
     competing = [label for label in labels if information[label] != _WHOLE_MAP]
     leaders = _find_unranked_leaders({label: by_label[label] for label in competing}, scores, tracks)
@@ -263,7 +267,13 @@ def _build_overview(
     missing = sorted((label for label in labels if not by_label[label]), key=str.casefold)
     if missing:
         notes.append(f"Without runs on these tracks: {'; '.join(missing)}.")
-    return PageTable("Scores, and median gaps on each track, %", head, rows, notes=tuple(notes))
+    caption = "Scores, and median gaps on each track, %"
+    return PageTable(caption, head, rows, text_columns=frozenset({1}), notes=tuple(notes))
+
+
+def _compute_rank(score: float, scores: Iterable[float]) -> int:
+    """Return the rank of a score. Equal scores have the same rank."""
+    return 1 + sum(other > score for other in scores)
 
 
 def _find_unranked_leaders(
@@ -287,13 +297,13 @@ def _find_unranked_leaders(
 
 def _compute_mean_scores(
     by_label: Mapping[str, Mapping[str, Rating]], tracks: Collection[str]
-) -> dict[str, float]:
+) -> dict[str, ratings.MeanScore]:
     """Return the mean score of each entry that has all runs of all tracks, by its label."""
     scores = {}
     for label, label_ratings in by_label.items():
         is_complete = all(rating.is_complete for rating in label_ratings.values())
         if is_complete and label_ratings.keys() == set(tracks):
-            scores[label] = float(np.mean([rating.score for rating in label_ratings.values()]))
+            scores[label] = ratings.compute_mean_score(label_ratings.values())
     return scores
 
 
@@ -395,7 +405,7 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         for rating in track_ratings:
             point = ParetoPoint(
                 style=entries.styles[rating.label],
-                label=shorten(rating.label, _MAX_PLOT_LABEL_CHARS),
+                label=_shorten_plot_label(rating.label, is_bundled=rating.label in entries.bundled),
                 x=quantity.compute(rating),
                 gap=100.0 * rating.gap.estimate,
                 is_rival=entries.information[rating.label] != _WHOLE_MAP,
@@ -420,6 +430,14 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
             )
         plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
     return plots
+
+
+def _shorten_plot_label(label: str, *, is_bundled: bool) -> str:
+    """Shorten a label for a plot; the mark of a result from a file is kept."""
+    if is_bundled:
+        return shorten(label, _MAX_PLOT_LABEL_CHARS)
+    name = label.removesuffix(ratings.FILE_MARK)
+    return shorten(name, _MAX_PLOT_LABEL_CHARS - len(ratings.FILE_MARK)) + ratings.FILE_MARK
 
 
 def thin_out_equal_values(

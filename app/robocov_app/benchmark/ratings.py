@@ -4,10 +4,10 @@ The rating of an entry does not depend on other entries. Adding an entry to a pa
 of the others. Only complete entries are ranked.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,9 +23,15 @@ _INFINITE_GAP = "∞"
 _MAX_FINITE_GAP = 1e30
 """Gap in place of an infinite one in resamples, because percentiles of infinite values are not defined. The
 gaps of all runs are smaller than its square root."""
+_NORMAL_QUANTILE = 1.96
+"""Half the width of a 95% interval, in standard errors."""
+_VARIANT_PREFIX = "dense-"
+"""Beginning of the names of maps that are equal to others, apart from their density."""
 MIN_INTERVAL_MAPS = 12
 """Minimum number of maps for an interval. A 95% bootstrap interval contains the true value in 82% of all
 cases with 5 maps, and in 92% with 12."""
+FILE_MARK = "*"
+"""End of the labels of results that are not bundled: they are from files, whose content may be wrong."""
 _MAX_LABEL_CHARS = 100
 """Maximum length of the label of an entry with its gains."""
 CONTACT_FACTOR = 0.5
@@ -132,12 +138,14 @@ class Rating:
     def compute_median(self, metric: str) -> float:
         """Return the median of a metric over the runs; nan if no run has a value.
 
-        Failed runs count as infinite, so that no entry improves by failing.
+        Runs without a value, such as failed ones, count as infinite, so that no entry improves by failing or
+        by leaving out values.
         """
         values = self.get_values(metric)
         if not len(values):
             return float("nan")
-        return float(np.median([*values, *[np.inf] * len(self.failed_rows)]))
+        missing_count = self.run_count - len(values)
+        return float(np.median([*values, *[np.inf] * missing_count]))
 
     @property
     def run_count(self) -> int:
@@ -161,9 +169,14 @@ class Rating:
         return self.run_count == len(list_run_keys(self.track))
 
     @property
+    def run_scores(self) -> FloatArray:
+        """Score of each run in `run_keys`; 0 if the run failed."""
+        return np.array([*map(compute_score, self.rows), *[0.0] * len(self.failed_rows)])
+
+    @property
     def score(self) -> float:
         """Mean score of the runs; failed runs count as 0."""
-        return sum(map(compute_score, self.rows)) / self.run_count
+        return float(self.run_scores.sum()) / self.run_count
 
     @property
     def gap(self) -> Interval:
@@ -253,6 +266,43 @@ def compute_score(row: Mapping[str, Any]) -> float:
     return float(score)
 
 
+class MeanScore(NamedTuple):
+    """Mean score of an entry on several tracks, each of which counts the same."""
+
+    score: float
+    margin: float
+    """Half the width of the 95% interval over maps; nan if there is only one map."""
+
+
+def compute_mean_score(track_ratings: Collection[Rating]) -> MeanScore:
+    """Compute the mean score of an entry, and its 95% interval over maps.
+
+    Parameters
+    ----------
+    track_ratings : collection of Rating
+        Ratings of the entry on each track.
+
+    Returns
+    -------
+    MeanScore
+        The runs on a map are correlated, also on different tracks. The interval therefore follows from the
+        variance of the contributions of maps (Liang and Zeger, 1986), not of runs.
+    """
+    contributions: dict[str, float] = {}
+    for rating in track_ratings:
+        weight = 1.0 / (len(track_ratings) * rating.run_count)
+        for (map_name, _), run_score in zip(rating.run_keys, rating.run_scores, strict=True):
+            name = map_name.removeprefix(_VARIANT_PREFIX)
+            contributions.setdefault(name, 0.0)
+            contributions[name] += weight * (run_score - rating.score)
+    score = float(np.mean([rating.score for rating in track_ratings]))
+    map_count = len(contributions)
+    if map_count < 2:
+        return MeanScore(score, np.nan)
+    variance = sum(value**2 for value in contributions.values()) * map_count / (map_count - 1)
+    return MeanScore(score, _NORMAL_QUANTILE * float(np.sqrt(variance)))
+
+
 def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
     """Build the ratings of all results by track.
 
@@ -285,7 +335,10 @@ def build_ratings(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating
 
 
 def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return a unique label for each result: controller, gains that were set, and a number if necessary.
+    """Return a unique label for each result.
+
+    It consists of the label of the controller, gains that were set, a number if necessary, and `FILE_MARK` if
+    the result is not bundled.
 
     Parameters
     ----------
@@ -304,11 +357,12 @@ def label_results(results: Iterable[Mapping[str, Any]]) -> list[str]:
             gains = ", ".join(f"{gain} {value}" for gain, value in entry["set"].items())
             name = f"{name} ({gains})"
         name = shorten(escape_controls(name, single_line=True), _MAX_LABEL_CHARS)
-        label = name
+        mark = "" if result.get("is_bundled") else FILE_MARK
+        label = f"{name}{mark}"
         number = 1
         while label in labels:
             number += 1
-            label = f"{name} #{number}"
+            label = f"{name} #{number}{mark}"
         labels.append(label)
     return labels
 
@@ -395,10 +449,10 @@ def _format_bound(rating: Rating) -> str:
 
 
 def _compute_cost_integral(rating: Rating) -> float | None:
-    """Return the median of the integral of J / J_ref over a run, s; None if no run has a gap."""
+    """Return the median of the integral of J / J_ref over a run, s; None if no run has this integral."""
     ratios = []
     for row in rating.rows:
-        if row["gap"] is not None:
+        if row["gap"] is not None and row["mean_distance_over_run_m"] is not None:
             reference_cost = row["mean_distance_m"] / (1.0 + row["gap"])
             ratios.append(row["mean_distance_over_run_m"] / reference_cost)
     if not ratios:

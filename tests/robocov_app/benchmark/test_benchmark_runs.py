@@ -235,7 +235,10 @@ def test_forged_results_are_detected(tmp_path: Path) -> None:
         (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: expected"),
         (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: expected"),
         (lambda result: result["rows"].pop(), "blocks-b, seed 0: missing row"),
-        (lambda result: result["rows"][0].update(seed=7), "seed 7: a row of a run that was not selected"),
+        (
+            lambda result: result["selection"].update(maps=["blocks-a"]),
+            "blocks-b, seed 0: a row of a run that was not selected",
+        ),
         (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
     ):
         (out / RESULT_FILE).write_text(honest)
@@ -289,7 +292,7 @@ def test_an_incomplete_entry_is_listed_separately() -> None:
         assert track_ratings == ratings_with_few[track][: len(track_ratings)]
     tables = [build_tables(results), build_tables([*results, few_result])]
     assert tables[0].overview == tables[1].overview[:-1]
-    assert tables[1].overview[-1][:4] == ("Few", "–", "–", "3 of 345")
+    assert tables[1].overview[-1][:5] == ("Few", "own", "–", "–", "3 of 345")
     assert [row[0] for row in tables[1].ideal] == [row[0] for row in tables[0].ideal]
     assert "Few" not in [row[0] for row in tables[1].ideal]
     incomplete = tables[1].incomplete
@@ -347,7 +350,7 @@ def test_large_plans_have_a_ranking_of_their_own() -> None:
     assert "Overview of large plans" in overview
     first_row = re.findall(r"<tr>(.*?)</tr>", overview.partition("<tbody>")[2])[0]
     cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", first_row)
-    assert (cells[1], cells[3]) == ("1", "24")
+    assert (cells[2], cells[4]) == ("1", "24")
 
 
 class PageTables(NamedTuple):
@@ -366,7 +369,8 @@ def build_tables(results: list[dict[str, Any]]) -> PageTables:
             cells = re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)
             rows.append(tuple(html.unescape(re.sub(r"<svg.*?</svg>", "", cell)) for cell in cells))
         tables.setdefault(caption.partition(",")[0].partition(":")[0], rows)
-    return PageTables(tables["Scores"], tables["Ratings"], tables.get("Few", []))
+    incomplete = tables.get("Few") or tables.get("Few*", [])
+    return PageTables(tables["Scores"], tables["Ratings"], incomplete)
 
 
 def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:
@@ -377,6 +381,29 @@ def test_a_contact_and_motion_at_the_end_halve_the_score() -> None:
     assert ratings.compute_score({**row, "gap": None}) == 0.0
     two_runs = ratings.Rating("", "ideal", [{**row, "map": "rooms", "seed": 0}], [row])
     assert two_runs.score == 0.4
+
+
+def test_the_interval_of_the_mean_score_is_over_maps() -> None:
+    """More runs on the same maps, on the same or on other tracks, do not make it narrower."""
+    names = suite.TRACKS["ideal"].maps[:20]
+    gaps = np.random.default_rng(0).uniform(0.0, 1.0, len(names))
+
+    def build_rating(seeds: tuple[int, ...]) -> ratings.Rating:
+        runs = product(zip(names, gaps, strict=True), seeds)
+        rows = [
+            {"map": name, "seed": seed, "gap": gap, "contacts": 0, "settled_at_s": 9.0}
+            for (name, gap), seed in runs
+        ]
+        return ratings.Rating("", "ideal", rows)
+
+    once = ratings.compute_mean_score([build_rating((0,))])
+    scores = 1.0 / (1.0 + gaps)
+    assert once.score == pytest.approx(scores.mean())
+    assert once.margin == pytest.approx(1.96 * scores.std(ddof=1) / np.sqrt(len(names)))
+    assert ratings.compute_mean_score([build_rating((0, 1))]) == pytest.approx(once)
+    assert ratings.compute_mean_score([build_rating((0,)), build_rating((0, 1))]) == pytest.approx(once)
+    single = replace(build_rating((0,)), rows=build_rating((0,)).rows[:1])
+    assert np.isnan(ratings.compute_mean_score([single]).margin)
 
 
 def test_intervals_require_at_least_12_maps() -> None:
@@ -407,6 +434,12 @@ def test_failed_runs_count_as_infinite() -> None:
     assert (most["Gap, %"], most["95%"]) == ("∞", "1.0–∞")
     for column in ("Within 5%, s", "∫J / J_ref, s", "Path, m", "Work, J", "Settled, s", "B/s", "µs/s"):
         assert some[column] != ratings.NO_VALUE and most[column] == ratings.NO_VALUE
+    # A run without a value counts like a failed one.
+    incomplete_rating = build_failing_rating(0)
+    for row in incomplete_rating.rows[:11]:
+        row |= {"near_final_s": None, "mean_distance_over_run_m": None}  # type: ignore[operator]
+    cells = ratings.build_rating_cells(incomplete_rating, "own")
+    assert cells["Within 5%, s"] == cells["∫J / J_ref, s"] == ratings.NO_VALUE
     bounded_rating = build_failing_rating(11)
     for row in bounded_rating.rows:
         row |= {"gap_to_bound": 0.02}  # type: ignore[operator]
@@ -440,7 +473,7 @@ def test_entries_with_failed_runs_are_neither_in_plots_nor_hidden() -> None:
     descriptions = re.findall(r"Median gap against .*?\.", page)
     assert descriptions and not any("Failing" in description for description in descriptions)
     overview = page.partition('id="overview-core"')[2].partition("</section>")[0]
-    (row,) = [row for row in overview.split("<tr>") if "Failing</th>" in row]
+    (row,) = [row for row in overview.split("<tr>") if "Failing*</th>" in row]
     # Only a line break keeps the column narrow.
     assert "<td>2,\n1 failed</td>" in row and "<td>50%</td>" in row and "<td>∞</td>" in row
 
@@ -659,9 +692,31 @@ def test_other_entries_do_not_replace_a_bundled_one() -> None:
     incomplete["rows"].pop()
     tables = build_tables([by_label, by_name, incomplete, build_bundled_rapf()])
     gaps = {row[0]: row[4] for row in tables.ideal}
-    assert gaps == {"RAPF": "30.0", "RAPF #2": "10.0", "RAPF #3": "20.0"}
+    assert gaps == {"RAPF": "30.0", "RAPF*": "10.0", "RAPF #2*": "20.0"}
     # Only the bundled entry is a yardstick.
-    assert [row[0] for row in tables.incomplete] == ["Few", "RAPF"]
+    assert [row[0] for row in tables.incomplete] == ["Few*", "RAPF"]
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_results_from_files_are_marked_everywhere() -> None:
+    long_label = "Atlas, shared maps" + 30 * "."
+    pages = [
+        build_page([*results, build_bundled_rapf()], "Test")
+        for results in ([build_result(long_label, 0.1)], [build_result("Mine", 0.1, is_bundled=True)])
+    ]
+    assert [f"{long_label}*" in page for page in pages] == [True, False]
+    # In a plot, only the name is shortened.
+    (text,) = set(re.findall(r">(Atlas, shared maps[^<]*)</text>", pages[0]))
+    assert text.endswith("…*")
+    assert ["from a file, which may contain anything" in page for page in pages] == [True, False]
+
+
+@pytest.mark.usefixtures("short_ideal_track", "without_plots")
+def test_equal_scores_have_the_same_rank() -> None:
+    results = [build_result(label, gap) for label, gap in (("a", 0.2), ("b", 0.2), ("c", 0.1), ("d", 0.4))]
+    overview = build_tables([*results, build_bundled_rapf()]).overview
+    ranks = {row[0]: row[2] for row in overview}
+    assert ranks == {"c*": "1", "a*": "2", "b*": "2", "RAPF": "4", "d*": "5"}
 
 
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")
@@ -775,7 +830,7 @@ def test_the_page_fits_narrow_and_wide_windows(
         assert len(browser.find_all("svg.plot")) == 3
     assert browser.find("h1").text == "A <test> of names"
     labels = [cell.text for cell in browser.find_all("#ideal tbody th")][:3]
-    assert labels == ["RAPF", "LLOYD", "ATLAS"]
+    assert labels == ["RAPF*", "LLOYD*", "ATLAS*"]
     assert [cell.text for cell in browser.find_all("#overview-core tbody th")] == labels
     gaps = [
         float(cell.text.split()[0])

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from robocov_app.benchmark import suite
-from robocov_app.benchmark.ratings import Rating
-from robocov_app.benchmark.results import ENTRIES, read_result
+from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.ratings import Rating, build_ratings
+from robocov_app.benchmark.results import ENTRIES, load_bundled_results, read_result
 from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_AT_REST
 
 PAGE = Path(__file__).parents[3] / "app/handbook/controllers.md"
@@ -112,6 +113,35 @@ def test_the_goals_in_the_handbook_are_the_thresholds_of_the_study() -> None:
     assert expected["median gap, six robots, 71 maps, 60 s"] == f"{100 * MAX_GAP:g}%"
     assert f"median above {100 * MAX_MAP_GAP:g}% on no map" in expected
     assert expected["settled after 60 s"] == f"{100 * MIN_AT_REST:g}%"
+
+
+def test_the_effect_of_the_factors_of_the_score_agrees_with_the_entries(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    results = [result for result in load_bundled_results() if result["entry"]["information"] != "whole map"]
+    names = [result["entry"]["controller"] for result in results]
+    core = [track for track in suite.TRACKS if suite.TRACKS[track].ranking == "core"]
+    by_track = build_ratings(results)
+    ranks: dict[str, list[int]] = {name: [] for name in names}
+    for contact_factor, motion_factor in product((0.25, 0.5, 0.75, 1.0), repeat=2):
+        monkeypatch.setattr(ratings, "CONTACT_FACTOR", contact_factor)
+        monkeypatch.setattr(ratings, "MOTION_FACTOR", motion_factor)
+        # On core tracks, the ratings are in the order of the results.
+        scores = np.mean([[rating.score for rating in by_track[track]] for track in core], axis=0)
+        for rank, k in enumerate(np.argsort(-scores), start=1):
+            ranks[names[k]].append(rank)
+    assert set(ranks["atlas-shared"]) == {1}
+    text = " ".join((PAGE.parent / "benchmark.md").read_text(encoding="utf-8").split())
+    best, worst = min(ranks["atlas"]), max(ranks["atlas"])
+    assert f"always `atlas-shared`, but the rank of `atlas` among them varies from {best} to {worst}" in text
+    best, worst = min(ranks["learned"]), max(ranks["learned"])
+    assert f"that of `learned`, whose robots never settle, from {best} to {worst}" in text
+    oracle_rows = read_result(ENTRIES / "oracle.json.gz")["rows"]
+    contacts = {
+        track: sum(row["contacts"] > 0 for row in oracle_rows if row["track"] == track)
+        for track in ("lossy", "noisy")
+    }
+    assert f"in {contacts['lossy']} of 30 runs on Lossy and in {contacts['noisy']} on Noisy" in text
 
 
 FAILURES_PAGE = Path(__file__).parents[3] / "app/handbook/where-controllers-fail.md"
