@@ -18,14 +18,14 @@ class Doubling:
     def __init__(self) -> None:
         self.received = []
 
-    def __call__(self, questions, channel):
-        self.received += questions
-        match questions[-1]:
+    def __call__(self, requests, channel):
+        self.received += requests
+        match requests[-1]:
             case "slow":
                 for step in range(1, SLOW_STEPS):
                     channel.report_progress(step)
                     time.sleep(SLOW_STEP_S)
-                    if channel.get_newer_questions():
+                    if channel.get_newer_requests():
                         raise InputError("there is a newer one")
             case "sleep":
                 time.sleep(SLEEP_S)

@@ -83,9 +83,9 @@ class RefereeService:
 
     failure_message = "the verification failed"
 
-    def __call__(self, questions: list[RepeatedRun], channel: Channel) -> RunCheck:
-        """Repeat a run while other processes execute its controller. There is only one question."""
-        (run,) = questions
+    def __call__(self, requests: list[RepeatedRun], channel: Channel) -> RunCheck:
+        """Repeat a run while other processes execute its controller. There is only one request."""
+        (run,) = requests
         with ExitStack() as stack:
             team_process = _start_controller_process(run, stack)
             robot_processes = {robot: _start_controller_process(run, stack) for robot in run.robots}

@@ -167,14 +167,14 @@ class LowerBoundService:
 
     failure_message = "the bound failed"
 
-    def __call__(self, questions: list[tuple[dict[str, Any], list[list[float]]]], channel: Channel) -> float:
+    def __call__(self, requests: list[tuple[dict[str, Any], list[list[float]]]], channel: Channel) -> float:
         """Return a lower bound for the mean distance of all placements, m, which may take minutes.
 
-        The last question contains the map as JSON, and the positions of the best known placement.
+        The last request contains the map as JSON, and the positions of the best known placement.
         """
         from robocov.lower_bound import compute_lower_bound
 
-        document, positions = questions[-1]
+        document, positions = requests[-1]
         bound = compute_lower_bound(
             from_json(document),
             np.array(positions),

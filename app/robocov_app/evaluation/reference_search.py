@@ -84,11 +84,11 @@ class ReferenceSearch:
 
     failure_message = "the search failed"
 
-    def __call__(self, questions: list[ReferenceQuery], channel: Channel) -> ReferencePlacement:
-        """Return the best placement for the last query."""
+    def __call__(self, requests: list[ReferenceQuery], channel: Channel) -> ReferencePlacement:
+        """Find the best placement for the last request."""
         from robocov.optimum import find_optimum
 
-        query = questions[-1]
+        query = requests[-1]
         best = find_optimum(
             from_json(dict(query.document)),
             query.robots,

@@ -14,7 +14,7 @@ READY = "ready"
 
 
 class Service(Protocol):
-    """Interface of a service: a callable that answers questions.
+    """Interface of a service: a callable that answers requests.
 
     Attributes
     ----------
@@ -24,28 +24,28 @@ class Service(Protocol):
 
     failure_message: str
 
-    def __call__(self, questions: list[Any], channel: Channel) -> object:
-        """Answer the newest question.
+    def __call__(self, requests: list[Any], channel: Channel) -> object:
+        """Answer the newest request.
 
         Parameters
         ----------
-        questions : list
-            All questions since the last answer, at least one. Only the last one needs an answer.
+        requests : list
+            All requests since the last answer, at least one. Only the last one needs an answer.
         channel : Channel
-            Channel for newer questions and for progress.
+            Channel for newer requests and for progress.
         """
 
 
 class Codec:
-    """Converts questions before they are sent, and answers after they are received.
+    """Converts requests before they are sent, and answers after they are received.
 
-    This base class leaves them unchanged. Each process has its own codec. Questions are converted in one
+    This base class leaves them unchanged. Each process has its own codec. Requests are converted in one
     thread and answers in another, each in order.
     """
 
-    def encode(self, question: Any) -> object:
-        """Convert a question to the object that is sent."""
-        return question
+    def encode(self, request: Any) -> object:
+        """Convert a request to the object that is sent."""
+        return request
 
     def decode(self, answer: Any) -> Any:
         """Convert a received object to the answer."""
@@ -53,24 +53,24 @@ class Codec:
 
 
 class Channel:
-    """Connection of a working service to its program: it receives newer questions and sends progress."""
+    """Connection of a working service to its program: it receives newer requests and sends progress."""
 
-    def get_newer_questions(self) -> list[Any]:
-        """Return the questions that have arrived since the service started to work."""
+    def get_newer_requests(self) -> list[Any]:
+        """Return the requests that have arrived since the service started to work."""
         return []
 
     def report_progress(self, progress: object) -> None:
-        """Report the progress of the current question."""
+        """Report the progress of the current request."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reply:
-    """The reply to a question.
+    """The reply to a request.
 
     Attributes
     ----------
     number : int
-        Number of the question.
+        Number of the request.
     answer : object
         The answer, or None if there is none.
     problem : str
@@ -84,12 +84,12 @@ class Reply:
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Progress of the answer to a question, sent before the reply.
+    """Progress of the answer to a request, sent before the reply.
 
     Attributes
     ----------
     number : int
-        Number of the question.
+        Number of the request.
     value : object
         The progress, as reported by the service.
     """
@@ -98,26 +98,26 @@ class Progress:
     value: Any
 
 
-def answer_questions(service: Service, questions: list[tuple[int, Any]], channel: Channel) -> Reply:
+def answer_requests(service: Service, requests: list[tuple[int, Any]], channel: Channel) -> Reply:
     """Ask a service for its answer, and turn errors into replies.
 
     Parameters
     ----------
     service : Service
         The service.
-    questions : list of (int, object)
-        Numbered questions, oldest first.
+    requests : list of (int, object)
+        Numbered requests, oldest first.
     channel : Channel
-        Channel of the service for newer questions and for progress.
+        Channel of the service for newer requests and for progress.
 
     Returns
     -------
     Reply
-        Reply to the newest question. An error becomes its `problem`, so that it does not crash the window.
+        Reply to the newest request. An error becomes its `problem`, so that it does not crash the window.
     """
-    number = questions[-1][0]
+    number = requests[-1][0]
     try:
-        return Reply(number, service([question for _, question in questions], channel))
+        return Reply(number, service([request for _, request in requests], channel))
     except RobocovError as error:
         return Reply(number, None, str(error))
     except Exception as error:

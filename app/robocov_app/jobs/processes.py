@@ -83,15 +83,15 @@ def start_python(
     return process
 
 
-def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | None:
-    """Send a question to the process of a service, and wait for the reply.
+def ask_process(process: subprocess.Popen[bytes], request: object) -> Reply | None:
+    """Send a request to the process of a service, and wait for the reply.
 
     Parameters
     ----------
     process : subprocess.Popen
         Process that `start_process` returned.
-    question : object
-        The question, which must be picklable.
+    request : object
+        The request, which must be picklable.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def ask_process(process: subprocess.Popen[bytes], question: object) -> Reply | N
     assert process.stdin is not None
     assert process.stdout is not None
     with suppress(OSError):
-        send(process.stdin, (0, question))
+        send(process.stdin, (0, request))
     reply = receive(process.stdout)
     while reply == READY or isinstance(reply, Progress):
         reply = receive(process.stdout)

@@ -1,4 +1,4 @@
-"""Main loop of the process of a service, which answers questions until its program ends."""
+"""Main loop of the process of a service, which answers requests until its program ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import threading
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from robocov_app.jobs.messages import READY, Channel, Progress, answer_questions, receive, send
+from robocov_app.jobs.messages import READY, Channel, Progress, answer_requests, receive, send
 
 _STDIN = 0
 _STDOUT = 1
@@ -28,16 +28,16 @@ class _PipeChannel(Channel):
     def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
         self._source = source
         self._target = target
-        self._has_questions = threading.Condition()
-        self._questions: list[tuple[int, Any]] = []
+        self._has_requests = threading.Condition()
+        self._requests: list[tuple[int, Any]] = []
         self._number = 0
 
-    def get_newer_questions(self) -> list[Any]:
-        """Return the questions that have arrived since the service started to work."""
-        return [question for _, question in self._questions]
+    def get_newer_requests(self) -> list[Any]:
+        """Return the requests that have arrived since the service started to work."""
+        return [request for _, request in self._requests]
 
     def report_progress(self, progress: object) -> None:
-        """Send the progress of the current question."""
+        """Send the progress of the current request."""
         self.send(Progress(self._number, progress))
 
     def send(self, message: object) -> None:
@@ -47,28 +47,28 @@ class _PipeChannel(Channel):
         except OSError:
             os._exit(0)
 
-    def wait_for_questions(self) -> list[tuple[int, Any]]:
-        """Wait until there is a question, and return all new questions with their numbers."""
-        with self._has_questions:
-            self._has_questions.wait_for(lambda: self._questions)
-            questions = self._questions
-            self._questions = []
-        self._number = questions[-1][0]
-        return questions
+    def wait_for_requests(self) -> list[tuple[int, Any]]:
+        """Wait until there is a request, and return all new requests with their numbers."""
+        with self._has_requests:
+            self._has_requests.wait_for(lambda: self._requests)
+            requests = self._requests
+            self._requests = []
+        self._number = requests[-1][0]
+        return requests
 
     def listen(self) -> None:
-        """Collect incoming questions, and exit the process when the input ends; the target of a thread."""
+        """Collect incoming requests, and exit the process when the input ends; the target of a thread."""
         while True:
-            question = receive(self._source)
-            if question is None:
+            request = receive(self._source)
+            if request is None:
                 os._exit(0)
-            with self._has_questions:
-                self._questions.append(question)
-                self._has_questions.notify()
+            with self._has_requests:
+                self._requests.append(request)
+                self._has_requests.notify()
 
 
 def serve(service: str) -> None:
-    """Load a service, and answer questions until the standard input is closed.
+    """Load a service, and answer requests until the standard input is closed.
 
     The standard input is closed when the program ends, even if it crashes.
 
@@ -85,8 +85,8 @@ def serve(service: str) -> None:
     answering_service = getattr(importlib.import_module(module), name)()
     channel.send(READY)
     while True:
-        questions = channel.wait_for_questions()
-        channel.send(answer_questions(answering_service, questions, channel))
+        requests = channel.wait_for_requests()
+        channel.send(answer_requests(answering_service, requests, channel))
 
 
 def prepare_process() -> None:

@@ -1,4 +1,4 @@
-"""Background workers for a window that must not block. Only the newest question is answered."""
+"""Background workers for a window that must not block. Only the newest request is answered."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robocov_app.jobs.messages import (
     Progress,
     Reply,
     Service,
-    answer_questions,
+    answer_requests,
     receive,
     send,
 )
@@ -29,7 +29,7 @@ _Answer = TypeVar("_Answer")
 
 
 class LatestWorker(Generic[_Answer]):
-    """A service in a separate process. A question starts the process if it is not running.
+    """A service in a separate process. A request starts the process if it is not running.
 
     Parameters
     ----------
@@ -38,15 +38,15 @@ class LatestWorker(Generic[_Answer]):
     work_description : str
         Work of the service as a verb phrase for messages, such as ``measures the map``.
     codec : type
-        Converts questions and answers; see `Codec`.
+        Converts requests and answers; see `Codec`.
     patience : float, s
-        If a new question arrives after an older one has been unanswered for longer than this, the process is
+        If a new request arrives after an older one has been unanswered for longer than this, the process is
         restarted.
 
     Attributes
     ----------
     problem : str
-        Reason why there is no answer to the last question; empty if there is one.
+        Reason why there is no answer to the last request; empty if there is one.
     process : subprocess.Popen or None
         Process of the service. One thread writes to it, and another one reads from it.
     """
@@ -67,8 +67,8 @@ class LatestWorker(Generic[_Answer]):
         self._is_ready = False
         self._progress: Progress | None = None
         self._replies: deque[Reply] = deque(maxlen=1)
-        self._questions: deque[tuple[int, object]] = deque(maxlen=1)
-        self._has_question = threading.Event()
+        self._requests: deque[tuple[int, object]] = deque(maxlen=1)
+        self._has_request = threading.Event()
         self._threads: list[threading.Thread] = []
 
     @property
@@ -78,40 +78,40 @@ class LatestWorker(Generic[_Answer]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether the newest question has no answer yet."""
+        """Whether the newest request has no answer yet."""
         return self._answered_number < self._number
 
     @property
     def progress(self) -> Any:
-        """Latest progress that the service reported for the newest question; None if there is none yet."""
+        """Latest progress that the service reported for the newest request; None if there is none yet."""
         latest = self._progress
         if latest is None or latest.number != self._number:
             return None
         return latest.value
 
-    def put(self, question: object) -> None:
-        """Ask a question without waiting for the answer. Older questions that were not sent yet are dropped.
+    def put(self, request: object) -> None:
+        """Send a request without waiting for the answer. Older requests that were not sent yet are dropped.
 
         Parameters
         ----------
-        question : object
-            The question, in the form that the codec expects.
+        request : object
+            The request, in the form that the codec expects.
         """
         try:
             self._restart_if_needed()
         except OSError as error:
-            # The system is out of memory or processes. The next question tries again.
+            # The system is out of memory or processes. The next request tries again.
             self._number += 1
             self._answered_number = self._number
             reason = error.strerror or error
             self.problem = f"the process that {self._work_description} cannot be started: {reason}"
             return
         self._number += 1
-        self._questions.append((self._number, question))
-        self._has_question.set()
+        self._requests.append((self._number, request))
+        self._has_request.set()
 
     def _restart_if_needed(self) -> None:
-        """Restart the process if it has ended, or has worked on a question for longer than the patience."""
+        """Restart the process if it has ended, or has worked on a request for longer than the patience."""
         now = time.monotonic()
         if not self.is_busy:
             self._waiting_since = now
@@ -121,7 +121,7 @@ class LatestWorker(Generic[_Answer]):
             self._start()
 
     def _start(self) -> None:
-        """Start the process, and the two threads that write questions to it and read its replies."""
+        """Start the process, and the two threads that write requests to it and read its replies."""
         process = start_process(self._service)
         # A new codec, because it may remember the data that the previous process has received.
         codec = self._codec()
@@ -141,7 +141,7 @@ class LatestWorker(Generic[_Answer]):
         Returns
         -------
         object or None
-            None if no answer has arrived. While `is_busy`, the answer belongs to an older question.
+            None if no answer has arrived. While `is_busy`, the answer belongs to an older request.
         """
         if self.process is None:
             return None
@@ -175,33 +175,33 @@ class LatestWorker(Generic[_Answer]):
         return description
 
     def close(self) -> None:
-        """End the process and its threads, and drop questions and answers."""
+        """End the process and its threads, and drop requests and answers."""
         if self.process is None:
             return
         process = self.process
         # Wakes the writing thread, which ends because the process no longer belongs to the worker.
         self.process = None
-        self._has_question.set()
+        self._has_request.set()
         process.kill()
         process.wait()
         for thread in self._threads:
             thread.join()
-        self._questions.clear()
+        self._requests.clear()
         self._replies.clear()
 
     def _write(self, process: subprocess.Popen[bytes], codec: Codec) -> None:
-        """Send the newest question whenever there is one; the target of the writing thread."""
+        """Send the newest request whenever there is one; the target of the writing thread."""
         assert process.stdin is not None
         try:
             # If the process has ended, the reading thread notices it.
             with suppress(OSError), process.stdin as stream:
-                while self._has_question.wait() and self.process is process:
-                    self._has_question.clear()
-                    if self._questions:
-                        number, question = self._questions.pop()
-                        send(stream, (number, codec.encode(question)))
+                while self._has_request.wait() and self.process is process:
+                    self._has_request.clear()
+                    if self._requests:
+                        number, request = self._requests.pop()
+                        send(stream, (number, codec.encode(request)))
         except Exception:
-            # A question that cannot be sent gets no answer, so the window must not wait for one.
+            # A request that cannot be sent gets no answer, so the window must not wait for one.
             traceback.print_exc()
             if self.process is process:
                 self._has_ended = True
@@ -235,12 +235,12 @@ class DirectWorker(Generic[_Answer]):
     service : Service
         The service.
     codec : Codec or None
-        Converts questions and answers; see `Codec`.
+        Converts requests and answers; see `Codec`.
 
     Attributes
     ----------
     problem : str
-        Reason why there is no answer to the last question; empty if there is one.
+        Reason why there is no answer to the last request; empty if there is one.
     """
 
     is_busy = False
@@ -253,14 +253,14 @@ class DirectWorker(Generic[_Answer]):
         self._codec = codec or Codec()
         self._answer: Any = None
 
-    def put(self, question: object) -> None:
-        """Ask a question, and wait for the answer."""
-        reply = answer_questions(self._service, [(0, self._codec.encode(question))], Channel())
+    def put(self, request: object) -> None:
+        """Answer a request before returning."""
+        reply = answer_requests(self._service, [(0, self._codec.encode(request))], Channel())
         self.problem = reply.problem
         self._answer = reply.answer
 
     def poll(self) -> _Answer | None:
-        """Return the answer to the last question, or None if there is none or it was returned before."""
+        """Return the answer to the last request, or None if there is none or it was returned before."""
         encoded = self._answer
         self._answer = None
         if encoded is None:

@@ -167,9 +167,9 @@ class TaskService:
 
     failure_message = "the run failed"
 
-    def __call__(self, questions: list[Task], channel: Channel) -> Outcome:
-        """Execute the task. A `LocalPool` sends one at a time, so there is only one question."""
-        (task,) = questions
+    def __call__(self, requests: list[Task], channel: Channel) -> Outcome:
+        """Execute the task. A `LocalPool` sends one at a time, so there is only one request."""
+        (task,) = requests
         return perform(task)
 
 

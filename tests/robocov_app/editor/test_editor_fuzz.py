@@ -65,16 +65,16 @@ class RareMeasurer:
         self._asked = None
         self._count = 0
 
-    def put(self, question) -> None:
-        self._asked = question
+    def put(self, request) -> None:
+        self._asked = request
 
     def poll(self):
         self._count += 1
         if self._asked is None or self._count % 40:
             return None
-        question = self._asked
+        request = self._asked
         self._asked = None
-        return measure(*question)
+        return measure(*request)
 
     def close(self) -> None:
         pass

@@ -70,17 +70,17 @@ def test_changes_are_enough_to_rebuild_the_sketch(data):
     codec = MeasurementCodec()
     sketch = data.draw(valid_sketches(min_size=1))
     known = {}
-    questions = []
+    requests = []
     for _ in range(4):
-        questions.append(codec.encode((sketch, 0.2)))
-        assert [item.key for item in questions[-1][0].obstacles] == [
+        requests.append(codec.encode((sketch, 0.2)))
+        assert [item.key for item in requests[-1].sketch.obstacles] == [
             item.key for item in sketch.obstacles if known.get(item.key) is not item
         ]
         known = {item.key: item for item in sketch.obstacles}
         last = sketch
         change = data.draw(changes(sketch))
         sketch = sketch if change is None else change.sketch
-    measuring(questions[:2], Channel())
-    answer = measuring(questions[2:], Channel())
+    measuring(requests[:2], Channel())
+    answer = measuring(requests[2:], Channel())
     expected = measure(last, 0.2)
     assert (answer.vertices, answer.free_area) == (expected.vertices, expected.free_area)

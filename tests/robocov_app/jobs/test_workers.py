@@ -1,4 +1,4 @@
-"""Workers in processes: questions, progress, and processes that end or take too long."""
+"""Workers in processes: requests, progress, and processes that end or take too long."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def wait_for(condition):
     return result
 
 
-def ask(worker, question):
+def ask(worker, request):
     """Ask a worker, and return the answer; None if there is none."""
-    worker.put(question)
+    worker.put(request)
     answer = None
     while worker.is_busy:
         answer = worker.poll()
@@ -49,7 +49,7 @@ def worker():
         yield worker
 
 
-def test_questions_are_answered_by_one_process(worker):
+def test_requests_are_answered_by_one_process(worker):
     assert (worker.poll(), worker.is_busy, worker.is_alive) == (None, False, False)
     assert ask(worker, 4) == 8
     assert (worker.poll(), worker.is_alive, worker.problem) == (None, True, "")
@@ -68,7 +68,7 @@ def test_questions_are_answered_by_one_process(worker):
     assert ask(worker, "print") == pid
 
 
-def test_progress_and_newer_questions_are_passed_on(worker):
+def test_progress_and_newer_requests_are_passed_on(worker):
     assert ask(worker, 1) == 2
     worker.put("slow")
     assert wait_for(lambda: worker.progress) >= 1
@@ -86,7 +86,7 @@ def test_a_process_that_works_too_long_is_replaced():
         assert first.poll() is not None
         pid = ask(worker, "print")
         time.sleep(0.01)
-        assert ask(worker, "print") == pid, "the patience does not apply to answered questions"
+        assert ask(worker, "print") == pid, "the patience does not apply to answered requests"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
@@ -103,7 +103,7 @@ def test_a_process_that_dies_is_reported_and_replaced(worker):
 
 
 def test_no_call_of_a_worker_blocks(monkeypatch, worker):
-    """The loop of a window continues while the process reads no questions."""
+    """The loop of a window continues while the process reads no requests."""
     gate = threading.Event()
     was_opened = []
 
@@ -125,9 +125,9 @@ def test_each_process_has_its_own_codec():
         def __init__(self):
             self.encoded = 0
 
-        def encode(self, question):
+        def encode(self, request):
             self.encoded += 1
-            return self.encoded * question
+            return self.encoded * request
 
         def decode(self, answer):
             return -answer
@@ -161,7 +161,7 @@ def test_a_worker_may_be_closed_twice_or_without_a_process(worker):
     assert not worker.is_alive
 
 
-def test_questions_to_a_process_are_answered_one_by_one():
+def test_requests_to_a_process_are_answered_one_by_one():
     process = start_process(SERVICE)
     assert [ask_process(process, number).answer for number in (1, 2)] == [2, 4]
     assert ask_process(process, "bad").problem == "bad: it is"

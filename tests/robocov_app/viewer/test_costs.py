@@ -56,7 +56,7 @@ class StubWorker:
     """A worker that answers when a test calls `answer`."""
 
     def __init__(self) -> None:
-        self.questions = []
+        self.requests = []
         self.is_busy = False
         self.is_alive = True
         self.progress = None
@@ -64,11 +64,11 @@ class StubWorker:
         self._service = DirectWorker(CostService(), module._CostCodec())
         self._answer = None
 
-    def put(self, question) -> None:
-        self.questions.append(question)
+    def put(self, request) -> None:
+        self.requests.append(request)
         self.is_busy = True
         self.progress = None
-        self._service.put(question)
+        self._service.put(request)
 
     def answer(self) -> None:
         self._answer = self._service.poll()
@@ -137,7 +137,7 @@ def test_answers_equal_the_coverage_cost():
     costs.close()
 
 
-def test_only_the_newest_question_of_a_pane_is_answered():
+def test_only_the_newest_request_of_a_pane_is_answered():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
     for when in (1.0, 2.0, 3.0):
@@ -145,7 +145,7 @@ def test_only_the_newest_question_of_a_pane_is_answered():
     assert [known.time for _, known in costs.poll()] == [3.0]
 
 
-def test_positions_are_copied_when_a_question_is_asked():
+def test_positions_are_copied_when_a_request_is_sent():
     costs = Costs(32, direct=True)
     positions = POSITIONS.copy()
     costs.set_environment(HALL)
@@ -155,7 +155,7 @@ def test_positions_are_copied_when_a_question_is_asked():
     np.testing.assert_array_equal(known.result.positions, POSITIONS)
 
 
-def test_impossible_questions_have_no_answer():
+def test_impossible_requests_have_no_answer():
     costs = Costs(32, direct=True)
     costs.set_environment(HALL)
     costs.request(0, 1.0, INSIDE)
@@ -164,7 +164,7 @@ def test_impossible_questions_have_no_answer():
     assert costs.state == ""
 
 
-def test_a_new_map_replaces_earlier_questions():
+def test_a_new_map_replaces_earlier_requests():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
     costs.request(0, 1.0, POSITIONS)
@@ -172,7 +172,7 @@ def test_a_new_map_replaces_earlier_questions():
     costs.request(0, 2.0, POSITIONS)
     costs.set_environment(replace(HALL, obstacles=()))
     assert costs.known == {}
-    assert costs.poll() == [], "the question was about the previous map"
+    assert costs.poll() == [], "the request was about the previous map"
     costs.request(0, 2.0, INSIDE)
     assert len(costs.poll()) == 1
     costs = Costs(1, direct=True)
@@ -184,7 +184,7 @@ def test_a_new_map_replaces_earlier_questions():
     assert costs.state == ""
 
 
-def test_forget_drops_costs_and_questions():
+def test_forget_drops_costs_and_requests():
     costs = Costs(16, direct=True)
     costs.set_environment(HALL)
     costs.request(0, 1.0, POSITIONS)
@@ -237,10 +237,10 @@ def test_travel_time_of_robots_with_speeds():
     assert timed.result.mean_distance == without.result.mean_distance
 
 
-# order of the questions
+# order of the requests
 
 
-def test_questions_wait_until_the_map_is_prepared(stubbed):
+def test_requests_wait_until_the_map_is_prepared(stubbed):
     costs, worker = stubbed
     costs.request(0, 1.0, POSITIONS)
     assert costs.poll() == []
@@ -251,11 +251,11 @@ def test_questions_wait_until_the_map_is_prepared(stubbed):
     worker.progress = 0.5, 0.3
     costs.poll()
     assert costs.state == "cost: preparing the map, 50%"
-    assert [question.positions for question in worker.questions] == [None]
+    assert [request.positions for request in worker.requests] == [None]
     worker.answer()
     costs.poll()
     assert costs.state == ""
-    assert [question.time for question in worker.questions[1:]] == [1.0]
+    assert [request.time for request in worker.requests[1:]] == [1.0]
 
 
 def test_panes_take_turns(ready):
@@ -267,20 +267,20 @@ def test_panes_take_turns(ready):
         worker.answer()
         turns += [pane for pane, _ in costs.poll()]
     assert {turns.count(pane) for pane in range(3)} <= {13, 14}
-    # Each answer belongs to a recent question.
+    # Each answer belongs to a recent request.
     assert min(known.time for known in costs.known.values()) >= 36.0
 
 
-def test_one_question_is_sent_at_a_time(ready):
+def test_one_request_is_sent_at_a_time(ready):
     costs, worker = ready
     for pane in range(3):
         costs.request(pane, 1.0, POSITIONS)
     for _ in range(3):
         assert costs.poll() == []
-    assert len(worker.questions) == 2  # with the map
+    assert len(worker.requests) == 2  # with the map
 
 
-def test_answers_to_forgotten_questions_are_ignored(ready):
+def test_answers_to_forgotten_requests_are_ignored(ready):
     costs, worker = ready
     costs.request(0, 7.0, POSITIONS)
     costs.poll()
@@ -299,7 +299,7 @@ def test_answers_about_an_earlier_map_are_ignored(ready):
     costs.poll()
     costs.set_environment(replace(HALL, obstacles=()))
     costs.request(2, 8.0, INSIDE)
-    worker._answer = module.KnownCost(7.0, None, None, None)  # while the newest question has no answer
+    worker._answer = module.KnownCost(7.0, None, None, None)  # while the newest request has no answer
     assert costs.poll() == []
     assert costs.known == {}
     for _ in range(2):
@@ -308,7 +308,7 @@ def test_answers_about_an_earlier_map_are_ignored(ready):
     assert [(pane, known.time) for pane, known in answers] == [(2, 8.0)]
 
 
-def test_a_robot_in_an_obstacle_does_not_block_other_questions(ready):
+def test_a_robot_in_an_obstacle_does_not_block_other_requests(ready):
     costs, worker = ready
     costs.request(0, 1.0, INSIDE)
     costs.request(1, 1.0, POSITIONS)
@@ -328,14 +328,14 @@ def test_a_process_that_ends_repeatedly_is_reported(ready):
     worker.die()
     costs.poll()
     assert costs.state == "cost: preparing the map"
-    assert worker.questions[-1].positions is None
-    count = len(worker.questions)
+    assert worker.requests[-1].positions is None
+    count = len(worker.requests)
     worker.die()
     for _ in range(3):
         costs.request(0, 2.0, POSITIONS)
         costs.poll()
     assert costs.state == "no cost: it has ended"
-    assert len(worker.questions) == count
+    assert len(worker.requests) == count
 
 
 # in another process

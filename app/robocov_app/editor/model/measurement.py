@@ -1,7 +1,7 @@
 """Measurements of a sketch: its free area and components, narrowest gap, and impassable areas."""
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -228,8 +228,22 @@ def _list_polygons(geometry: shapely.Geometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
 
 
-Question: TypeAlias = tuple[Sketch, tuple[int, ...], float]
-"""A sketch with only new or changed obstacles, the keys of all its obstacles in order, and a radius, m."""
+class MeasurementRequest(NamedTuple):
+    """Request to measure a sketch, without the obstacles that the service has already received.
+
+    Attributes
+    ----------
+    sketch : Sketch
+        The sketch, with only its new or changed obstacles.
+    keys : tuple of int
+        Keys of all its obstacles, in order.
+    radius : float, m
+        Radius of the robots.
+    """
+
+    sketch: Sketch
+    keys: tuple[int, ...]
+    radius: float
 
 
 class MeasurementCodec(Codec):
@@ -238,12 +252,12 @@ class MeasurementCodec(Codec):
     def __init__(self) -> None:
         self._known: dict[int, Item] = {}
 
-    def encode(self, question: tuple[Sketch, float]) -> Question:
-        """Return a question with the obstacles that the process has not received yet; they count as sent."""
-        sketch, radius = question
+    def encode(self, request: tuple[Sketch, float]) -> MeasurementRequest:
+        """Return a request with the obstacles that the process has not received yet; they count as sent."""
+        sketch, radius = request
         changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
         self._known = {item.key: item for item in sketch.obstacles}
-        return replace(sketch, obstacles=changed), tuple(self._known), radius
+        return MeasurementRequest(replace(sketch, obstacles=changed), tuple(self._known), radius)
 
 
 class SketchMeasurer:
@@ -254,16 +268,17 @@ class SketchMeasurer:
     def __init__(self) -> None:
         self._known: dict[int, Item] = {}
 
-    def __call__(self, questions: list[Question], channel: Channel) -> Measurement:
-        """Apply the changes in all questions, and measure the last sketch."""
-        for sketch, order, _ in questions:
-            known = self._known | {item.key: item for item in sketch.obstacles}
-            self._known = {key: known[key] for key in order}
-        return measure(replace(sketch, obstacles=tuple(self._known.values())), questions[-1][2])
+    def __call__(self, requests: list[MeasurementRequest], channel: Channel) -> Measurement:
+        """Apply the changes in all requests, and measure the last sketch."""
+        for request in requests:
+            known = self._known | {item.key: item for item in request.sketch.obstacles}
+            self._known = {key: known[key] for key in request.keys}
+        newest = requests[-1]
+        return measure(replace(newest.sketch, obstacles=tuple(self._known.values())), newest.radius)
 
 
 def create_measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
-    """Create a worker that measures sketches. Its questions are tuples (sketch, radius in m).
+    """Create a worker that measures sketches. Its requests are tuples (sketch, radius in m).
 
     Parameters
     ----------

@@ -337,14 +337,14 @@ class CostService:
         self._sent_cost: CoverageCost | None = None  # the cost whose shared data were sent last
         self._varying_cost: TimeVaryingCost | None = None
 
-    def __call__(self, questions: list[CostRequest], channel: Channel) -> _Answer:
+    def __call__(self, requests: list[CostRequest], channel: Channel) -> _Answer:
         """Answer the last of several requests; the map may have come with an earlier one."""
-        maps = [request for request in questions if request.environment is not None]
+        maps = [request for request in requests if request.environment is not None]
         if maps:
             self._prepare(maps[-1], channel)
         cost = self._cost
         varying_cost = self._varying_cost
-        request = questions[-1]
+        request = requests[-1]
         if cost is None or varying_cost is None:
             raise InputError("the map has no cost")
         answer = _Answer(None)
@@ -365,7 +365,7 @@ class CostService:
         reported_at = started_at
 
         def stop_for_newer_map(fraction: float) -> None:
-            if any(newer.environment is not None for newer in channel.get_newer_questions()):
+            if any(newer.environment is not None for newer in channel.get_newer_requests()):
                 raise RobocovError("there is a newer map")
 
         def report_progress(fraction: float) -> None:

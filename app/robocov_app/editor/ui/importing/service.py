@@ -61,9 +61,9 @@ class ImportService:
         self._read: tuple[_ReadKey, ForeignMap] | None = None
         self._sheet: tuple[_ReadKey, ColorSheet | None] | None = None
 
-    def __call__(self, questions: list[ImportRequest], channel: Channel) -> Imported:
+    def __call__(self, requests: list[ImportRequest], channel: Channel) -> Imported:
         """Import the file of the newest request."""
-        newest = questions[-1]
+        newest = requests[-1]
         path, format_name, options, shaping = newest
         key = _ReadKey(path, format_name, options)
         foreign = self._read_map(key)
