@@ -232,7 +232,7 @@ def execute_tasks(
     open_executor : callable
         Returns the executor; only called if there is a task.
     progress : SweepProgress
-        Numbers of runs, which are updated.
+        Numbers of runs and start time, which are updated.
     interruption : Interruption
         Ends the execution early when it is requested.
     store : callable
@@ -248,6 +248,8 @@ def execute_tasks(
     if task is None or interruption.requested:
         return
     with open_executor() as executor:
+        # The survey of earlier runs and the compilation do not count as computing time of the runs.
+        progress.start_time = time.perf_counter()
         while (task is not None or executor.unfinished_tasks) and not interruption.requested:
             while task is not None and executor.unfinished_tasks < executor.capacity:
                 executor.submit(task)

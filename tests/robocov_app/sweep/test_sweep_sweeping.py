@@ -23,10 +23,11 @@ from robocov_app.cli import main
 from robocov_app.sweep import sweeping
 from robocov_app.sweep.executor import Executor, Result
 from robocov_app.sweep.ledger import open_ledger
+from robocov_app.sweep.progress import SweepProgress
 from robocov_app.sweep.study.study import Study
-from robocov_app.sweep.sweeping import Totals, sweep
+from robocov_app.sweep.sweeping import Totals, execute_tasks, sweep
 from robocov_app.sweep.tasks import Task, generate_tasks
-from robocov_app.sweep.worker import list_result_versions, perform
+from robocov_app.sweep.worker import build_failure, list_result_versions, perform
 from robocov_app.terminal.interruption import Interruption
 
 HANG_LIMIT_S = 60.0
@@ -90,6 +91,29 @@ def undisturbed(study: Study, tmp_path_factory: pytest.TempPathFactory) -> list[
     folder = tmp_path_factory.mktemp("undisturbed")
     assert sweep(study, folder, workers=1, quiet=True) == Totals(18, 0, 0, False)
     return read_tables(folder)
+
+
+def test_the_rate_of_runs_excludes_the_time_before_the_first_one(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    monkeypatch.setattr(sweeping.time, "perf_counter", lambda: now)
+    progress = SweepProgress(2, start_time=now)
+    now += 60.0  # The folder is surveyed.
+
+    class InstantExecutor(StackExecutor):
+        def _wait_for_result(self, timeout: float) -> Result | None:
+            return self._stack.pop(), build_failure("not executed", "")
+
+    def open_executor() -> InstantExecutor:
+        nonlocal now
+        now += 30.0  # The kernels are compiled.
+        return InstantExecutor()
+
+    tasks = list(generate_tasks(study))[:2]
+    for _ in execute_tasks(tasks, open_executor, progress, Interruption(), lambda task, outcome: None):
+        now += 5.0
+    assert progress.rate == 2 / 10.0
 
 
 def read_rows(folder: Path) -> list[dict[str, str]]:
