@@ -106,8 +106,8 @@ def _run_subcommand(name: str, rest: list[str], *, may_supervise: bool) -> int:
 
     controllers = find_own_controllers(rest)
     if may_supervise and controllers and can_supervise():
-        status, complaint = supervise(controllers)
-        return _print_error(complaint, FAILED) if complaint else status
+        status, error_message = supervise(controllers)
+        return _print_error(error_message, FAILED) if error_message else status
     descriptor = prepare_supervision() if may_supervise else None
     streams = StandardStreams()
     try:
@@ -224,7 +224,7 @@ def _print_os_error(error: OSError) -> int:
     """Print the file and the reason of an error of the operating system, and return the exit status."""
     reason = error.strerror or error
     if error.filename is None:
-        return _print_error(f"the answer cannot be written: {reason}")
+        return _print_error(f"the output cannot be written: {reason}")
     return _print_error(f"{os.fsdecode(error.filename)}: cannot be used: {reason}")
 
 

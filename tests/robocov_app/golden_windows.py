@@ -23,8 +23,8 @@ def show_comparison(window) -> None:
 def inspect_robot(window) -> None:
     window.viewer.inspection.selected = 2
     window.panel.show_tab("robot")
-    window.do("layer:force_attraction")
-    window.do("layer:distances")
+    window.run_command("layer:force_attraction")
+    window.run_command("layer:distances")
     play_frames(window, 40)
 
 
@@ -32,18 +32,18 @@ def show_past(window) -> None:
     play_frames(window, 30)
     window.viewer.attempt(lambda: window.viewer.session.fail_robot(3))
     play_frames(window, 30)
-    window.do("back:second")
+    window.run_command("back:second")
     window.panel.show_tab("show")
     play_frames(window, 1)
 
 
 def show_help(window) -> None:
-    window.do("help")
+    window.run_command("help")
     play_frames(window, 1)
 
 
 def show_tour(window) -> None:
-    window.do("tour")
+    window.run_command("tour")
     play_frames(window, 40)
 
 

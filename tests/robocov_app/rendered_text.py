@@ -26,7 +26,7 @@ def find_text(frame, text, size, theme, color):
 
     Both the inked and the empty pixels of the text have to match.
     """
-    alpha = pygame.surfarray.array_alpha(render_text(text, size, color, True)).T.astype(float) / 255
+    alpha = pygame.surfarray.array_alpha(render_text(text, size, color, bold=True)).T.astype(float) / 255
     rows, columns = np.nonzero(alpha)
     alpha = alpha[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     height, width = alpha.shape

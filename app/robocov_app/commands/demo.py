@@ -314,7 +314,7 @@ def _start_lesson(window: ViewerWindow, options: Arguments) -> None:
     if options.lesson is not None:
         window.lesson.start(options.lesson)
     else:
-        window.do("tour")
+        window.run_command("tour")
 
 
 def _render(launcher: ViewerLauncher, options: Arguments) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import tyro
 
@@ -169,18 +169,26 @@ def save_branches(options: Arguments, interruption: Interruption) -> Iterator[di
             return
 
 
-def _select_branches(session: SavedSession, options: Arguments) -> list[tuple[Node, int, str]]:
-    """Return node, step and suffix of the folder name for each branch to simulate.
+class _BranchSelection(NamedTuple):
+    """A branch to simulate up to a step, and the suffix of the name of its result folder."""
+
+    node: Node
+    last_step: int
+    folder_suffix: str
+
+
+def _select_branches(session: SavedSession, options: Arguments) -> list[_BranchSelection]:
+    """Select the branches to simulate.
 
     By default, this is the branch of the session, up to the step at which it was saved.
     """
     document = session.document
     if options.branch is not None:
         branch = document.find_branch(options.branch)
-        return [(branch.node, branch.last_step, "")]
+        return [_BranchSelection(branch.node, branch.last_step, "")]
     if options.all_branches:
         return [
-            (branch.node, branch.last_step, f"-{number}")
+            _BranchSelection(branch.node, branch.last_step, f"-{number}")
             for number, branch in enumerate(document.list_branches(), start=1)
         ]
-    return [(session.head, session.step, "")]
+    return [_BranchSelection(session.head, session.step, "")]

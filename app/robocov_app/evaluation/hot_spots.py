@@ -5,7 +5,7 @@ from dataclasses import replace
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, UniformStart
 
-HOT_SPOTS = 2
+HOT_SPOT_COUNT = 2
 """Number of peaks on a map."""
 PEAK_WEIGHT = 20.0
 """Height of a peak above the floor, divided by the floor."""
@@ -33,7 +33,7 @@ def add_hot_spots(environment: Environment, seed: int) -> Environment:
         The map with the new density; everything else is unchanged.
     """
     start = replace(environment, starts={"uniform": UniformStart()}).start("uniform")
-    centers = start.sample(HOT_SPOTS, seed=seed, radius=_CLEARANCE_M).tolist()
+    centers = start.sample(HOT_SPOT_COUNT, seed=seed, radius=_CLEARANCE_M).tolist()
     peaks = []
     for x, y in centers:
         # Rounding makes the centers the same on every processor.

@@ -14,6 +14,12 @@ from robocov_app.look.theme import LIGHT, Theme, get_theme
 
 _MARGINS = CurveMargins(left=52, top=86, bottom=56, right=52)
 """Space around the curves on a page without maps; the title is above them."""
+_REFERENCE_SIZE_PX = (800, 450)
+"""Size of a page without maps on which texts have scale 1."""
+_MIN_SCALE = 0.8
+_MAX_SCALE = 6.0
+_TITLE_ROW_PX = 30
+"""Distance of the middle of the title from the upper edge at scale 1."""
 
 
 @plain_style()
@@ -70,8 +76,10 @@ def _check_curve(curve: TimeCurve) -> None:
 def _create_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
     """Create a page with only curves, whose texts can be larger than on pages with maps."""
     width, height = size
-    page = FigurePage(size, theme, float(np.clip(min(width / 800, height / 450), 0.8, 6.0)))
+    reference_width, reference_height = _REFERENCE_SIZE_PX
+    fitting_scale = min(width / reference_width, height / reference_height)
+    page = FigurePage(size, theme, float(np.clip(fitting_scale, _MIN_SCALE, _MAX_SCALE)))
     left = _MARGINS.left * page.scale
-    title_row = 30 * page.scale
+    title_row = _TITLE_ROW_PX * page.scale
     page.write(title, left, title_row, points=TITLE_SIZE_PT, bold=True, max_width=width - left - page.margin)
     return add_curve_axes(page, curves, _MARGINS)

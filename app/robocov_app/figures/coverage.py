@@ -260,7 +260,7 @@ def _build_handles(snapshots: Sequence[DistanceSnapshot], theme: Theme) -> list[
     )
     handles: list[Artist] = [robot_drawing.build_robot_handle(legend.ROBOT, theme.final, theme), border]
     legends = [
-        map_drawing.build_map_handles(snapshot.environment, theme, show_density=False)[1:]
+        map_drawing.build_map_handles(snapshot.environment, theme, show_boundary=False, show_density=False)
         for snapshot in snapshots
     ]
     for handle in legend.merge_legends(legends, map_drawing.get_label):

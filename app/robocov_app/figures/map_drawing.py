@@ -179,13 +179,14 @@ def get_label(handle: Artist) -> str:
     return str(handle.get_label())
 
 
-def build_map_handles(environment: Environment, theme: Theme, *, show_density: bool = True) -> list[Artist]:
-    """Build the legend entries for what `draw_map` draws; the first one is the boundary."""
-    handles: list[Artist] = [
-        Line2D(
-            [], [], color=to_plot_color(theme.boundary), linewidth=LINE_WIDTH_PT, label=legend.KNOWN_REGION
-        )
-    ]
+def build_map_handles(
+    environment: Environment, theme: Theme, *, show_boundary: bool = True, show_density: bool = True
+) -> list[Artist]:
+    """Build the legend entries for the elements that `draw_map` draws."""
+    handles: list[Artist] = []
+    if show_boundary:
+        color = to_plot_color(theme.boundary)
+        handles.append(Line2D([], [], color=color, linewidth=LINE_WIDTH_PT, label=legend.KNOWN_REGION))
     if not environment.blocked.is_empty:
         handles.append(Patch(label=legend.UNKNOWN_OBSTACLE, **_build_obstacle_style(theme)))
     if environment.has_moving_obstacles:
@@ -203,6 +204,6 @@ def build_map_handles(environment: Environment, theme: Theme, *, show_density: b
     density = describe_density(environment)
     if show_density and density:
         # A medium density, since the legend has a single color for the gradient.
-        color = mix(theme.background, theme.density, 0.7 * theme.density_strength)
-        handles.append(Patch(facecolor=to_plot_color(color), linewidth=0.0, label=density))
+        medium = mix(theme.background, theme.density, 0.7 * theme.density_strength)
+        handles.append(Patch(facecolor=to_plot_color(medium), linewidth=0.0, label=density))
     return handles

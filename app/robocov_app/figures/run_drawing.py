@@ -339,7 +339,7 @@ def _draw_goals(axes: Axes, record: Record, centroids: FloatArray, theme: Theme)
     size = fit_mark_size(goal_points[np.isfinite(distances)], _MIN_MARK_PT, max_size)
     is_away = distances > MIN_GOAL_DISTANCE * np.ptp(record.environment.boundary, axis=0).max()
     if is_away.any():
-        style = _build_goal_style(is_centroid, theme, size)
+        style = _build_goal_style(theme, size, is_centroid=is_centroid)
         axes.plot(*goals[is_away].T, zorder=_GOALS_ORDER, path_effects=_build_halo(theme), **style)
     centers = goal_points[is_away]
     return Discs(centers, np.full(len(centers), 0.5 * size))
@@ -458,7 +458,7 @@ def _build_start_style(color: Color, size: float) -> dict[str, Any]:
     }
 
 
-def _build_goal_style(is_centroid: bool, theme: Theme, size: float) -> dict[str, Any]:
+def _build_goal_style(theme: Theme, size: float, *, is_centroid: bool) -> dict[str, Any]:
     """Return the matplotlib properties of the mark of a goal or centroid, with a size in points."""
     if is_centroid:
         return {
@@ -514,13 +514,12 @@ def build_run_handles(
         handles.append(build_robot_handle(legend.FAILED_ROBOT, theme.failed_robot, theme))
     if has_goals(record):
         is_centroid = are_centroids(record.goals[-1][record.is_working[-1]], record.cells().centroids)
-        handles.append(Line2D([], [], **_build_goal_style(is_centroid, theme, _GOAL_PT)))
+        handles.append(Line2D([], [], **_build_goal_style(theme, _GOAL_PT, is_centroid=is_centroid)))
     if contacts is not None and len(contacts):
         handles.append(Line2D([], [], **_build_contact_style(theme)))
     cell_edge = to_plot_color(theme.cell_edge)
     handles.append(Line2D([], [], color=cell_edge, linewidth=0.9, label=legend.FINAL_VORONOI_CELL))
-    # The boundary needs no entry here.
-    return [*handles, *build_map_handles(record.environment, theme)[1:]]
+    return [*handles, *build_map_handles(record.environment, theme, show_boundary=False)]
 
 
 def select_drawn(handles: Iterable[Artist], axes: Iterable[Axes]) -> list[Artist]:

@@ -236,8 +236,8 @@ def name_color(color: Sequence[int]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*color)
 
 
-def count_colors(colors: Iterable[Color | None]) -> str:
-    """List the distinct colors and how often each occurs, the most frequent first; None is ignored."""
+def describe_color_counts(colors: Iterable[Color | None]) -> str:
+    """Describe how often each color occurs, the most frequent first: "#ff0000 (3), #000000 (1)"."""
     counts = Counter(name_color(color) for color in colors if color is not None)
     words = [f"{name} ({count})" for name, count in counts.most_common(_MAX_LISTED_COLORS)]
     unlisted = len(counts) - len(words)

@@ -363,5 +363,5 @@ def export_map(
     if environment.has_moving_obstacles:
         count = sum(shape.path is not None for shape in environment.obstacles)
         paths = format_count(count, "path")
-        dropped.append(f"the {paths} of obstacles, which stand where they are at time zero")
+        dropped.append(f"the {paths} of moving obstacles, which are written at their positions at time 0")
     return replace(report, dropped=tuple(dropped))

@@ -327,11 +327,11 @@ class Episode:
             The current cost, if it has been computed already.
         """
         self.trail.append(self.positions)
-        shares = self._share_cost_change(is_rewarded, coverage) / self.reference_distance
+        shares = self._share_cost_change(coverage, is_rewarded=is_rewarded) / self.reference_distance
         penalties = self.task.contact_penalty * contact_time
         return ActionOutcome(np.asarray(shares - penalties), contact_time)
 
-    def _share_cost_change(self, is_rewarded: bool, coverage: CoverageResult | None) -> FloatArray:
+    def _share_cost_change(self, coverage: CoverageResult | None, *, is_rewarded: bool) -> FloatArray:
         """Evaluate the cost, and split its change since the last reward among the robots, (n,) m.
 
         Robots must not be rewarded or punished because others join or fail. If that happens, the cost is

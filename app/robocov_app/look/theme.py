@@ -15,7 +15,7 @@ HEAT_LEVELS = 12
 _MUTED_FRACTION = 0.55
 """Fraction of the heat scale that grids of numbers use; on the rest, their text would be illegible."""
 _MIN_HUE_LUMINANCE = 0.16
-"""Luminance below which a hue can hardly be told from the background of the dark theme."""
+"""Luminance below which a hue can hardly be distinguished from the background of the dark theme."""
 
 
 @dataclass(frozen=True)
@@ -217,8 +217,8 @@ _HEAT = (
     ("3F60A2", "78ADB8"),
     ("2A3F78", "B8D3C8"),
 )
-# Paul Tol's "muted" scheme: nine hues that color-blind readers tell apart. The first six are also far apart
-# as tints of cells, where sand and olive would look alike, so large teams use these.
+# Paul Tol's "muted" scheme: nine hues that color-blind readers can distinguish. The first six are also far
+# apart as tints of cells, where sand and olive would look alike, so large teams use these.
 _MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
 
 _LIGHT_CODES = 0
@@ -250,9 +250,9 @@ def _lighten(hue: Color) -> Color:
 
 
 _HUES = [parse_hex_color(code) for code in _MUTED]
-# Found by a search: the least color difference between two of the first six cells, as seen by readers with
-# normal and with color-blind eyes, is as large as possible while obstacles stand out on every cell, and cells
-# on the background.
+# Found by a search: the smallest color difference between two of the first six cells, for readers with normal
+# and with color-deficient vision, is as large as possible, while obstacles stand out on every cell, and cells
+# stand out on the background.
 _LIGHT_TINTS = (0.42, 0.40, 0.23, 0.17, 0.36, 0.34, 0.42, 0.33, 0.33)
 _DARK_TINTS = (0.39, 0.30, 0.27, 0.47, 0.55, 0.16, 0.14, 0.39, 0.38)
 LIGHT = _build_theme(

@@ -296,7 +296,7 @@ class Canvas:
         ----------
         choices : sequence of Sprite
         centers : (n, 2) array, px
-            Rounded to a quarter of a pixel.
+            Rounded to a quarter of a pixel. Those that are nan are skipped.
         indices : (n,) int array, optional
             The sprite at each center, an index into `choices`; by default the first everywhere.
         """
@@ -363,18 +363,18 @@ class Canvas:
         """
         if size is None:
             size = self.theme.text
-        picture = render_text(text, self.scale_text_size(size), color or self.theme.ink, bold)
+        picture = render_text(text, self.scale_text_size(size), color or self.theme.ink, bold=bold)
         width, height = picture.get_size()
         x, y = position
         offset = {"left": 0.0, "middle": width / 2, "right": float(width)}[anchor]
         self.surface.blit(picture, (round(x - offset), round(y - height / 2)))
         return width
 
-    def measure_text(self, text: str, size: float | None = None, bold: bool = False) -> int:
+    def measure_text(self, text: str, size: float | None = None, *, bold: bool = False) -> int:
         """Return the width of a line of text, px; `size` is px at scale 1."""
         if size is None:
             size = self.theme.text
-        return measure_text(text, self.scale_text_size(size), bold)
+        return measure_text(text, self.scale_text_size(size), bold=bold)
 
 
 def _list_bar_ends(tip: FloatArray, along: FloatArray, half_bar: float) -> list[list[float]]:

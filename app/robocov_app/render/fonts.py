@@ -15,7 +15,7 @@ _CACHE_BYTES = 8_000_000
 
 
 @lru_cache(maxsize=2)
-def find_font_file(bold: bool = False) -> Path | None:
+def find_font_file(*, bold: bool = False) -> Path | None:
     """Return the path of the font in the installation of matplotlib; None if there is none.
 
     The package is only located, not imported, because importing it takes long.
@@ -32,22 +32,22 @@ def find_font_file(bold: bool = False) -> Path | None:
 
 
 @lru_cache(maxsize=64)
-def _open_font(size: int, bold: bool) -> pygame.font.Font:
-    return pygame.font.Font(find_font_file(bold), size)
+def _open_font(size: int, *, bold: bool) -> pygame.font.Font:
+    return pygame.font.Font(find_font_file(bold=bold), size)
 
 
-def _get_font(size: int, bold: bool) -> pygame.font.Font:
+def _get_font(size: int, *, bold: bool) -> pygame.font.Font:
     """Return the font of a size, px; open it again if pygame's font module was shut down since."""
     try:
-        _open_font(size, bold).get_height()
+        _open_font(size, bold=bold).get_height()
     except pygame.error:
         pygame.font.init()
         _open_font.cache_clear()
-    return _open_font(size, bold)
+    return _open_font(size, bold=bold)
 
 
 @cache_surfaces(_CACHE_BYTES)
-def render_text(text: str, size: int, color: Color, bold: bool = False) -> pygame.Surface:
+def render_text(text: str, size: int, color: Color, *, bold: bool = False) -> pygame.Surface:
     """Render one line of text on a transparent surface.
 
     Parameters
@@ -63,14 +63,14 @@ def render_text(text: str, size: int, color: Color, bold: bool = False) -> pygam
     pygame.Surface
         The surface is cached, so callers must not draw on it.
     """
-    return _get_font(size, bold).render(escape_controls(text, single_line=True), True, color)
+    return _get_font(size, bold=bold).render(escape_controls(text, single_line=True), True, color)
 
 
-def measure_text(text: str, size: int, bold: bool = False) -> int:
+def measure_text(text: str, size: int, *, bold: bool = False) -> int:
     """Return the width of one line of text of a size, px."""
-    return _get_font(size, bold).size(escape_controls(text, single_line=True))[0]
+    return _get_font(size, bold=bold).size(escape_controls(text, single_line=True))[0]
 
 
-def shorten_to_width(text: str, size: int, width: float, bold: bool = False) -> str:
+def shorten_to_width(text: str, size: int, width: float, *, bold: bool = False) -> str:
     """Shorten a text, which is written at a size in px, to a width in px; an ellipsis replaces its end."""
-    return shorten_text(text, lambda candidate: measure_text(candidate, size, bold), width)
+    return shorten_text(text, lambda candidate: measure_text(candidate, size, bold=bold), width)

@@ -250,7 +250,7 @@ def _render_disc(
     pygame.draw.circle(large, fill, center, (radius - ring_width) * supersampling)
     if text:
         size = choose_number_size(radius - ring_width, min(len(text), len(_DIGIT_SIZES)))
-        number = render_text(text, round(size * supersampling), choose_text_color(fill), True)
+        number = render_text(text, round(size * supersampling), choose_text_color(fill), bold=True)
         # Center the visible part of the digits; the font leaves space for ascenders and descenders.
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))

@@ -75,7 +75,7 @@ class ContenderSummary:
     medians: Mapping[str, float]
 
 
-class Duel(NamedTuple):
+class OwnComparison(NamedTuple):
     """Comparison of one of our controllers with a contender."""
 
     own_label: str
@@ -94,7 +94,7 @@ class ControllerEvidence:
         Summaries of its contenders, the best one first. Everything else is about the best one.
     medians_by_map : Mapping
         Median gap on each map.
-    duels : sequence of Duel
+    comparisons : sequence of OwnComparison
     failures : str
         Sentences on where it fails.
     tuning : str
@@ -104,7 +104,7 @@ class ControllerEvidence:
     profile: ControllerProfile
     summaries: Sequence[ContenderSummary]
     medians_by_map: Mapping[str, float]
-    duels: Sequence[Duel]
+    comparisons: Sequence[OwnComparison]
     failures: str
     tuning: str
 
@@ -205,7 +205,7 @@ def collect_evidence(
                 load_profile(name),
                 own_summaries,
                 medians_by_map=results.outcomes.compute_medians_by_map(best.contender.key),
-                duels=_list_duels(results, own_summaries),
+                comparisons=_list_own_comparisons(results, own_summaries),
                 failures=describe_failures(results.outcomes, best),
                 tuning=tuning,
             )
@@ -213,9 +213,11 @@ def collect_evidence(
     return evidence
 
 
-def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -> list[Duel]:
+def _list_own_comparisons(
+    results: BeyondResults, summaries: Sequence[ContenderSummary]
+) -> list[OwnComparison]:
     """List the comparisons of our own controllers with the contenders in the summaries."""
-    duels = []
+    comparisons = []
     for own in OWN:
         for summary in summaries:
             other = summary.contender
@@ -223,8 +225,8 @@ def _list_duels(results: BeyondResults, summaries: Sequence[ContenderSummary]) -
                 continue
             pairs = results.outcomes.compare(own.key, other.key)
             if pairs is not None:
-                duels.append(Duel(own.label, other.label, pairs))
-    return duels
+                comparisons.append(OwnComparison(own.label, other.label, pairs))
+    return comparisons
 
 
 def collect_degradations(

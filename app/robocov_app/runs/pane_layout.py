@@ -84,8 +84,10 @@ class PaneLayout(NamedTuple):
         header_height, header_width = self.header.shape[:2]
         page[:header_height, :header_width] = self.header
         body = tile_frames(panes, self.columns, PANE_GAP_PX, theme.grid, theme.background)
-        target = page[header_height:][: body.shape[0], : body.shape[1]]
-        target[:] = body[: target.shape[0], : target.shape[1]]
+        # A low page may have no space for all rows of the body.
+        body = body[: height - header_height, :width]
+        body_height, body_width = body.shape[:2]
+        page[header_height : header_height + body_height, :body_width] = body
         return page
 
 

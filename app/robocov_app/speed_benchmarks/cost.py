@@ -100,13 +100,13 @@ def list_cases(*, quick: bool = False) -> list[Case]:
     sizes = QUICK_SIZES
     if not quick:
         sizes = tuple((lattice, vertices) for vertices in VERTICES for lattice in LATTICES)
-    return [partial(_measure_size, lattice, vertices, quick) for lattice, vertices in sizes]
+    return [partial(_measure_size, lattice, vertices, quick=quick) for lattice, vertices in sizes]
 
 
 def list_map_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark cases of the cost on bundled maps; quick cases use the smallest lattice only."""
     sizes = sorted({(name, lattice) for name, lattice, _ in EARLIER_RATIOS if not quick or lattice == 64})
-    return [partial(_measure_map, name, lattice, quick) for name, lattice in sizes]
+    return [partial(_measure_map, name, lattice, quick=quick) for name, lattice in sizes]
 
 
 def has_baseline() -> bool:
@@ -166,7 +166,7 @@ class MovingRobots:
         self.positions = np.where(is_free[:, None], positions, self._start)
 
 
-def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
+def _measure_size(lattice: int, vertices: int, *, quick: bool) -> Iterator[Row]:
     """Measure how long the cost takes to build among random obstacles, and to evaluate for each team size."""
     environment = build_random_map(vertices)
     start = perf_counter()
@@ -181,7 +181,7 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
             continue
         moving = MovingRobots(cost, robots)
         baseline = _measure_by_marching if has_baseline() else None
-        times = _measure_costs(cost, moving, baseline, quick)
+        times = _measure_costs(cost, moving, baseline, quick=quick)
         row = Row("cost", "evaluated", size | {"robots": robots}, times["exact"])
         if baseline is not None:
             max_ratio = GOALS.get((lattice, vertices, robots))
@@ -189,13 +189,13 @@ def _measure_size(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
         yield row
 
 
-def _measure_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
+def _measure_map(name: str, lattice: int, *, quick: bool) -> Iterator[Row]:
     """Measure the cost on a bundled map for each team size in `EARLIER_RATIOS`, compared with a k-d tree."""
     cost = CoverageCost(load_map(name), lattice)
     for (map_name, map_lattice, robots), earlier_ratio in EARLIER_RATIOS.items():
         if (map_name, map_lattice) != (name, lattice):
             continue
-        times = _measure_costs(cost, MovingRobots(cost, robots), _measure_by_tree, quick)
+        times = _measure_costs(cost, MovingRobots(cost, robots), _measure_by_tree, quick=quick)
         speedup = SPEEDUPS[lattice]
         if name == "campus":
             speedup *= _CAMPUS_FACTOR
@@ -218,6 +218,7 @@ def _measure_costs(
     cost: CoverageCost,
     moving: MovingRobots,
     baseline: Callable[[CoverageCost, MovingRobots], object] | None,
+    *,
     quick: bool,
 ) -> dict[str, float]:
     """Return the median times, s, of the "exact" cost and, if given, of the "baseline" in alternation."""

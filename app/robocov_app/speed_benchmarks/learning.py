@@ -72,10 +72,10 @@ class PointMasses(gymnasium.Env[Any, Any]):
 
 def list_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark case of learning environments."""
-    return [partial(_measure_environments, quick)]
+    return [partial(_measure_environments, quick=quick)]
 
 
-def _measure_environments(quick: bool) -> Iterator[Row]:
+def _measure_environments(*, quick: bool) -> Iterator[Row]:
     """Measure a step of one environment, and of many environments together, compared with point masses."""
     options: dict[str, Any] = {"robots": ROBOTS, "lattice": LATTICE, "repeat": 1, "duration": 1e6}
     plain = PointMasses()

@@ -59,7 +59,7 @@ def list_cases(*, quick: bool = False) -> list[Case]:
 
 def list_start_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark case of command start-up."""
-    return [partial(_measure_starts, quick)]
+    return [partial(_measure_starts, quick=quick)]
 
 
 def _measure_sweep(seeds: int) -> Iterator[Row]:
@@ -96,7 +96,7 @@ def _get_processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def _measure_starts(quick: bool) -> Iterator[Row]:
+def _measure_starts(*, quick: bool) -> Iterator[Row]:
     """Measure the start-up time of each command."""
     run_silently = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
     commands = {BASELINE: ("-c", BASELINE), **COMMANDS}

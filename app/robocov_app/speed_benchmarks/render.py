@@ -45,11 +45,11 @@ _WHITE = (255, 255, 255)
 
 def list_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark cases of frames, and of videos and PNGs."""
-    frames = [partial(_measure_frames, name, robots, quick) for name, robots in _FRAME_CASES]
-    return [*frames, partial(_measure_encoding, quick)]
+    frames = [partial(_measure_frames, name, robots, quick=quick) for name, robots in _FRAME_CASES]
+    return [*frames, partial(_measure_encoding, quick=quick)]
 
 
-def _measure_frames(name: str, robots: int, quick: bool) -> Iterator[Row]:
+def _measure_frames(name: str, robots: int, *, quick: bool) -> Iterator[Row]:
     """Measure the drawing of the frames of a run, compared with clearing and copying a frame."""
     record = _simulate(name, robots)
     painter = Painter(record.environment, SIZE_PX)
@@ -75,7 +75,7 @@ def build_clearing_call(canvas: pygame.Surface | None) -> Call:
     return lambda: (empty.fill(_WHITE), canvas.blit(empty, (0, 0)))
 
 
-def _measure_encoding(quick: bool) -> Iterator[Row]:
+def _measure_encoding(*, quick: bool) -> Iterator[Row]:
     """Measure the encoding of the frames of a run as a video and as PNGs, compared with drawing them."""
     record = _simulate(_ENCODED_MAP, _ENCODED_ROBOTS)
     settings = VideoSettings(colors="robots")

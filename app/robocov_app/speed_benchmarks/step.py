@@ -63,10 +63,13 @@ _ROBOT_RADIUS_M = 0.1
 
 def list_cases(*, quick: bool = False) -> list[Case]:
     """Return the benchmark cases of single simulations of each team size, and of a batch."""
-    return [*(partial(_measure_step, robots, quick) for robots in GOALS), partial(_measure_batch, quick)]
+    return [
+        *(partial(_measure_step, robots, quick=quick) for robots in GOALS),
+        partial(_measure_batch, quick=quick),
+    ]
 
 
-def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
+def _measure_step(robots: int, *, quick: bool) -> Iterator[Row]:
     """Measure a step of one simulation, compared with each of the two baselines."""
     campus = load_map("campus")
     simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(robots, seed=0))
@@ -76,7 +79,7 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
         "space": partial(space.step, simulation.dt),
         "delaunay": lambda: Delaunay(simulation.positions),
     }
-    times = measure_interleaved(calls, _get_rounds(robots, quick))
+    times = measure_interleaved(calls, _get_rounds(robots, quick=quick))
     step = times["step"]
     goals = GOALS[robots]
     earlier_ratios = EARLIER_RATIOS[robots]
@@ -107,14 +110,14 @@ def _measure_step(robots: int, quick: bool) -> Iterator[Row]:
     )
 
 
-def _get_rounds(robots: int, quick: bool) -> int:
+def _get_rounds(robots: int, *, quick: bool) -> int:
     """Return the number of rounds for a team size; large teams have fewer rounds."""
     if robots > _LARGE_TEAM:
         return _QUICK_LARGE_TEAM_ROUNDS if quick else _FULL_LARGE_TEAM_ROUNDS
     return _QUICK_ROUNDS if quick else _FULL_ROUNDS
 
 
-def _measure_batch(quick: bool) -> Iterator[Row]:
+def _measure_batch(*, quick: bool) -> Iterator[Row]:
     """Measure a step of a batch of simulations, compared with the same number of bare physics steps."""
     campus = load_map("campus")
     starts = [campus.start("uniform").sample(BATCH_ROBOTS, seed=seed) for seed in range(BATCH_RUNS)]
@@ -127,7 +130,7 @@ def _measure_batch(quick: bool) -> Iterator[Row]:
             space.step(simulation.dt)
 
     calls: dict[str, Call] = {"step": simulation.step, "space": step_spaces}
-    times = measure_interleaved(calls, _get_rounds(BATCH_ROBOTS, quick))
+    times = measure_interleaved(calls, _get_rounds(BATCH_ROBOTS, quick=quick))
     yield Row(
         "step",
         "one step per run",

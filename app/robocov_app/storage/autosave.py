@@ -397,14 +397,20 @@ def is_open_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     for draft_folder in _list_folders(folder):
         with suppress(MapError, OSError):
             draft_path = read_draft(draft_folder, kind).path
-            if draft_path is not None and os.path.realpath(draft_path) == real_path:
-                # The folder is locked if, and only if, a program has the document open.
-                try:
-                    with lock_folder(draft_folder):
-                        pass
-                except OutputError:
-                    return True
+            is_same_file = draft_path is not None and os.path.realpath(draft_path) == real_path
+            # The folder is locked if, and only if, a program has the document open.
+            if is_same_file and _is_locked(draft_folder):
+                return True
     return False
+
+
+def _is_locked(folder: Path) -> bool:
+    """Return whether another running program has locked a draft folder."""
+    try:
+        with lock_folder(folder):
+            return False
+    except OutputError:
+        return True
 
 
 def read_draft(folder: Path, kind: str) -> Draft:

@@ -123,10 +123,10 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
         After the help has been printed.
     """
     words = merge_repeated_options(kind, words)
-    complaint = io.StringIO()
+    error_text = io.StringIO()
     help_text = HelpBuffer(sys.stdout)
     try:
-        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(help_text):
+        with contextlib.redirect_stderr(error_text), contextlib.redirect_stdout(help_text):
             return tyro.cli(
                 _arrange_help(kind),
                 prog=f"robocov {command}",
@@ -139,7 +139,7 @@ def parse_options(kind: type[T], command: str, words: list[str]) -> T:
             width = shutil.get_terminal_size().columns
             sys.stdout.write(insert_description(help_text.getvalue(), kind.__doc__ or "", width))
             raise
-        problem = _add_suggestion(summarize_complaint(complaint.getvalue()), kind, command)
+        problem = _add_suggestion(summarize_tyro_error(error_text.getvalue()), kind, command)
         raise InputError(f"{problem} (robocov {command} -h explains)") from None
 
 
@@ -324,8 +324,8 @@ def name_option(kind: Any, message: str) -> str:
     return f"--{option}{message[match.end() :]}"
 
 
-def summarize_complaint(text: str) -> str:
-    """Summarize tyro's complaint, which is printed in a box, in one line with its suggestion.
+def summarize_tyro_error(text: str) -> str:
+    """Summarize an error message of tyro, which is printed in a box, in one line with its suggestion.
 
     Parameters
     ----------

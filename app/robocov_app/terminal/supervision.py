@@ -74,7 +74,7 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
     -------
     status : int
         The exit status of the command; 1 if it did not end properly.
-    complaint : str
+    error_message : str
         Message that names the controllers; empty if the command ended properly, or if a signal to this
         process stopped it.
     """

@@ -104,7 +104,7 @@ def get_field_color(theme: Theme) -> Color:
     return mix(theme.panel, theme.background, _FIELD_STRENGTH)
 
 
-def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[str]:
+def wrap_text(text: str, size: int, width: float, *, bold: bool = False) -> list[str]:
     """Wrap text into lines of limited width.
 
     Parameters
@@ -122,12 +122,12 @@ def wrap_text(text: str, size: int, width: float, bold: bool = False) -> list[st
     """
     lines: list[str] = []
     for word in text.split():
-        if lines and measure_text(f"{lines[-1]} {word}", size, bold) <= width:
+        if lines and measure_text(f"{lines[-1]} {word}", size, bold=bold) <= width:
             lines[-1] += f" {word}"
             continue
         lines.append("")
         for character in word:
-            if lines[-1] and measure_text(lines[-1] + character, size, bold) > width:
+            if lines[-1] and measure_text(lines[-1] + character, size, bold=bold) > width:
                 lines.append("")
             lines[-1] += character
     return lines

@@ -85,11 +85,11 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     def run(window: ViewerWindow) -> None:
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
-            window.do("robot:next")
+            window.run_command("robot:next")
             for _ in range(10):
                 window.run_frame(1 / 30)
         for action in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
-            window.do(action)
+            window.run_command(action)
             window.run_frame(1 / 30)
         sessions.append(window.viewer.session)
         window.close()

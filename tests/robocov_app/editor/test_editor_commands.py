@@ -190,7 +190,7 @@ def test_tab_cycles_through_all_objects(driver: EditorDriver) -> None:
 
 def test_an_obstacle_becomes_the_boundary_and_back(driver: EditorDriver) -> None:
     driver.select(0)
-    driver.window.do("boundary:of")
+    driver.window.run_command("boundary:of")
     assert driver.sketch.boundary == LOW.vertices and len(driver.shapes) == 4
 
 

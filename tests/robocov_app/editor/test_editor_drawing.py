@@ -285,7 +285,7 @@ def test_a_map_is_levelled_along_a_measured_line(driver: EditorDriver) -> None:
     driver.press_key("m")
     driver.click_all((1, 1), (5, 2.5))
     driver.run_command("level")
-    assert driver.message == "Map turned by -20.56°"
+    assert driver.message == "Map rotated by -20.56°"
     (_, ay), (bx, by) = driver.shapes[0].points
     assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
     assert driver.editor.tool.build_overlay(driver.editor) == EditorToolOverlay()

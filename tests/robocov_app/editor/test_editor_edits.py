@@ -466,7 +466,7 @@ def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     assert transform.level_map(level, (2.0, 3.0), (5.0, 3.0)).sketch == level
     change = transform.level_map(tilted, *tilted.get_item(keys[0]).shape.points)
     after = change.sketch
-    assert change.description == "map turned by -7.00°"
+    assert change.description == "map rotated by -7.00°"
     (ax, ay), (bx, by) = after.get_item(keys[0]).shape.points
     assert (bx - ax, by - ay) == pytest.approx((3.0, 0.0), abs=3e-4)
     for was, now in zip(level.boundary, after.boundary, strict=True):
@@ -481,7 +481,7 @@ def test_a_tilted_scan_is_levelled_by_two_points_on_a_wall():
     areas = WeightedPolygons((WeightedArea(((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), 2.0),), 1.0)
     upright = transform.level_map(replace(level, density=areas), (0.0, 0.0), (-0.1, 1.0)).sketch
     assert upright.density.areas[0].vertices[0] == pytest.approx((1.0945, 0.8955), abs=2e-4)
-    with pytest.raises(MapError, match="cannot be turned"):
+    with pytest.raises(MapError, match="cannot be rotated"):
         transform.level_map(replace(level, density=Raster(np.eye(3), (0, 0, 9, 9))), (0.0, 0.0), (3.0, 1.0))
     with pytest.raises(MapError, match="two different points"):
         transform.level_map(level, (1.0, 1.0), (1.0, 1.0))

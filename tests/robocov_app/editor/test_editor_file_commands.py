@@ -189,7 +189,7 @@ def test_the_path_of_a_picture_is_relative_to_the_map(driver: EditorDriver, tmp_
     driver.type("no.png")
     driver.press_key("return")
     assert "not an image" in driver.read_dialog_error()
-    driver.window.do("background:none")
+    driver.window.run_command("background:none")
     assert driver.sketch.background is None
     driver.editor.apply(set_background(driver.sketch, Background("gone.png", (40, 30))))
     driver.window.draw()

@@ -120,7 +120,7 @@ def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:
     with open_editor(tmp_path, Sketch()) as driver:
         assert "no boundary" in driver.editor.problems[0].message or driver.editor.problems[0].is_error
         for tool in driver.editor.toolbox.by_name:
-            driver.window.do(f"tool:{tool}")
+            driver.window.run_command(f"tool:{tool}")
             driver.click_all((2, 2), (4, 2), (4, 4))
             driver.press_key("escape", times=3)
 

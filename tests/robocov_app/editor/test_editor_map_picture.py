@@ -38,7 +38,7 @@ def test_a_phone_shows_the_map_below_a_dialog(tmp_path: Path) -> None:
     with open_editor(tmp_path, build_sheet(CIRCLE)) as driver:
         pictures = driver.window.map_pictures
         before = pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=False), "RGB")
-        driver.window.do("palette")
+        driver.window.run_command("palette")
         driver.settle()
         assert driver.window.controls.is_covered
         assert pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=False), "RGB") == before

@@ -31,7 +31,7 @@ def test_only_dialogs_of_phones_do_not_mention_keys(
             scale=2.0, theme="light", shows_panel=False, is_compact=is_compact, is_motion_reduced=True
         )
         driver.window.set_appearance(appearance)
-        driver.window.do("recent")
+        driver.window.run_command("recent")
         driver.run_frames(2)
     counts = {label for label in labels if "in all" in label}
     assert len(counts) == 1

@@ -56,8 +56,8 @@ def test_inside_keeps_the_part_around_a_position() -> None:
     assert environment.boundary_polygon.equals(CLOSET)
     edge, note = report.notes
     assert edge == "the boundary is the inner edge of the walls around the free space"
-    assert note.startswith("only 3.3% of the free area stays: --inside ")
-    assert note.endswith("keeps another part, --keep all every part")
+    assert note.startswith("only 3.3% of the free area is kept: --inside ")
+    assert note.endswith("keeps another part, --keep all keeps every part")
     assert len(report.others) == 2
     for x, y in report.others:
         assert f"--inside {x:g} {y:g} (" in note
@@ -70,7 +70,7 @@ def test_inside_keeps_the_part_around_a_position() -> None:
 def test_a_large_omitted_part_is_noted() -> None:
     _, report = build_environment(build_foreign_map(CLOSET, ROOM), Shaping(), "plan")
     assert report.notes[0].startswith(
-        "89% of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
+        "89% of the free area is kept: --inside 21.5 1.5 (9 m²) keeps another part"
     )
     assert build_environment(build_foreign_map(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
     # A speck next to it, such as the inside of a letter, is not offered.

@@ -204,6 +204,6 @@ def test_a_map_around_a_pole_is_rejected(tmp_path: Path) -> None:
 
 def test_dropped_paths_of_obstacles_are_reported(tmp_path: Path) -> None:
     report = export_map(load_map("forklifts"), tmp_path / "forklifts.geojson")
-    assert "the 2 paths of obstacles, which stand where they are at time zero" in report.dropped
+    assert "the 2 paths of moving obstacles, which are written at their positions at time 0" in report.dropped
     without_paths = export_map(load_map("rooms"), tmp_path / "rooms.geojson")
     assert not any("path" in line for line in without_paths.dropped)

@@ -66,12 +66,12 @@ def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
     [
         ("0", []),
         ("-0.0", []),
-        ("1.5707963267948966", ["origin: turned by 90 degrees about the lower left corner"]),
-        ("-0.5", ["origin: turned by -28.65 degrees about the lower left corner"]),
+        ("1.5707963267948966", ["origin: rotated by 90 degrees about the lower left corner"]),
+        ("-0.5", ["origin: rotated by -28.65 degrees about the lower left corner"]),
         (
             "90",
             [
-                "origin: turned by 116.6 degrees about the lower left corner, as its yaw is 90 rad; "
+                "origin: rotated by 116.6 degrees about the lower left corner, as its yaw is 90 rad; "
                 "if it was meant in degrees, write 1.5708"
             ],
         ),

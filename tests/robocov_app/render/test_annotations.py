@@ -93,8 +93,8 @@ def test_a_narrow_status_omits_the_least_important_facts():
 @pytest.mark.parametrize("text", ["", "RAPF", "mean distance 1.234 m · Museum", "…"])
 @pytest.mark.parametrize("is_bold", [False, True])
 def test_measured_widths_are_those_of_rendered_texts(text, is_bold):
-    surface = render_text(text, 17, (0, 0, 0), is_bold)
-    assert measure_text(text, 17, is_bold) == surface.get_width()
+    surface = render_text(text, 17, (0, 0, 0), bold=is_bold)
+    assert measure_text(text, 17, bold=is_bold) == surface.get_width()
 
 
 @pytest.mark.parametrize(

@@ -224,7 +224,7 @@ def test_labels_can_be_rendered_after_the_font_module_was_restarted():
 
 @pytest.mark.parametrize("is_bold", [False, True])
 def test_font_files_exist(is_bold):
-    path = fonts.find_font_file(is_bold)
+    path = fonts.find_font_file(bold=is_bold)
     assert path is not None
     assert path.is_file()
 

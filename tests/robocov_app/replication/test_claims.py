@@ -497,7 +497,7 @@ def test_the_summary_counts_verdicts():
     holds = build_claim(0.5, 0.4, 0.6)
     fails = build_claim(2.0, 1.9, 2.1)
     undecided = build_claim(1.0, 0.9, 1.1)
-    assert summarize_verdicts([holds, holds, undecided]) == "Of 3 claims 2 hold, 1 is undecided."
+    assert summarize_verdicts([holds, holds, undecided]) == "Of 3 claims, 2 hold, 1 is undecided."
     assert summarize_verdicts([holds, fails, undecided, undecided]) == (
         "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
     )

@@ -12,7 +12,7 @@ from robocov_app.terminal.arguments import (
     name_option,
     parse_gains,
     parse_options,
-    summarize_complaint,
+    summarize_tyro_error,
 )
 
 
@@ -59,7 +59,7 @@ def test_a_wrong_word_gets_one_line_whatever_the_terminal(
 def test_a_box_in_either_drawing() -> None:
     lines = "╭─ Oh ─╮\n│ no   │\n│ more │\n│ ──── │\n│ rest │\n╰──────╯"
     dashes = " Oh \n ---- \n  no  \n  more \n  ---- \n  rest \n"
-    assert summarize_complaint(lines) == summarize_complaint(dashes) == "no more"
+    assert summarize_tyro_error(lines) == summarize_tyro_error(dashes) == "no more"
 
 
 def test_defaults_that_say_something_are_in_the_help() -> None:

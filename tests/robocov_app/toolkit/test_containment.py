@@ -253,7 +253,7 @@ def test_an_edit_of_a_map_that_raises_is_reverted(tmp_path: Path, monkeypatch: p
 
         with monkeypatch.context() as patch:
             patch.setattr(driver.window.play_mode, "start", apply_edit_and_fail)
-            patch.setattr(driver.window, "do", apply_edit_and_fail)
+            patch.setattr(driver.window, "run_command", apply_edit_and_fail)
             driver.press_key("f5")
         assert editor.sketch == sketch
         assert "Internal error" in editor.message

@@ -48,7 +48,7 @@ def test_only_a_long_drag_completes_a_line(
     outline = DrawnOutline(can_drag=True)
     press_points(outline, (0, 0))
     assert outline.is_dragging
-    assert outline.release(point, point, DRAG_REACH_M, clicked=is_click) == is_complete
+    assert outline.release(point, point, DRAG_REACH_M, is_click=is_click) == is_complete
     assert not outline.is_dragging
 
 

@@ -384,7 +384,7 @@ class TestPalette:
         """Dialogs with a palette that was just opened with the key "/"."""
         dialogs = Dialogs()
         dialogs.ask(create_palette(recorded.commands, "", messages.append))
-        dialogs.ignore_letter("/")
+        dialogs.ignore_character("/")
         return dialogs
 
     def test_the_palette_stays_open_with_an_invalid_text(

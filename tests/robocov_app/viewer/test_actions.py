@@ -112,7 +112,7 @@ def test_every_key_exists_in_pygame(commands: list[Command]) -> None:
 def test_commands_named_in_the_code_exist(commands: list[Command]) -> None:
     """Calls of functions that expect the name of a command have one."""
     names = {command.name for command in commands}
-    functions = {"_show_button", "do", "_do"}
+    functions = {"_show_button", "run_command", "_run_command"}
     for text in TEXTS:
         for node in ast.walk(ast.parse(text)):
             if not isinstance(node, ast.Call) or getattr(node.func, "attr", "") not in functions:
@@ -212,7 +212,7 @@ def test_every_command_changes_something(shared: Driver) -> None:
             continue
         prepare(shared)
         before = list_state(shared)
-        shared.window.do(command.name)
+        shared.window.run_command(command.name)
         assert list_state(shared) != before, command.name
 
 
@@ -221,7 +221,7 @@ def test_every_key_runs_its_command(shared: Driver, monkeypatch: pytest.MonkeyPa
     shared.window.dialogs.close()
     shared.window.panel.ui.stop_typing()
     shared.window.focus.leave()
-    monkeypatch.setattr(shared.window, "do", done.append)
+    monkeypatch.setattr(shared.window, "run_command", done.append)
     for command in shared.window.commands.commands:
         for key in command.keys:
             shared.post(pygame.KEYDOWN, **build_key_event(key))

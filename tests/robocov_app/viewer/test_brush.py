@@ -41,7 +41,7 @@ def paint_stroke(brush, session, *points, lowers=False) -> str | None:
     brush.press(session, build_event(points[0], is_right=lowers))
     for point in points[1:]:
         brush.move(session, build_event(point))
-    return brush.release(session, build_event(points[-1]), clicked=False)
+    return brush.release(session, build_event(points[-1]), is_click=False)
 
 
 def get_density(session, point) -> float:
@@ -107,7 +107,7 @@ def test_robots_know_the_density_while_it_is_painted():
             assert seen.density is session.displayed.environment.density
     assert session.displayed.environment.density is not None
     assert brush.is_painting
-    brush.release(session, build_event((4.6, 3.0)), clicked=False)
+    brush.release(session, build_event((4.6, 3.0)), is_click=False)
     assert not brush.is_painting
     assert session.timeline.head.parent is not None
 
@@ -134,7 +134,7 @@ def test_a_stroke_can_be_cancelled():
     assert brush.cancel(session)
     assert session.displayed.environment == before
     assert session.timeline.head.parent is None
-    assert brush.release(session, build_event((1.0, 1.0)), clicked=False) is None
+    assert brush.release(session, build_event((1.0, 1.0)), is_click=False) is None
     assert brush.build_overlay(session) == ViewerToolOverlay()
 
 
@@ -168,7 +168,7 @@ def test_another_map_ends_a_stroke():
     brush.press(session, build_event((1.0, 1.0)))
     session.restart(environment=square)
     brush.move(session, build_event((2.0, 1.0)))
-    assert brush.release(session, build_event((2.0, 1.0)), clicked=False) is None
+    assert brush.release(session, build_event((2.0, 1.0)), is_click=False) is None
     assert session.displayed.environment.boundary == square.boundary
 
 
@@ -209,7 +209,7 @@ def test_nothing_is_painted_before_a_press():
     session = start_session()
     before = describe_state(session)
     brush.move(session, build_event((1.0, 1.0)))
-    assert brush.release(session, build_event((1.0, 1.0)), clicked=False) is None
+    assert brush.release(session, build_event((1.0, 1.0)), is_click=False) is None
     assert not brush.cancel(session)
     assert describe_state(session) == before
 

@@ -30,7 +30,7 @@ def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:
     canvas = driver.window.canvas
     whole = canvas.to_pixel((1.0, 1.0))
     canvas.camera.is_animated = True
-    driver.window.do("zoom:in")
+    driver.window.run_command("zoom:in")
     assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(whole)
     assert driver.window.build_frame_key() is None
     driver.run_frames(1)
@@ -39,7 +39,7 @@ def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:
     assert not canvas.camera.is_moving
     zoomed = canvas.to_pixel((1.0, 1.0))
     assert len({whole, between, zoomed}) == 3
-    driver.window.do("fit")
+    driver.window.run_command("fit")
     driver.run_frames(15)
     assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(whole)
 
@@ -47,12 +47,12 @@ def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:
 def test_quick_turns_of_the_wheel_add_up(driver: Driver) -> None:
     canvas = driver.window.canvas
     for _ in range(3):
-        driver.window.do("zoom:in")
+        driver.window.run_command("zoom:in")
     zoomed = canvas.to_pixel((1.0, 1.0))
-    driver.window.do("fit")
+    driver.window.run_command("fit")
     canvas.camera.is_animated = True
     for _ in range(3):
-        driver.window.do("zoom:in")
+        driver.window.run_command("zoom:in")
         driver.run_frames(1)
     driver.run_frames(15)
     assert canvas.to_pixel((1.0, 1.0)) == pytest.approx(zoomed)
@@ -61,8 +61,8 @@ def test_quick_turns_of_the_wheel_add_up(driver: Driver) -> None:
 def test_motion_can_be_switched_off(driver: Driver) -> None:
     canvas = driver.window.canvas
     canvas.camera.is_animated = True
-    driver.window.do("motion")
-    driver.window.do("zoom:in")
+    driver.window.run_command("motion")
+    driver.window.run_command("zoom:in")
     assert not canvas.camera.is_moving
 
 
@@ -70,13 +70,13 @@ def test_reduced_motion_of_the_system_is_respected(driver: Driver) -> None:
     canvas = driver.window.canvas
     canvas.camera.is_animated = True
     driver.viewer.view.is_motion_reduced = True
-    driver.window.do("zoom:in")
+    driver.window.run_command("zoom:in")
     assert not canvas.camera.is_moving
     for _ in range(2):
-        driver.window.do("motion")
+        driver.window.run_command("motion")
     assert driver.viewer.message == "Zooming is instant, because the system asks for reduced motion"
     driver.viewer.view.is_motion_reduced = False
-    driver.window.do("zoom:in")
+    driver.window.run_command("zoom:in")
     assert canvas.camera.is_moving
 
 

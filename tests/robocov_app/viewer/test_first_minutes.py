@@ -131,7 +131,7 @@ def test_each_of_four_panes_shows_its_cost(
         free_width = left + width - driver.window.chart.times.right - 9 * scale
         name = max((pane.controller.label for pane in driver.session.timeline.panes), key=len)
         text_size = round(driver.window.theme.small_text * scale)
-        assert measure_text(f"{name}  8.888  +88.8%", text_size, True) <= free_width
+        assert measure_text(f"{name}  8.888  +88.8%", text_size, bold=True) <= free_width
 
 
 def test_a_controller_name_is_not_cut_next_to_a_large_cost(tmp_path: Path, drawn_texts: list[str]) -> None:
@@ -163,7 +163,7 @@ def test_actions_are_suggested_once_the_team_has_settled(tmp_path: Path) -> None
         session.timeline.is_settled = True
         assert "fail" not in suggest_actions(viewer), "an action that was used is not suggested again"
         session.show_time(0.0)
-        driver.window.do("suggestions")
+        driver.window.run_command("suggestions")
         session.show_time(session.timeline.end_time)
         assert suggest_actions(viewer) == ""
 
@@ -390,7 +390,7 @@ def test_a_lesson_waits_for_the_answer_about_drafts(monkeypatch: pytest.MonkeyPa
     workspace.close()
     launcher = build_visible_launcher(monkeypatch, tmp_path, offers_lesson=False)
     with launcher.window() as window:
-        window.do("tour")
+        window.run_command("tour")
         window.run_frame(0.5)
         start = window.lesson.frame_key
         window.run_frame(0.5)

@@ -233,18 +233,18 @@ class RandomUser:
 def limit_commands(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Run some commands a few times at most, and compute costs of small maps only."""
     remaining = dict(MAX_CALLS)
-    do = ViewerWindow.do
+    run_command = ViewerWindow.run_command
 
-    def do_if_remaining(window: ViewerWindow, name: str) -> None:
+    def run_if_remaining(window: ViewerWindow, name: str) -> None:
         if name in remaining:
             ends_video = name == "video" and window.video_recorder.video is not None
             if remaining[name] == 0 and not ends_video:
                 return
             remaining[name] = max(remaining[name] - 1, 0)
-        do(window, name)
+        run_command(window, name)
 
     with monkeypatch.context() as patch:
-        patch.setattr(ViewerWindow, "do", do_if_remaining)
+        patch.setattr(ViewerWindow, "run_command", run_if_remaining)
         patch.setattr("driven_window.Costs", CostsOfSmallMaps)
         yield
 

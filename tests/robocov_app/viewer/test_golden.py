@@ -16,7 +16,7 @@ def test_windows_look_like_their_reference_images(name: str) -> None:
 
 
 def test_a_missing_legend_is_found() -> None:
-    changed_frame = draw_scene("past-light", lambda window: window.do("layer:legend"))
+    changed_frame = draw_scene("past-light", lambda window: window.run_command("layer:legend"))
     assert compute_difference(changed_frame, read_golden("past-light")) > TOLERANCE
 
 

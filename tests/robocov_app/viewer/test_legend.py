@@ -96,7 +96,7 @@ def test_a_click_toggles_a_layer_and_nothing_moves(tmp_path: Path, controllers: 
 
 def test_a_click_on_a_chip_does_not_act_on_the_map(tmp_path: Path) -> None:
     with open_window(tmp_path) as window:
-        window.do("tool:robot")
+        window.run_command("tool:robot")
         robots = len(window.viewer.robot_numbers)
         click(window, find_chips(window)["layer:cells"])
         assert len(window.viewer.robot_numbers) == robots
@@ -106,8 +106,8 @@ def test_a_click_on_a_chip_does_not_act_on_the_map(tmp_path: Path) -> None:
 @pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
 def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], preset) -> None:
     with open_window(tmp_path, size=size) as window:
-        window.do(f"preset:{preset.name}")
-        window.do("layers")
+        window.run_command(f"preset:{preset.name}")
+        window.run_command("layers")
         window.run_frame(1 / 30)
         left, _, width, _ = window.layout.arena
         boxes = [box for _, box in window.layer_bar.chips]
@@ -121,7 +121,7 @@ def test_chips_stay_within_the_arena(tmp_path: Path, size: tuple[int, int], pres
 @pytest.mark.parametrize("preset", LAYER_PRESETS, ids=lambda preset: preset.name)
 def test_no_chip_lacks_a_text_for_which_there_is_space(preset, width: int, tmp_path: Path) -> None:
     with open_window(tmp_path, size=(width, 720), n_frames=1) as window:
-        window.do(f"preset:{preset.name}")
+        window.run_command(f"preset:{preset.name}")
         window.run_frame(1 / 30)
         canvas = create_flat_canvas(window.screen, window.theme, window.layout.scale)
         placed = window.layer_bar.chips
@@ -136,7 +136,7 @@ def test_no_chip_lacks_a_text_for_which_there_is_space(preset, width: int, tmp_p
 def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path) -> None:
     with open_window(tmp_path, size=(900, 600)) as window:
         assert "Centroids" in list_texts(window)
-        window.do("tour")
+        window.run_command("tour")
         for _ in range(10):
             window.run_frame(1 / 30)
         assert {"Attraction", "Robot repulsion", "Obstacle repulsion"} <= set(list_texts(window))
@@ -145,10 +145,10 @@ def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path)
 def test_chips_of_a_lesson_disappear_with_it(tmp_path: Path) -> None:
     with open_window(tmp_path) as window:
         before = find_chips(window)
-        window.do("tour")
+        window.run_command("tour")
         window.run_frame(1 / 30)
         assert find_chips(window) != before
-        window.do("cancel")
+        window.run_command("cancel")
         window.run_frame(1 / 30)
         assert find_chips(window) == before
 
@@ -157,7 +157,7 @@ def test_chips_of_a_lesson_disappear_with_it(tmp_path: Path) -> None:
 def test_every_unusual_symbol_has_a_chip_in_a_small_window(tmp_path: Path, preset) -> None:
     """Chips that do not fit with their text remain with a tip; only standard layers are left out."""
     with open_window(tmp_path, size=(900, 600)) as window:
-        window.do(f"preset:{preset.name}")
+        window.run_command(f"preset:{preset.name}")
         window.run_frame(1 / 30)
         unusual = [layer for layer in window.canvas.layers if not layer.is_default]
         explained = [layer for layer in unusual if build_layer_entries(layer, window.canvas.scenes)]
@@ -179,20 +179,20 @@ def test_presets_and_the_menu_have_every_layer(tmp_path: Path) -> None:
         assert "distances" in window.viewer.view.layers
         click(window, rows["preset:why"])
         assert window.viewer.view.layers == next(p.layers for p in LAYER_PRESETS if p.name == "why")
-        window.do("cancel")
+        window.run_command("cancel")
         assert not window.layer_bar.is_open
 
 
 def test_a_key_goes_through_the_presets(tmp_path: Path) -> None:
     with open_window(tmp_path) as window:
         for preset in (*LAYER_PRESETS, LAYER_PRESETS[0]):
-            window.do("preset:next")
+            window.run_command("preset:next")
             assert window.viewer.view.layers == preset.layers
 
 
 def test_in_a_small_window_a_menu_replaces_the_presets(tmp_path: Path) -> None:
     with open_window(tmp_path, size=(900, 600)) as window:
-        window.do("preset:why")
+        window.run_command("preset:why")
         window.run_frame(1 / 30)
         chips = find_chips(window)
         assert not any(command.startswith("preset:") for command in chips)

@@ -471,7 +471,7 @@ def test_a_lesson_continues_after_sharing(command: str, tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         driver.window.lesson.is_unattended = False
         driver.window.lesson.start(write_short_lesson(tmp_path))
-        driver.window.do(command)
+        driver.window.run_command(command)
         driver.window.dialogs.close()
         assert driver.window.lesson.shown is not None
         time = driver.session.displayed.time

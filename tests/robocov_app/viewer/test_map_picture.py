@@ -40,7 +40,7 @@ def test_a_finger_next_to_a_robot_in_a_picture_reaches_it(driver: Driver) -> Non
     canvas = driver.window.map_pictures._pictures[PHONE, True]._canvas
     position = get_position(driver, 2).tolist()
     x, y = canvas.to_pixel(position)
-    driver.window.do("tool:failure")
+    driver.window.run_command("tool:failure")
     driver.click(*driver.window.map_pictures.find_window_pixel(PHONE, (x - 23 * SCALE, y)))
     assert driver.viewer.message == "Robot 2 failed"
     x, y = driver.find_robot_pixel(3)
@@ -131,17 +131,17 @@ def test_a_picture_shows_the_map_while_something_covers_it_in_the_window(
     pictures = driver.window.map_pictures
     before = pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB")
     assert not driver.window.controls.is_covered
-    driver.window.do(command)
+    driver.window.run_command(command)
     driver.run_frames(2)
     assert driver.window.controls.is_covered
     assert pygame.image.tobytes(pictures.draw(PHONE, SCALE, is_controlling=True), "RGB") == before
-    driver.window.do("cancel")
+    driver.window.run_command("cancel")
     driver.run_frames(2)
 
 
 def test_the_menu_of_layers_is_used_in_a_picture(driver: Driver) -> None:
     window = driver.window
-    window.do("layers")
+    window.run_command("layers")
     driver.run_frames(2)
     window.map_pictures.draw_cover(PHONE, SCALE)
     menu = window.layer_bar.menu_box
@@ -167,12 +167,12 @@ def test_dialogs_and_menus_are_not_wider_than_the_phone_that_controls_the_window
         max_dialog_width=374.0,
     )
     window.set_appearance(appearance)
-    window.do("palette")
+    window.run_command("palette")
     driver.run_frames(2)
     assert window.dialogs.box is not None
     assert window.dialogs.box.width <= 374
-    window.do("cancel")
+    window.run_command("cancel")
     window.dialogs.close()
-    window.do("layers")
+    window.run_command("layers")
     driver.run_frames(2)
     assert window.layer_bar.menu_box.width <= 374

@@ -23,7 +23,7 @@ def draw_circle(viewer: Presenter, center: tuple[float, float], rim: tuple[float
     tool = viewer.toolbox.by_name["circle"]
     release = build_event(rim)
     tool.press(viewer.session, build_event(center))
-    viewer.attempt(lambda: tool.release(viewer.session, release, clicked=False))
+    viewer.attempt(lambda: tool.release(viewer.session, release, is_click=False))
 
 
 # playing

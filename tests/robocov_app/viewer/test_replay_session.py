@@ -413,12 +413,12 @@ def test_the_window_displays_a_record_without_its_controller(
             window.run_frame(1 / 30)
         assert window.viewer.session.timeline.is_live
         assert window.viewer.message.startswith("The record ends here")
-        window.do("pause")
+        window.run_command("pause")
         window.run_frame(1 / 30)
         assert "not resumed" in window.viewer.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
-            window.do("robot:next")
+            window.run_command("robot:next")
             window.run_frame(1 / 30)
             window.run_frame(1 / 30)
 

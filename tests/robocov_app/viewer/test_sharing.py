@@ -220,7 +220,7 @@ def test_robots_that_differ_are_in_the_script(tmp_path: Path) -> None:
 
 def test_a_copy_opens_this_session_which_keeps_its_own_file(driver: Driver, tmp_path: Path) -> None:
     advance_session(driver.session, STEPS)
-    driver.window.do("save:session")
+    driver.window.run_command("save:session")
     driver.session.fail_robot(1)
     copy_text(driver, "share:copy")
     assert driver.viewer.files.workspace.path == tmp_path / "hall-1.robocov"
@@ -230,7 +230,7 @@ def test_a_copy_opens_this_session_which_keeps_its_own_file(driver: Driver, tmp_
 
 
 def test_a_link_needs_a_server(driver: Driver) -> None:
-    driver.window.do("share:link")
+    driver.window.run_command("share:link")
     assert driver.window.model.has_error_message
     driver.push_button("share")
     menu = driver.window.dialogs.current

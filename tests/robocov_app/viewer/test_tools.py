@@ -41,7 +41,7 @@ def click(tool, session, *points, number=None) -> str | None:
     for point in points:
         tool.move(session, build_event(point))
         message = tool.press(session, build_event(point, robot=number))
-        message = tool.release(session, build_event(point), clicked=True) or message
+        message = tool.release(session, build_event(point), is_click=True) or message
     return message
 
 
@@ -50,7 +50,7 @@ def drag(tool, session, start, *points, number=None) -> str | None:
     message = tool.press(session, build_event(start, robot=number))
     for point in points:
         tool.move(session, build_event(point))
-    return tool.release(session, build_event(points[-1]), clicked=False) or message
+    return tool.release(session, build_event(points[-1]), is_click=False) or message
 
 
 def get_position(session, number) -> list[float]:
@@ -75,7 +75,7 @@ def test_an_unused_tool_does_nothing(name):
     session = start_session()
     before = describe_state(session)
     tool.move(session, build_event((1.0, 1.0)))
-    assert tool.release(session, build_event((1.0, 1.0)), clicked=False) is None
+    assert tool.release(session, build_event((1.0, 1.0)), is_click=False) is None
     assert tool.finish(session) is None
     assert not tool.cancel(session)
     assert tool.build_overlay(session) == ViewerToolOverlay()
@@ -110,7 +110,7 @@ def test_the_hand_drags_robots():
     # The robot returns to its old position.
     hand.move(session, build_event((x, y)))
     assert get_position(session, 2) == [x, y]
-    assert hand.release(session, build_event((x, y)), clicked=False) is None
+    assert hand.release(session, build_event((x, y)), is_click=False) is None
 
 
 def test_the_hand_throws_robots():
@@ -123,7 +123,7 @@ def test_the_hand_throws_robots():
     session.playback.advance(0.1)
     hand.move(session, build_event((3.1, 3.2)))
     assert session.timeline.run.drag == (2, (3.1, 3.2))
-    hand.release(session, build_event((3.1, 3.2)), clicked=False)
+    hand.release(session, build_event((3.1, 3.2)), is_click=False)
     assert session.timeline.run.drag is None
     assert session.timeline.events[-1].text == "robot 2 was dragged"
 
@@ -159,7 +159,7 @@ def test_a_robot_can_be_removed_while_it_is_dragged():
     hand.move(session, build_event((3.0, 3.2)))
     session.remove_robot(2)
     hand.move(session, build_event((3.0, 3.5)))
-    assert hand.release(session, build_event((3.0, 3.5)), clicked=False) is None
+    assert hand.release(session, build_event((3.0, 3.5)), is_click=False) is None
     assert session.timeline.run.drag is None
 
 
@@ -175,7 +175,7 @@ def test_the_hand_moves_obstacles():
     assert state.line == ((4.2, 1.2), (4.5, 2.2))
     assert state.label == "1.04 m"
     assert session.displayed.environment is HALL
-    assert hand.release(session, build_event((4.5, 2.2)), clicked=False) == "circle “pillar” moved"
+    assert hand.release(session, build_event((4.5, 2.2)), is_click=False) == "circle “pillar” moved"
     assert session.displayed.environment.obstacles == (*state.obstacles, HALL.obstacles[1])
     assert hand.build_overlay(session).selected == state.obstacles
     assert session.undo() == "circle “pillar” moved"
@@ -199,12 +199,12 @@ def test_the_map_can_change_while_an_obstacle_is_dragged():
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=(HALL.obstacles[1], HALL.obstacles[0])), "obstacles reversed")
     assert hand.build_overlay(session).selected == HALL.obstacles[:1]
-    assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
+    assert hand.release(session, build_event((4.5, 2.2)), is_click=False) is None
     hand.press(session, build_event((4.2, 1.2)))
     hand.move(session, build_event((4.5, 2.2)))
     session.edit_map(replace(HALL, obstacles=()), "obstacles deleted")
     assert hand.build_overlay(session) == ViewerToolOverlay()
-    assert hand.release(session, build_event((4.5, 2.2)), clicked=False) is None
+    assert hand.release(session, build_event((4.5, 2.2)), is_click=False) is None
     assert session.displayed.environment.obstacles == ()
 
 
@@ -348,9 +348,9 @@ def test_a_circle_is_drawn_from_its_center():
     tool.move(session, build_event((3.5, 3.5)))
     assert tool.build_overlay(session).label == "radius 0.30 m"
     assert tool.build_overlay(session).obstacles == (CircleObstacle((3.5, 3.2), 0.3),)
-    assert tool.release(session, build_event((3.5, 3.5)), clicked=False) == "circle drawn"
+    assert tool.release(session, build_event((3.5, 3.5)), is_click=False) == "circle drawn"
     assert session.displayed.environment.obstacles[-1] == CircleObstacle((3.5, 3.2), 0.3)
-    assert tool.release(session, build_event((3.5, 3.5)), clicked=False) is None
+    assert tool.release(session, build_event((3.5, 3.5)), is_click=False) is None
 
 
 def test_a_click_draws_no_circle():
@@ -360,7 +360,7 @@ def test_a_click_draws_no_circle():
         click(tool, session, (3.5, 3.2))
     tool.press(session, build_event((3.5, 3.2)))
     assert tool.cancel(session)
-    assert tool.release(session, build_event((3.5, 3.9)), clicked=False) is None
+    assert tool.release(session, build_event((3.5, 3.9)), is_click=False) is None
     assert session.displayed.environment is HALL
 
 
@@ -425,7 +425,7 @@ def test_the_ruler_measures_a_distance():
     tool.move(session, build_event((4.0, 5.0)))
     assert tool.build_overlay(session).line == ((1.0, 1.0), (4.0, 5.0))
     assert tool.build_overlay(session).label == "5.00 m  (Δx 3.00, Δy 4.00)"
-    tool.release(session, build_event((4.0, 5.0)), clicked=False)
+    tool.release(session, build_event((4.0, 5.0)), is_click=False)
     # The measured line stays.
     tool.move(session, build_event((2.0, 2.0)))
     assert tool.build_overlay(session).line == ((1.0, 1.0), (4.0, 5.0))
@@ -480,7 +480,7 @@ def test_tools_may_be_used_in_any_order(actions):
                 case "move":
                     tool.move(session, build_event(point))
                 case "release":
-                    message = tool.release(session, build_event(point), clicked=False)
+                    message = tool.release(session, build_event(point), is_click=False)
                 case "finish":
                     message = tool.finish(session)
                 case "cancel":

@@ -221,11 +221,11 @@ def test_the_palette_says_whether_a_video_would_start_or_stop(driver: Driver) ->
         return [option.text for option in list_options(driver.window.commands, "video")]
 
     assert "Start recording a video" in list_video_titles()
-    driver.window.do("video")
+    driver.window.run_command("video")
     assert command.current_title == "Stop recording the video"
     assert "Stop recording the video" in list_video_titles()
     assert "Start recording a video" not in list_video_titles()
-    driver.window.do("video")
+    driver.window.run_command("video")
     assert command.current_title == "Start recording a video"
 
 

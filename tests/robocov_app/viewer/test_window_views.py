@@ -166,8 +166,8 @@ def test_robots_have_the_same_size_in_all_panes(tmp_path: Path) -> None:
 def test_a_click_next_to_a_small_robot_reaches_it(tmp_path: Path) -> None:
     with open_viewer(tmp_path, robots=3, size=(1280, 720)) as driver:
         for _ in range(8):
-            driver.window.do("zoom:out")
-        driver.window.do("tool:failure")
+            driver.window.run_command("zoom:out")
+        driver.window.run_command("tool:failure")
         canvas = driver.window.canvas
         pane_canvas = canvas._build_canvas(driver.window.screen, 0, canvas.scenes[0])
         assert max(compute_drawn_radii(pane_canvas, canvas.scenes[0])) < 7.0

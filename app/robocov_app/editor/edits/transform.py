@@ -164,7 +164,7 @@ def rotate(sketch: Sketch, selection: Selection, degrees: float, about: Point | 
     """Rotate the selection counter-clockwise about a point, m, by default the center of its bounding box."""
     require(math.isfinite(degrees), "expected an angle in degrees")
     center = about or _compute_center(sketch, selection)
-    return _transform(sketch, selection, Affine.rotation(degrees, center), "turned")
+    return _transform(sketch, selection, Affine.rotation(degrees, center), "rotated")
 
 
 def scale(
@@ -372,7 +372,7 @@ def level_map(sketch: Sketch, a: Point, b: Point) -> Change:
     rotated = _apply_affine(sketch, everything, affine)
     density = _rotate_density(sketch.density, affine)
     rotated = replace(rotated, background=background, density=density)
-    return Change(rotated, Selection(), f"map turned by {degrees:.2f}°")
+    return Change(rotated, Selection(), f"map rotated by {degrees:.2f}°")
 
 
 def _rotate_density(density: Density | None, affine: Affine) -> Density | None:
@@ -381,7 +381,7 @@ def _rotate_density(density: Density | None, affine: Affine) -> Density | None:
         return rotated
     if density is not None and not density.is_uniform:
         kind = density.kind
-        raise MapError(f"a density that is a {kind} cannot be turned: remove it first by “density none”")
+        raise MapError(f"a density that is a {kind} cannot be rotated: remove it first by “density none”")
     return density
 
 

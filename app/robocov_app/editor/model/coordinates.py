@@ -157,7 +157,7 @@ def _require_value(value: float, text: str, help_text: str) -> float:
 
 
 def _parse_number(typed: str) -> float:
-    """Parse a number; return nan if the text is not one, as the functions below do."""
+    """Parse a number; return nan if the text is not one."""
     typed = typed.strip()
     if not re.fullmatch(_NUMBER, typed):
         return math.nan

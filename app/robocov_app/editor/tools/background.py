@@ -57,7 +57,7 @@ class BackgroundTool(EditorTool):
         corner = (background.corner[0] + dx, background.corner[1] + dy)
         self.moved = replace(background, corner=corner)
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """Apply the drag, or add a point."""
         pressed = self.pressed
         moved = self.moved
@@ -65,7 +65,7 @@ class BackgroundTool(EditorTool):
         self.moved = None
         if pressed is None:
             return
-        if moved is not None and not clicked:
+        if moved is not None and not is_click:
             x, y = moved.corner
             corner = (round(x, CORNER_DECIMALS), round(y, CORNER_DECIMALS))
             context.apply(set_background(context.sketch, replace(moved, corner=corner)))

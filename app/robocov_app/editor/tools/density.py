@@ -79,7 +79,7 @@ class DensityTool(EditorTool):
         if self.pressed is not None and event.has_moved_from(self.pressed.point):
             self.change = self._build_change(context, self.pressed.point, event.point)
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """Apply the drag, or choose the feature that was clicked; a new or dragged feature is chosen, too."""
         pressed = self.pressed
         change = self.change
@@ -87,7 +87,7 @@ class DensityTool(EditorTool):
         self.change = None
         if pressed is None:
             return
-        if change is not None and not clicked:
+        if change is not None and not is_click:
             context.apply(change)
             self.chosen = self._hit.feature
             if self.chosen is None:

@@ -65,7 +65,7 @@ class DoorTool(EditorTool):
                 context.sketch, event.unsnapped_point, WALL_REACH_FRACTION * event.reach
             )
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """Cut an opening into the wall: a door at a click, or everything between both ends of a drag."""
         pressed = self.pressed
         wall = self._wall
@@ -74,7 +74,7 @@ class DoorTool(EditorTool):
         if pressed is None or wall is None:
             return
         before = context.sketch
-        if clicked:
+        if is_click:
             context.apply(create.open_door(before, wall, event.point, self.width))
             self._opened = _OpenedDoor(before, context.sketch, wall, event.point)
         else:

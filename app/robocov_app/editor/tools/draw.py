@@ -116,10 +116,10 @@ class LineTool(EditorTool, ABC):
         """Move the preview of the next point to the pointer."""
         self.outline.cursor = self.choose_point(event)
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """Complete the drawing if it was drawn with a drag."""
         if self.outline.release(
-            self.choose_point(event), event.unsnapped_point, event.reach, clicked=clicked
+            self.choose_point(event), event.unsnapped_point, event.reach, is_click=is_click
         ):
             self._finish_drag(context, self.outline.cursor)
 
@@ -236,7 +236,9 @@ class MeasureTool(LineTool):
     name = "measure"
     title = "Measure"
     key = "m"
-    hint = "click points, or drag; “level” turns the map until the line is level; Esc clears the measurement"
+    hint = (
+        "click points, or drag; “level” rotates the map until the line is level; Esc clears the measurement"
+    )
     allows_drag = True
 
     @property

@@ -120,12 +120,12 @@ class MotionPathTool(EditorTool):
             position = event.constrain(origin)
             self.change = paths.move_waypoint(context.sketch, key, dragged, position)
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """Apply the drag of a waypoint."""
         change = self.change
         self._dragged = None
         self.change = None
-        if change is not None and not clicked:
+        if change is not None and not is_click:
             context.apply(change)
         self._selected = _find_selected_path(context)
 

@@ -139,7 +139,7 @@ class SelectTool(EditorTool):
             return MoveDrag(context, objects, pressed.unsnapped_point)
         return BoxDrag(context, pressed.unsnapped_point, adds=pressed.shift)
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
         """End the drag, or handle the click."""
         pressed = self.pressed
         drag = self.drag

@@ -86,8 +86,8 @@ class EditorTool(Tool[EditorContext, EditorPointerEvent]):
         """Handle a move of the pointer, with or without a button held down."""
         self.cursor = event.point
 
-    def release(self, context: EditorContext, event: EditorPointerEvent, *, clicked: bool) -> None:
-        """Handle the release of the left button; `clicked` if the pointer has not moved since the press."""
+    def release(self, context: EditorContext, event: EditorPointerEvent, *, is_click: bool) -> None:
+        """Handle the release of the left button; `is_click` if the pointer has not moved since the press."""
 
     def finish(self, context: EditorContext) -> None:
         """Complete the action, as Enter or a right click does."""

@@ -154,7 +154,7 @@ class EditorPointer(Pointer):
         """Pass the release of the button to the tool."""
         editor = self.editor
         pointer = self._build_event(event.pos)
-        editor.attempt(lambda: editor.tool.release(editor, pointer, clicked=is_click))
+        editor.attempt(lambda: editor.tool.release(editor, pointer, is_click=is_click))
         editor.document.history.starts_new_step = True
 
     def handle_wheel(self, event: pygame.event.Event) -> None:

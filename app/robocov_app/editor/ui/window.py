@@ -145,9 +145,9 @@ class EditorWindow(CommandWindow):
         )
         commands = list_commands(editor, self.canvas, self.file_commands, self._build_actions())
         self.commands = CommandTable(commands, self._attempt, lambda: list_typed_commands(editor))
-        self.panel = EditorPanel(editor, self.commands, self.do, self._show_problem)
-        self.top_bar = EditorTopBar(editor, self.commands, self.do)
-        self.tool_rail = ToolRail(editor.toolbox, self.commands, self.do)
+        self.panel = EditorPanel(editor, self.commands, self.run_command, self._show_problem)
+        self.top_bar = EditorTopBar(editor, self.commands, self.run_command)
+        self.tool_rail = ToolRail(editor.toolbox, self.commands, self.run_command)
         self.pointer = EditorPointer(editor, self.canvas, self.parts, self.open_menu)
         self.team_preview = TeamPreview(editor, self.canvas)
         self.field_focus = FieldFocus(editor, self.panel, self._arrange)
@@ -359,7 +359,7 @@ class EditorWindow(CommandWindow):
         if self.canvas.contains(pixel):
             select_for_menu(self.editor, self.canvas.to_world(pixel))
         commands = [self.commands[name] if name else None for name in list_menu_commands(self.editor)]
-        self.dialogs.ask(Menu(commands, pixel, self.do, is_for_fingers=self.editor.is_compact))
+        self.dialogs.ask(Menu(commands, pixel, self.run_command, is_for_fingers=self.editor.is_compact))
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event; the key for screenshots works even while a dialog is open."""
@@ -369,7 +369,7 @@ class EditorWindow(CommandWindow):
         if event.type in MOUSE_EVENTS and event.type != pygame.MOUSEWHEEL:
             self.pointer.pixel = event.pos
         if event.type == pygame.KEYDOWN and event.key == pygame.K_F12:
-            self.do("screenshot")
+            self.run_command("screenshot")
         else:
             super().handle_event(event)
 
@@ -378,7 +378,7 @@ class EditorWindow(CommandWindow):
         if isinstance(self.dialogs.current, ImportDialog | Menu):
             self.dialogs.close()
         if not self.dialogs.is_open:
-            self.do("quit")
+            self.run_command("quit")
 
     def open_file(self, path: Path) -> None:
         """Open or import a file that was dropped on the window."""

@@ -10,10 +10,10 @@ UNIT_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 """Vertices of a square with side 1 around the origin, (4, 2)."""
 
 
-def build_frame(x: float, y: float, turn: float) -> FloatArray:
-    """Return the (3, 3) matrix of a frame at a position, rotated by the angle `turn`, rad."""
-    cos = math.cos(turn)
-    sin = math.sin(turn)
+def build_frame(x: float, y: float, angle: float) -> FloatArray:
+    """Return the (3, 3) matrix of a frame at a position, rotated by an angle, rad."""
+    cos = math.cos(angle)
+    sin = math.sin(angle)
     return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
 
 

@@ -1,7 +1,7 @@
 """MovingAI benchmark grids.
 
-Each cell is a letter: ``.``, ``G`` and ``S`` (swamp) are passable; ``@`` and ``O`` are out of bounds; ``T``
-(trees) and ``W`` (water) are obstacles unless an option makes them free.
+Each cell is a character: ``.``, ``G`` and ``S`` (swamp) are passable; ``@`` and ``O`` are out of bounds;
+``T`` (trees) and ``W`` (water) are obstacles unless an option makes them free.
 
 N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Computational Intelligence
 and AI in Games 4 (2012), 144-148.
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     Raises
     ------
     MapError
-        If the header is incomplete, a row has the wrong length, or a letter is unknown.
+        If the header is incomplete, a row has the wrong length, or a character is unknown.
     """
     source_name = to_one_line(path)
     content = files.read_content(path, files.MAX_CELLS + files.HEAD_BYTES).removeprefix(_BYTE_ORDER_MARK)

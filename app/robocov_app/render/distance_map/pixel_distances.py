@@ -481,6 +481,7 @@ def _select_different(sites: IntArray, sources: IntArray) -> IntArray:
     is_new = np.ones(sites.shape, dtype=bool)
     for column in range(1, sites.shape[1]):
         is_new[:, column] = (sources[:, column, None] != sources[:, :column]).all(axis=1)
+    # A stable sort moves the sites with new sources to the front of each row.
     order = np.argsort(~is_new, axis=1, kind="stable")[:, :_MAX_CANDIDATES]
     chosen = np.take_along_axis(sites, order, axis=1)
     return np.where(np.take_along_axis(is_new, order, axis=1), chosen, sites[:, :1])

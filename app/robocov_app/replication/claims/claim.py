@@ -248,14 +248,14 @@ def adjust_claims(claims: Sequence[Claim]) -> list[Claim]:
 
 
 def summarize_verdicts(claims: Sequence[Claim]) -> str:
-    """Return a sentence that counts the verdicts: "Of 3 claims 2 hold, 1 is undecided."."""
+    """Return a sentence that counts the verdicts: "Of 3 claims, 2 hold, 1 is undecided."."""
     verdicts = [claim.verdict for claim in claims]
     texts = []
     for verdict, (singular, plural) in VERDICTS.items():
         count = verdicts.count(verdict)
         if count:
             texts.append(f"{count} {plural if count > 1 else singular}")
-    return f"Of {len(claims)} claims {', '.join(texts)}."
+    return f"Of {len(claims)} claims, {', '.join(texts)}."
 
 
 def judge_pairs(

@@ -78,7 +78,7 @@ def judge_teams(outcomes: Outcomes, controller: str) -> Claim:
             f"Median of the mean time until the first robot arrives: "
             f"{format_median(pairs.second_values, 's')} "
             f"with cells by distance, {format_median(pairs.first_values, 's')} by time. "
-            f"Two robots each with a maximum of 1, 0.5 and 0.25 m/s."
+            f"Of the six robots, two each have a maximum speed of 1, 0.5 and 0.25 m/s."
         ),
     )
 

@@ -37,7 +37,7 @@ def prepare_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
         {
             "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
             "beyond-pairs": prepare_pairs_plot(
-                _list_duel_rows(results), "our cost / cost of the other, per pair (1: equal)", theme
+                _list_own_pair_rows(results), "our cost / cost of the other, per pair (1: equal)", theme
             ),
             "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
             "beyond-targets": prepare_pairs_plot(
@@ -67,7 +67,7 @@ def build_gap_samples(results: BeyondResults) -> list[Sample]:
     return samples
 
 
-def _list_duel_rows(results: BeyondResults) -> list[PairsRow]:
+def _list_own_pair_rows(results: BeyondResults) -> list[PairsRow]:
     """Compare our main controller with each other contender, in the order of the ranking."""
     own_key = OWN[0].key
     rows = []

@@ -30,6 +30,11 @@ _GAP_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Ticks of an axis of gaps, %."""
 _GRID_ROW_HEIGHT_PX = 24
 """Height of a row of a gain grid, px at scale 1."""
+_GRID_LEFT_PX = 44
+_GRID_RIGHT_PX = 10
+_GRID_ABOVE_PX = 52
+_GRID_BELOW_PX = 44
+"""Space around a gain grid, px at scale 1."""
 _GRID_NAME_RISE_PX = 36
 """Distance of the name of a gain grid above it, px at scale 1."""
 _MIN_TICKS = 3
@@ -161,10 +166,10 @@ def draw_gain_grids(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     rho_0 = rpf.list_levels("rho_0")
     columns = 3 if len(panels) > 4 else 2
     rows = math.ceil(len(panels) / columns)
-    left = 44 * PAGE_SCALE
-    right = 10 * PAGE_SCALE
-    above = 52 * PAGE_SCALE
-    below = 44 * PAGE_SCALE
+    left = _GRID_LEFT_PX * PAGE_SCALE
+    right = _GRID_RIGHT_PX * PAGE_SCALE
+    above = _GRID_ABOVE_PX * PAGE_SCALE
+    below = _GRID_BELOW_PX * PAGE_SCALE
     width = WIDE_PX / columns - left - right
     height = len(rho_0) * _GRID_ROW_HEIGHT_PX * PAGE_SCALE
     page = FigurePage((WIDE_PX, round(rows * (height + above + below))), theme, PAGE_SCALE)

@@ -230,7 +230,7 @@ def draw_partition(run: Record, theme: Theme = LIGHT) -> Figure:
         robot_drawing.build_robot_handle("robot", theme.final, theme),
         Line2D([], [], label="centroid of its cell", **dot_style),
         Line2D([], [], color=edge_color, linewidth=0.9, label="Voronoi cell"),
-        *map_drawing.build_map_handles(environment, theme)[1:],
+        *map_drawing.build_map_handles(environment, theme, show_boundary=False),
     ]
     page, boxes = build_panels(environment, 1, NARROW_PX, handles, theme, above=10.0)
     draw_panel_footer(page, boxes, environment, handles)

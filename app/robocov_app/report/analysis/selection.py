@@ -19,6 +19,14 @@ _CRITERIA = (
 )
 
 
+class _ShownRuns(NamedTuple):
+    """Runs to show, how they were selected, and why each was selected; see `RunSelection`."""
+
+    runs: tuple[ReportedRun, ...]
+    note: str
+    roles: Mapping[ReportedRun, str]
+
+
 class RunSelection(NamedTuple):
     """Runs to show.
 
@@ -58,23 +66,19 @@ def select_runs(result: ReportedResult, max_runs: int = MAX_SHOWN_RUNS, max_pane
     RunSelection
         The panes show as many different controllers as possible, from the same start if possible.
     """
-    runs = result.completed_runs
-    note = "All runs."
-    roles: Mapping[ReportedRun, str] = {}
-    if len(runs) > max_runs:
-        runs, note, roles = _select_extremes(result, max_runs)
+    shown = _ShownRuns(result.completed_runs, "All runs.", roles={})
+    if len(result.completed_runs) > max_runs:
+        shown = _select_extremes(result, max_runs)
     groups = list_variants(result)
     if len(groups) > max_panes:
         groups = choose_compared_groups(result).groups
-    middle_runs = _find_middle_case(groups, runs, compute_medians(result)) or runs[:1]
-    panes = tuple(runs.index(run) for run in middle_runs[:max_panes])
-    return RunSelection(runs, note, panes, roles)
+    middle_runs = _find_middle_case(groups, shown.runs, compute_medians(result)) or shown.runs[:1]
+    panes = tuple(shown.runs.index(run) for run in middle_runs[:max_panes])
+    return RunSelection(shown.runs, shown.note, panes, shown.roles)
 
 
-def _select_extremes(
-    result: ReportedResult, max_runs: int
-) -> tuple[tuple[ReportedRun, ...], str, dict[ReportedRun, str]]:
-    """Return the best, worst and middle runs, a note on how they were selected, and the role of each."""
+def _select_extremes(result: ReportedResult, max_runs: int) -> _ShownRuns:
+    """Select the best, worst and middle runs."""
     all_runs = result.completed_runs
     roles: dict[ReportedRun, str] = {}
     for map_runs in group_by(all_runs, lambda run: run.map).values():
@@ -87,9 +91,9 @@ def _select_extremes(
         )
     if not roles:
         note = f"The first {max_runs} of {len(all_runs)} runs: none has a final cost."
-        return all_runs[:max_runs], note, {}
+        return _ShownRuns(all_runs[:max_runs], note, roles={})
     runs = tuple(run for run in all_runs if run in roles)[:max_runs]
-    return runs, f"{len(runs)} of {len(all_runs)} runs: {criteria}", roles
+    return _ShownRuns(runs, f"{len(runs)} of {len(all_runs)} runs: {criteria}", roles)
 
 
 def _find_extremes(result: ReportedResult, runs: Sequence[ReportedRun]) -> dict[ReportedRun, str]:

@@ -224,7 +224,7 @@ class HelpPage:
             if not view.top - columns.row_height < y < view.bottom:
                 continue
             if isinstance(cell.line, str):
-                image = render_text(cell.line.upper(), columns.text_size, theme.accent, True)
+                image = render_text(cell.line.upper(), columns.text_size, theme.accent, bold=True)
                 screen.blit(image, (round(x), round(y)))
             else:
                 _draw_command(screen, theme, columns, cell.line, (x, y))
@@ -289,7 +289,7 @@ def _fill_columns(lines: Sequence[str | Command], rows: int) -> list[_Cell]:
 def _wrap_hint(hint: str, width: float, scale: float) -> list[str]:
     """Return the lines of the hint below the title; none if it fits next to the title in a width, px."""
     size = round(_TEXT_PX * scale)
-    title_width = measure_text(_TITLE, round(_TITLE_SIZE_PX * scale), True)
+    title_width = measure_text(_TITLE, round(_TITLE_SIZE_PX * scale), bold=True)
     if title_width + _TITLE_GAP_PX * scale + measure_text(hint, size) <= width:
         return []
     return wrap_text(hint, size, width)
@@ -305,7 +305,7 @@ def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> 
     scale = columns.scale
     left = columns.box.left + round(_MARGIN_PX * scale)
     top = columns.box.top
-    title = render_text(_TITLE, round(_TITLE_SIZE_PX * scale), theme.ink, True)
+    title = render_text(_TITLE, round(_TITLE_SIZE_PX * scale), theme.ink, bold=True)
     screen.blit(title, (left, top + round(_TITLE_TOP_PX * scale)))
     for number, line in enumerate(columns.hint_lines):
         image = render_text(line, columns.text_size, theme.faint)
@@ -336,7 +336,7 @@ def _draw_command(
     """Draw the key and the title of a command in a row; `position` is the upper left corner, px."""
     size = columns.text_size
     x, y = position
-    screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
+    screen.blit(render_text(format_key(command.keys[0]), size, theme.ink, bold=True), (round(x), round(y)))
     max_width = columns.width - (_KEY_WIDTH_PX + _TITLE_GAP_PX) * columns.scale
     title = shorten_to_width(command.title.partition(":")[0], size, max_width)
     image = render_text(title, size, mix(theme.panel, theme.ink, _TITLE_STRENGTH))

@@ -40,7 +40,7 @@ class Dialogs:
         self.ui: Ui | None = None
         self.max_width: float | None = None
         self.has_key_hints = True
-        self._ignored_letter = ""
+        self._ignored_character = ""
         self._is_drawn = False
 
     @property
@@ -71,12 +71,12 @@ class Dialogs:
         """Open a dialog; it replaces the one that is open, if any."""
         self.current = dialog
         self.ui = None
-        self._ignored_letter = ""
+        self._ignored_character = ""
         self._is_drawn = False
 
-    def ignore_letter(self, letter: str) -> None:
-        """Ignore the text event of the key that opened the dialog, so that its letter is not typed there."""
-        self._ignored_letter = letter if self.is_open else ""
+    def ignore_character(self, character: str) -> None:
+        """Ignore the text event of the key that opened the dialog, so that it is not typed there."""
+        self._ignored_character = character if self.is_open else ""
 
     def close(self) -> None:
         """Cancel the dialog."""
@@ -119,8 +119,8 @@ class Dialogs:
     def _pass_event(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
         """Pass an event to the dialog or to its widgets; a click outside may close the dialog."""
         if event.type == pygame.TEXTINPUT:
-            ignored = self._ignored_letter
-            self._ignored_letter = ""
+            ignored = self._ignored_character
+            self._ignored_character = ""
             if not ignored or event.text != ignored:
                 ui.handle_event(event)
         elif event.type == pygame.KEYDOWN:
@@ -137,15 +137,15 @@ class Dialogs:
     def _handle_key(self, event: pygame.event.Event, dialog: Dialog, ui: Ui) -> None:
         """Handle a key press: Escape closes the dialog, unless an input method is composing text."""
         name = get_key_name(event)
-        self._ignored_letter = ""
+        self._ignored_character = ""
         is_composing = ui.edit is not None and bool(ui.edit.composed)
         if name == "escape" and not is_composing:
             self.close()
         elif is_composing or not dialog.handle_key(name, ui):
             ui.handle_event(event)
         if self.current is not dialog:
-            # The answer has opened another dialog, which must not receive the letter of this key.
-            self.ignore_letter(event.unicode)
+            # The answer has opened another dialog, which must not receive the character of this key.
+            self.ignore_character(event.unicode)
 
     def _create_ui(self, dialog: Dialog, theme: Theme, scale: float) -> Ui:
         dialog.has_key_hints = self.has_key_hints

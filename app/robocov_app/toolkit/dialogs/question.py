@@ -76,7 +76,7 @@ class Question(Dialog):
         ui.space(_TEXT_GAP_PX)
         texts = [answer.text for answer in self.answers]
         widths = [
-            measure_text(text, ui.px(TEXT_PX), True) / ui.scale + 2 * _BUTTON_MARGIN_PX for text in texts
+            measure_text(text, ui.px(TEXT_PX), bold=True) / ui.scale + 2 * _BUTTON_MARGIN_PX for text in texts
         ]
         free_width = max(ui.width - sum(widths) - _BUTTON_GAP_PX * len(widths), 1.0)
         ui.row(free_width, *widths, height=_BUTTON_HEIGHT_PX, gap=_BUTTON_GAP_PX, below=0)

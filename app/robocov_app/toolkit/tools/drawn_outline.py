@@ -72,7 +72,7 @@ class DrawnOutline:
         self.is_dragging = self.can_drag and len(self.points) == 1
         return len(self.points) == self.max_points
 
-    def release(self, point: Point, unsnapped: Point, reach: float, *, clicked: bool = False) -> bool:
+    def release(self, point: Point, unsnapped: Point, reach: float, *, is_click: bool = False) -> bool:
         """End a drag.
 
         Parameters
@@ -82,7 +82,7 @@ class DrawnOutline:
         reach : float, m
             Minimum length of a drag, so that a shaky click draws nothing. It does not apply to outlines of
             two points.
-        clicked : bool
+        is_click : bool
             Whether the mouse has hardly moved since the press.
 
         Returns
@@ -93,7 +93,7 @@ class DrawnOutline:
         was_dragging = self.is_dragging
         self.is_dragging = False
         # A key may have removed the first point during the drag.
-        if not was_dragging or not self.points or clicked:
+        if not was_dragging or not self.points or is_click:
             return False
         self.cursor = point
         return self.max_points == 2 or dist(self._pressed_at, unsnapped) >= reach

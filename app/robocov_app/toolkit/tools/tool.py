@@ -113,8 +113,8 @@ class Tool(Generic[ContextT, EventT]):
     def move(self, context: ContextT, event: EventT) -> None:
         """Handle a move of the pointer, with or without a button held down."""
 
-    def release(self, context: ContextT, event: EventT, *, clicked: bool) -> str | None:
-        """Handle the release of the button; `clicked` if the pointer has not moved since the press."""
+    def release(self, context: ContextT, event: EventT, *, is_click: bool) -> str | None:
+        """Handle the release of the button; `is_click` if the pointer has not moved since the press."""
         return None
 
     def finish(self, context: ContextT) -> str | None:

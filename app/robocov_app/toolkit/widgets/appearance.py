@@ -186,7 +186,7 @@ def draw_text(
     if page.surface is None or not text or not is_visible(page, rect):
         return
     pixels = page.px(size)
-    image = render_text(shorten_to_width(text, pixels, rect.width, bold), pixels, color, bold)
+    image = render_text(shorten_to_width(text, pixels, rect.width, bold=bold), pixels, color, bold=bold)
     box = image.get_rect(midleft=rect.midleft)
     if align == "center":
         box = image.get_rect(center=rect.center)

@@ -58,7 +58,7 @@ def show_label(
     draw_text(page, text, rect, color, size, bold=is_bold, align=align)
     if note:
         note_rect = rect.copy()
-        note_rect.left += measure_text(text, page.px(size), is_bold) + page.px(_NOTE_GAP_PX)
+        note_rect.left += measure_text(text, page.px(size), bold=is_bold) + page.px(_NOTE_GAP_PX)
         note_rect.width = rect.right - note_rect.left
         if measure_text(note, page.px(SMALL_TEXT_PX)) <= note_rect.width:
             draw_text(page, note, note_rect, page.theme.faint, SMALL_TEXT_PX)
@@ -88,7 +88,7 @@ def show_paragraph(
     """
     widths = (indent, 0.0) if indent else (0.0,)
     page.row(*widths, height=size + 4, gap=0, below=1)
-    for line in wrap_text(text, page.px(size), page.px(page.width - indent), bold):
+    for line in wrap_text(text, page.px(size), page.px(page.width - indent), bold=bold):
         if indent:
             page.cell()
         draw_text(page, line, page.cell(), color or page.theme.ink, size, bold=bold)

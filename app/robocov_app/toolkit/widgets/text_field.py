@@ -165,7 +165,7 @@ def _draw_edit(page: Page, screen: Surface, rect: Rect, edit: TextEdit, placehol
     # Composed text is shown at the caret and underlined, although it is not part of the text yet.
     text = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
     image = render_text(text or placeholder, size, _get_text_color(page, text))
-    # The cursor must not cover the first letter of the placeholder.
+    # The cursor must not cover the first character of the placeholder.
     text_left = left if text else left + page.px(_PLACEHOLDER_SHIFT_PX)
     screen.blit(image, image.get_rect(midleft=(text_left, rect.centery)))
     x = left + measure_text(edit.text[: edit.caret], size)

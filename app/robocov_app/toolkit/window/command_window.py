@@ -146,7 +146,7 @@ class CommandWindow(BaseWindow):
 
     # Commands
 
-    def do(self, name: str) -> None:
+    def run_command(self, name: str) -> None:
         """Run the command with this name; while the help page is open, "cancel" only closes that.
 
         Otherwise, "cancel" also removes the status message.
@@ -166,9 +166,9 @@ class CommandWindow(BaseWindow):
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window."""
-        self.do("panel")
+        self.run_command("panel")
 
-    def _do_from_page(self, name: str) -> None:
+    def _run_page_command(self, name: str) -> None:
         """Run a command that was chosen in a browser page, after closing what covers the window."""
         if name not in self.commands:
             return
@@ -178,7 +178,7 @@ class CommandWindow(BaseWindow):
                 return
         if name not in ("help", "cancel"):
             self.help_page.close()
-        self.do(name)
+        self.run_command(name)
 
     def toggle_help(self) -> None:
         """Show or hide the help page."""
@@ -208,7 +208,7 @@ class CommandWindow(BaseWindow):
         if event.type == pygame.QUIT:
             self.handle_quit()
         elif event.type == COMMAND_EVENT:
-            self._do_from_page(event.name)
+            self._run_page_command(event.name)
         elif not self.dialogs.handle_event(event):
             self._handle_below_dialogs(event)
 
@@ -264,9 +264,9 @@ class CommandWindow(BaseWindow):
         if not self.use_key(event):
             command = self.commands.take_command(event)
             if command is not None:
-                self.do(command.name)
-        # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
-        self.dialogs.ignore_letter(event.unicode)
+                self.run_command(command.name)
+        # The character of the key follows as a separate text event, which a newly opened dialog must ignore.
+        self.dialogs.ignore_character(event.unicode)
 
     # Exceptions and drawing
 

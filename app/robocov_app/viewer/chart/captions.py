@@ -80,7 +80,7 @@ def _draw_headline(canvas: Canvas, frame: ChartFrame, value: float, note: str) -
     canvas.draw_text(number, (left, middle), bold=True, size=HEADLINE_TEXT_PX)
     width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
     row = middle + _HEADLINE_NOTE_DOWN_PX * frame.scale
-    for line in wrap_text(note, canvas.scale_text_size(theme.text), width, True):
+    for line in wrap_text(note, canvas.scale_text_size(theme.text), width, bold=True):
         canvas.draw_text(line, (left, row), color=theme.error, bold=True, size=theme.text)
         row += _HEADLINE_NOTE_LINE_PX * frame.scale
 

@@ -101,7 +101,9 @@ def has_headline(layout: Layout, timeline: Timeline) -> bool:
 
 def _measure_captions(panes: Sequence[Pane], text_size: int) -> int:
     """Return the width of the widest caption, a name with its value, px."""
-    return max(measure_text(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, True) for pane in panes)
+    return max(
+        measure_text(f"{pane.controller.label}{_WIDEST_VALUE}", text_size, bold=True) for pane in panes
+    )
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, lesson: L
     x = box.left + round(_CAPTION_MARGIN_PX * scale)
     title = _CLOSING_TITLE if is_closing else f"{lesson.number + 1}  {lesson.chapter.title}"
     title_top = box.top + round(_CAPTION_TITLE_TOP_PX * scale)
-    screen.blit(render_text(title, title_size, theme.accent, True), (x, title_top))
+    screen.blit(render_text(title, title_size, theme.accent, bold=True), (x, title_top))
     for k, line in enumerate(lines):
         y = box.top + round((_CAPTION_TEXT_TOP_PX + _CAPTION_LINE_PX * k) * scale)
         screen.blit(render_text(line, text_size, theme.ink), (x, y))
@@ -340,7 +340,7 @@ class LessonPage:
 
     def _write_title(self, title: str) -> None:
         size = round(_PAGE_TITLE_PX * self.scale)
-        for line in wrap_text(title, size, self.width, True):
+        for line in wrap_text(title, size, self.width, bold=True):
             self._write(line, _PAGE_TITLE_PX, self.theme.accent, bold=True)
             self.y += _TITLE_LINE_PX * self.scale
         self.y += _TITLE_GAP_PX * self.scale
@@ -348,7 +348,7 @@ class LessonPage:
     def _write(
         self, text: str, size: float, color: Color, *, indent: float = 0.0, bold: bool = False
     ) -> None:
-        picture = render_text(text, round(size * self.scale), color, bold)
+        picture = render_text(text, round(size * self.scale), color, bold=bold)
         self.screen.blit(picture, (round(self.x + indent * self.scale), round(self.y)))
 
     def _write_paragraph(
@@ -465,7 +465,7 @@ class LessonPage:
         self._draw_dot(number, (self.x + dx * scale, self.y + dy * scale), _CHAPTER_DOT_RADIUS_PX)
         size = round(_CHAPTER_TEXT_PX * scale)
         max_width = self.width - _CHAPTER_MARGINS_PX * scale
-        title = shorten_to_width(lesson.lesson.chapters[number].title, size, max_width, is_current)
+        title = shorten_to_width(lesson.lesson.chapters[number].title, size, max_width, bold=is_current)
         color = theme.ink if is_current else theme.faint
         self._write(title, _CHAPTER_TEXT_PX, color, indent=_CHAPTER_INDENT_PX, bold=is_current)
         top = round(self.y - _CHAPTER_TOP_PX * scale)
@@ -514,5 +514,5 @@ class LessonPage:
         edge = theme.accent if is_primary else mix(theme.panel, theme.ink, _BUTTON_EDGE_STRENGTH)
         ink = get_accent_ink(theme) if is_primary else theme.ink
         draw_rounded_box(self.screen, box, fill, edge=edge, radius=round(_BUTTON_RADIUS_PX * self.scale))
-        image = render_text(label, round(_BUTTON_TEXT_PX * self.scale), ink, is_primary)
+        image = render_text(label, round(_BUTTON_TEXT_PX * self.scale), ink, bold=is_primary)
         self.screen.blit(image, image.get_rect(center=box.center))

@@ -79,7 +79,7 @@ class CardSection:
         _draw_badge(number, inner, drawing, is_focused=is_focused)
         y = picture.bottom + drawing.px(_GAP_PX)
         size = _choose_title_size(card.choice.title, inner.width, drawing.scale)
-        title = shorten_to_width(card.choice.title, drawing.px(size), inner.width, True)
+        title = shorten_to_width(card.choice.title, drawing.px(size), inner.width, bold=True)
         drawing.write(title, (inner.left, y), size, theme.ink, bold=True)
         color = mix(theme.background, theme.ink, 0.72)
         lines = wrap_text(card.text, drawing.px(_TEXT_PX), inner.width)[:_MAX_TEXT_LINES]
@@ -110,7 +110,7 @@ class CardSection:
 
 def _choose_title_size(title: str, width: float, scale: float) -> float:
     """Return the size of a title at scale 1, px: smaller if it would not fit into a width."""
-    if measure_text(title, round(_TITLE_PX * scale), True) <= width:
+    if measure_text(title, round(_TITLE_PX * scale), bold=True) <= width:
         return _TITLE_PX
     return _SMALL_TITLE_PX
 
@@ -122,5 +122,5 @@ def _draw_badge(number: int, box: Rect, drawing: StartDrawing, *, is_focused: bo
     fill = theme.accent if is_focused else mix(theme.background, theme.ink, 0.1)
     color = get_accent_ink(theme) if is_focused else theme.ink
     draw_rounded_box(drawing.screen, badge, fill, edge=fill, radius=drawing.px(_BADGE_RADIUS_PX))
-    digit = render_text(str(number), drawing.px(_LABEL_PX), color, True)
+    digit = render_text(str(number), drawing.px(_LABEL_PX), color, bold=True)
     drawing.screen.blit(digit, digit.get_rect(center=badge.center))

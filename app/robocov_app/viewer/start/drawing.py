@@ -43,7 +43,7 @@ class StartDrawing:
         self, text: str, position: tuple[float, float], size: float, color: Color, *, bold: bool = False
     ) -> None:
         """Write a text with its upper left corner at a pixel; `size` is in px at scale 1."""
-        image = render_text(text, self.px(size), color, bold)
+        image = render_text(text, self.px(size), color, bold=bold)
         self.screen.blit(image, (round(position[0]), round(position[1])))
 
     def draw_frame(self, box: Rect, *, is_focused: bool) -> None:

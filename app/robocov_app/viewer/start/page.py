@@ -235,7 +235,7 @@ class StartPage(BaseWindow):
         if command is not None:
             self._commands.run(command.name)
         # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
-        self.dialogs.ignore_letter(event.unicode)
+        self.dialogs.ignore_character(event.unicode)
 
     def _click(self, pixel: tuple[int, int]) -> None:
         item = self.focus.find_at(pixel)
@@ -347,7 +347,7 @@ def _draw_headings(drawing: StartDrawing, layout: StartLayout) -> None:
     scale = drawing.scale
     left, top = layout.title
     drawing.write(_TITLE, (left, top), _TITLE_PX, theme.ink, bold=True)
-    title_width = measure_text(_TITLE, drawing.px(_TITLE_PX), True)
+    title_width = measure_text(_TITLE, drawing.px(_TITLE_PX), bold=True)
     max_tagline_width = layout.open_button.left - left - title_width - _TAGLINE_MARGINS_PX * scale
     tagline = shorten_to_width(_TAGLINE, drawing.px(_TAGLINE_PX), max_tagline_width)
     tagline_position = (left + title_width + _TAGLINE_GAP_PX * scale, top + _TAGLINE_DROP_PX * scale)

@@ -102,7 +102,7 @@ class BrushTool(ViewerTool):
             self._cursor = (x, y)
             self._dabs.append(self._cursor)
 
-    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, is_click: bool) -> str | None:
         """End the stroke."""
         if self.is_painting:
             self.move(session, event)

@@ -134,14 +134,14 @@ class HandTool(ViewerTool):
             if index is not None:
                 self.hovered = environment.obstacles[index]
 
-    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, is_click: bool) -> str | None:
         """Let go of the held robot, or apply the drag of obstacles."""
         drag = self.drag
         if self.robot is not None:
             session.release()
         self.robot = None
         self.drag = None
-        if drag is None or clicked:
+        if drag is None or is_click:
             return None
         drag.update(event)
         if drag.is_outdated(session):

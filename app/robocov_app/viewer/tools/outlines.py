@@ -69,10 +69,10 @@ class OutlineTool(ViewerTool, ABC):
             return event.point
         return event.constrain(self.outline.points[-1])
 
-    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, is_click: bool) -> str | None:
         """Complete the obstacle if it was drawn with a single drag."""
         point = self._constrain(event)
-        is_complete = self.outline.release(point, event.unsnapped_point, event.reach, clicked=clicked)
+        is_complete = self.outline.release(point, event.unsnapped_point, event.reach, is_click=is_click)
         if not is_complete:
             return None
         self.outline.points.append(self.outline.cursor)

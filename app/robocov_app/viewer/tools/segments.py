@@ -87,10 +87,10 @@ class RulerTool(SegmentTool):
     key = "m"
     hint = "drag from one point to another"
 
-    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, is_click: bool) -> str | None:
         """Keep the measurement visible until the next press; after a click, show a hint."""
         self.segment.release()
-        if clicked:
+        if is_click:
             return "nothing measured: drag from one point to another"
         return None
 
@@ -116,7 +116,7 @@ class AddCircleTool(SegmentTool):
     key = "c"
     hint = "drag from the center to the rim"
 
-    def release(self, session: Session, event: ViewerPointerEvent, *, clicked: bool) -> str | None:
+    def release(self, session: Session, event: ViewerPointerEvent, *, is_click: bool) -> str | None:
         """Add the circle to the map."""
         center = self.segment.start
         self.segment.clear()

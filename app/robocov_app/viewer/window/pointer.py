@@ -265,7 +265,7 @@ class ViewerPointer(Pointer):
         """Pass the release of the button in a pane to the tool."""
         viewer = self._viewer
         pointer = self.build_event(event.pos, pane)
-        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, clicked=is_click))
+        viewer.attempt(lambda: viewer.tool.release(viewer.session, pointer, is_click=is_click))
 
     def _click_without_tool(self, event: pygame.event.Event) -> None:
         """Handle a click that did not pan.

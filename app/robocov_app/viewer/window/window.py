@@ -143,11 +143,11 @@ class ViewerWindow(CommandWindow):
         window_commands = list_window_commands(self.canvas, self.chart, self.share, self._build_actions())
         listed = [*list_viewer_commands(viewer, titles), *window_commands, *self.list_more_commands()]
         self.commands = CommandTable(listed, viewer.attempt, lambda: list_parameter_commands(viewer))
-        self._menus = WindowMenus(viewer, self.share, self.commands, self.dialogs, self.do)
-        self.panel = ViewerPanel(viewer, titles, self.commands, self.do)
-        self.layer_bar = LayerBar(viewer.view, self.commands, self.do)
-        self.top_bar = self.top_bar_class(viewer, self.commands, self.do)
-        self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.do)
+        self._menus = WindowMenus(viewer, self.share, self.commands, self.dialogs, self.run_command)
+        self.panel = ViewerPanel(viewer, titles, self.commands, self.run_command)
+        self.layer_bar = LayerBar(viewer.view, self.commands, self.run_command)
+        self.top_bar = self.top_bar_class(viewer, self.commands, self.run_command)
+        self.tool_rail = ToolRail(viewer.toolbox, self.commands, self.run_command)
         self.chart_focus = ChartFocus(self.chart)
         self.focus = KeyboardFocus(self._list_focus_groups)
         targets = PointerTargets(self.canvas, self.chart, self.layer_bar, self.parts)
@@ -286,7 +286,7 @@ class ViewerWindow(CommandWindow):
 
     def close_sheet(self) -> None:
         """Close the panel of a narrow window, or leave the lesson in its place."""
-        self.do("panel" if self.lesson.shown is None else "tour")
+        self.run_command("panel" if self.lesson.shown is None else "tour")
 
     def update(self, seconds: float) -> None:
         """Advance everything by a time, s."""
@@ -383,7 +383,7 @@ class ViewerWindow(CommandWindow):
         self.draw_above_map()
         self.video_recorder.add_frame(self.screen)
 
-    def do(self, name: str) -> None:
+    def run_command(self, name: str) -> None:
         """Run the command with this name, unless the lesson or the help page handles it."""
         if name == "cancel" and self.layer_bar.is_open:
             self.layer_bar.toggle_menu()
@@ -392,7 +392,7 @@ class ViewerWindow(CommandWindow):
         is_for_window = closes_help or name in COMMANDS_OF_SHARE_MENU
         if not is_for_window and self.lesson.handle_command(name):
             return
-        super().do(name)
+        super().run_command(name)
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")

@@ -120,9 +120,9 @@ class ImportPreview:
         text_size = round(SMALL_TEXT_PX * scale)
         x = round(camera.view[0])
         y = round(camera.view[1] - CAPTION_HEIGHT_PX * scale)
-        screen.blit(render_text(caption.title, title_size, theme.ink, True), (x, y))
+        screen.blit(render_text(caption.title, title_size, theme.ink, bold=True), (x, y))
         if caption.mark:
-            left = x + measure_text(caption.title, title_size, True) + round(10 * scale)
+            left = x + measure_text(caption.title, title_size, bold=True) + round(10 * scale)
             square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
             pygame.draw.rect(screen, caption.mark_color, square)
             mark = render_text(caption.mark, text_size, theme.ink)

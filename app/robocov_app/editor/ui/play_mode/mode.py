@@ -106,7 +106,7 @@ class PlayMode:
         if window.returns_to_editor:
             host.draw()
         else:
-            host.do("quit")
+            host.run_command("quit")
 
     def _adopt_changes(self, window: PlayWindow) -> None:
         """Apply the theme of the viewer, and its changes of obstacles unless it has opened another map."""

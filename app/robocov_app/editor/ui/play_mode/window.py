@@ -99,7 +99,7 @@ class PlayWindow(ViewerWindow):
         if not self.viewer.files.has_left_edited_map:
             self.drafts.save(self.viewer.session.displayed.environment, force=force)
 
-    def do(self, name: str) -> None:
+    def run_command(self, name: str) -> None:
         """Run a command; Escape returns to the editor if there is nothing to cancel."""
         is_open = self.help_page.is_open or self.dialogs.is_open or self.lesson.player is not None
         viewer = self.viewer
@@ -108,7 +108,7 @@ class PlayWindow(ViewerWindow):
         if name == "cancel" and is_idle:
             self.returns_to_editor = not drag_tool.cancel(viewer.session)
         else:
-            super().do(name)
+            super().run_command(name)
 
 
 def open_play_window(

@@ -150,12 +150,12 @@ def _choose_boundary(
     selection: PartSelection,
     conversion: Conversion,
 ) -> Polygon | None:
-    """Return the boundary around the parts that stay, or None if their outline is the boundary.
+    """Return the boundary around the parts that are kept, or None if their outline is the boundary.
 
     A boundary is used only if the free space reaches it. If walls separate all of the free space from it, the
     area behind the walls is not part of the map: it would make the known region larger than the area that
     robots can cover, and would attract them to the walls. The boundary is then the inner edge of the walls,
-    in all formats. A boundary that the file or the user names is an exception: it stays, unless the user
+    in all formats. A boundary that the file or the user names is an exception: it is kept, unless the user
     chooses another part of the free space.
     """
     foreign = conversion.foreign
@@ -167,8 +167,8 @@ def _choose_boundary(
         return None
     outer: Polygon = around[0]
     is_chosen = shaping.inside is not None or (foreign.robots != () and shaping.keep == "largest")
-    stays = foreign.has_named_boundary and not (is_chosen or selection.is_enclosed)
-    if len(parts) == 1 and not stays and outer.contains_properly(parts[0]):
+    is_kept = foreign.has_named_boundary and not (is_chosen or selection.is_enclosed)
+    if len(parts) == 1 and not is_kept and outer.contains_properly(parts[0]):
         conversion.notes.insert(0, "the boundary is the inner edge of the walls around the free space")
         return None
     if foreign.boundary_source:

@@ -20,7 +20,7 @@ _TINY_AREA_M2 = 0.01
 _MANY_TINY_OBSTACLES = 10
 """This many obstacles smaller than `_TINY_AREA_M2` are probably noise, and the report says so."""
 _MIN_KEPT_SHARE = 0.5
-"""If a smaller share of the free area stays, the report offers other parts."""
+"""If a smaller share of the free area is kept, the report offers other parts."""
 _LARGE_PART_SHARE = 0.1
 """If a dropped part is a larger share of the free area, the report offers it, too."""
 _MAX_OFFERED_PARTS = 3
@@ -45,7 +45,7 @@ class PartSelection(NamedTuple):
     offered_positions : tuple of (x, y), m
         A position in each large part that was dropped, for the option ``inside``.
     is_enclosed : bool
-        Whether an enclosed part stays because the largest part is the paper around a plan.
+        Whether an enclosed part is kept because the largest part is the paper around a plan.
     """
 
     parts: list[Polygon]
@@ -76,9 +76,9 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
     is_enclosed = False
     if conversion.shaping.keep == "all":
         min_area = max(conversion.min_obstacle_area, min(MAX_CRUMB_M2, area[0]))
-        stays = area >= min_area
+        is_kept = area >= min_area
     elif conversion.shaping.inside is not None:
-        stays = np.arange(len(parts)) == _find_part_at(
+        is_kept = np.arange(len(parts)) == _find_part_at(
             conversion.shaping.inside, parts, conversion.source_name
         )
     else:
@@ -86,13 +86,13 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
         is_enclosed = index is not None
         if index is None:
             index = _find_main_part(parts, conversion)
-        stays = np.arange(len(parts)) == index
-    kept: list[Polygon] = parts[stays].tolist()
+        is_kept = np.arange(len(parts)) == index
+    kept: list[Polygon] = parts[is_kept].tolist()
     if not kept:
         largest = f"no part of the free space is larger than {area[0]:.3g} m²"
         min_size = f"{conversion.min_obstacle_area:g} m²"
         raise MapError(f"{conversion.source_name}: {largest}, expected one of at least {min_size}")
-    offered_positions = _report_dropped_parts(parts, stays, conversion)
+    offered_positions = _report_dropped_parts(parts, is_kept, conversion)
     if len(kept) > 1:
         conversion.notes.append(
             f"the free space consists of {len(kept)} separate parts: robots cannot pass between them"
@@ -118,10 +118,10 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
         area = shapely.area(holes)
         specks += holes[(area < min_area) & (area >= max_crumb)].tolist()
         crumbs += holes[area < max_crumb].tolist()
-        stays = area >= max(max_crumb, min_area)
-        tiny_count += int(np.count_nonzero(stays & (area < _TINY_AREA_M2)))
-        rings = shapely.get_exterior_ring(holes[stays]).tolist()
-        if stays.all():
+        is_kept = area >= max(max_crumb, min_area)
+        tiny_count += int(np.count_nonzero(is_kept & (area < _TINY_AREA_M2)))
+        rings = shapely.get_exterior_ring(holes[is_kept]).tolist()
+        if is_kept.all():
             result.append(part)
         else:
             result.append(Polygon(part.exterior, rings))
@@ -207,10 +207,10 @@ def _find_enclosed_part(parts: NDArray[np.object_], conversion: Conversion) -> i
 
 
 def _report_dropped_parts(
-    parts: NDArray[np.object_], stays: BoolArray, conversion: Conversion
+    parts: NDArray[np.object_], is_kept: BoolArray, conversion: Conversion
 ) -> tuple[tuple[float, float], ...]:
     """Report the parts that were dropped; return a position in each one that the report offers."""
-    dropped: list[Polygon] = parts[~stays].tolist()
+    dropped: list[Polygon] = parts[~is_kept].tolist()
     if not dropped:
         return ()
     largest = ""
@@ -219,7 +219,7 @@ def _report_dropped_parts(
     count = format_count(len(dropped), "separate part")
     conversion.dropped.append(f"{count} of the free space, {_format_total_area(dropped)}{largest}")
     area = shapely.area(parts)
-    share = area[stays].sum() / area.sum()
+    share = area[is_kept].sum() / area.sum()
     if share >= _MIN_KEPT_SHARE and dropped[0].area / area.sum() <= _LARGE_PART_SHARE:
         return ()
     min_area = _MIN_OFFERED_SHARE * dropped[0].area
@@ -231,8 +231,8 @@ def _report_dropped_parts(
     ]
     only = "only " if share < _MIN_KEPT_SHARE else ""
     conversion.notes.append(
-        f"{only}{100 * share:.2g}% of the free area stays: {' or '.join(choices)} keeps another part, "
-        "--keep all every part"
+        f"{only}{100 * share:.2g}% of the free area is kept: {' or '.join(choices)} keeps another part, "
+        "--keep all keeps every part"
     )
     return positions
 

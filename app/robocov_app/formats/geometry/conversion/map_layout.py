@@ -139,7 +139,7 @@ def build_boundary(
     if margin > 0.0:
         boundary = fill_holes(boundary.buffer(margin, join_style="mitre", mitre_limit=2.0))
     boundary = fill_holes(round_polygons(boundary, digits))
-    if not shapely.covers(boundary, free):  # A hair of the free space was rounded away.
+    if not shapely.covers(boundary, free):  # A sliver of the free space was rounded away.
         boundary = fill_holes(round_polygons(shapely.union(boundary, free), digits))
     return boundary, list_polygons(round_polygons(shapely.difference(boundary, free), digits))
 

@@ -13,7 +13,7 @@ from robocov.errors import MapError
 from robocov.mapfile.models import MAX_COORDINATE_M, MIN_SIZE_M
 from robocov.typing import FloatArray
 from robocov_app.formats import files
-from robocov_app.formats.colors import UNPAINTED, ColorKey, Paint, count_colors, name_color
+from robocov_app.formats.colors import UNPAINTED, ColorKey, Paint, describe_color_counts, name_color
 from robocov_app.formats.foreign_map import ForeignMap, Painted
 from robocov_app.formats.geometry.crossings import CrossingCounter
 from robocov_app.formats.geometry.shapes.boundary_search import find_surrounding
@@ -376,10 +376,10 @@ def note_colors(shapes: Shapes, key: ColorKey) -> None:
         declared = [color for color, its_role in key.entries if its_role == role]
         matches = [shape for shape in painted if shape.role == role]
         if matches:
-            counts = count_colors(shape.color for shape in matches)
+            counts = describe_color_counts(shape.color for shape in matches)
             shapes.notes.append(f"painted as {role}: {counts} (--{role}-color)")
         elif declared:
-            known = count_colors(shape.color for shape in painted)
+            known = describe_color_counts(shape.color for shape in painted)
             others = f"; there are {known}" if known else ""
             names = ", ".join(map(name_color, declared))
             shapes.notes.append(f"nothing is painted {names} (--{role}-color){others}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
-from robocov_app.formats.colors import WHITE, count_colors
+from robocov_app.formats.colors import WHITE, describe_color_counts
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport, get_outlines
 from robocov_app.formats.geometry.shapes.drawn_shapes import ClosedOutline
@@ -194,9 +194,9 @@ def _report_pale(
     pale = [outline.color for outline in rest if is_pale(outline.color)]
     pale += [line.color for line in drawing.lines if line.role is None and is_pale(line.color)]
     if floors.outlines:
-        counts = count_colors(outline.color for outline in floors.outlines)
+        counts = describe_color_counts(outline.color for outline in floors.outlines)
         hint = "(--solid-color: as obstacles)"
         report.notes.append(f"pale fills treated as floor: {counts} {floors.reason} {hint}")
     if pale:
-        counts = count_colors(pale)
+        counts = describe_color_counts(pale)
         report.notes.append(f"pale paint treated as solid: {counts} (--free-color: as free space)")

@@ -26,6 +26,7 @@ If walls separate the free space from the boundary, the map ends at the walls: s
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 import shapely
@@ -221,8 +222,9 @@ def _find_obstacles(
     walls = [line for line in (*lines, *edges) if line.role != "free"]
     blocks = np.array([outline.area for outline in outlines], dtype=object)
     shapely.prepare(region)
+    # An outline that covers the whole region is a frame around the map, not an obstacle in it.
     is_frame = shapely.covered_by(region, blocks)
-    layers = [outline.paint_layer for outline, frames in zip(outlines, is_frame, strict=True) if not frames]
+    layers = [outline.paint_layer for outline in compress(outlines, ~is_frame)]
     layers += [line.paint_layer for line in walls]
     # Nothing is painted over pillars, so their order is infinite.
     layers += [PaintLayer(pillar.polygon, np.inf) for pillar in drawing.pillars]

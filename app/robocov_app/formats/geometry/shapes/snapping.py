@@ -176,7 +176,7 @@ def _find_gaps(parts: FloatArray, tolerance: float) -> _Gaps:
     is_long = shapely.length(walls) > _MIN_LENGTH * tolerance
     # Parts that touch have no gap between them.
     is_open = widths[1] > 0.0
-    # What lies between parts that are not parallel is a wall in the form of a wedge.
+    # Between parts that are not parallel, there is a wedge-shaped wall instead of a gap.
     is_even = np.ptp(widths, axis=0) <= _MAX_WIDENING * tolerance
     is_gap = is_long & is_open & is_even
     surroundings = shapely.intersection(reach[first[is_gap]], reach[second[is_gap]])

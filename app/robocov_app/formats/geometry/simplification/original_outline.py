@@ -29,6 +29,10 @@ _MIN_THIN_LENGTH = 2.5
 """Minimum length of a thin part, in tolerances; shorter ones are bumps."""
 _MIN_THIN_WIDTH = 0.01
 """Minimum width of a thin part, in tolerances; narrower ones are rounding errors."""
+_REACH_M = 1e-9
+"""Maximum distance of a thin part from its vertices: the rounding errors of the morphological operations."""
+_REACH_NECKS = 1.5
+"""The same distance in outlines of cells, relative to the side of a neck, because corners replace necks."""
 _MAX_THIN_VERTICES = 80_000
 """Maximum number of vertices for which thin parts are searched, because the search takes long."""
 
@@ -103,13 +107,13 @@ class OriginalOutline(RingVertices):
             path = replace_stairs(self, self.cell, tolerance)
         allowed = tolerance[path.vertex]
         is_midpoint = path.source != path.vertex
-        stays = is_fixed[path.vertex] | (is_midpoint & is_fixed[self.after[path.vertex]])
-        stays |= path.find_extremes() | (allowed == 0.0)
-        stays |= np.arange(len(allowed)) % _MAX_LINE_VERTICES == 0
+        is_kept = is_fixed[path.vertex] | (is_midpoint & is_fixed[self.after[path.vertex]])
+        is_kept |= path.find_extremes() | (allowed == 0.0)
+        is_kept |= np.arange(len(allowed)) % _MAX_LINE_VERTICES == 0
         # Small rings get a smaller tolerance, because they have few corners to lose.
         min_tolerance = 0.0 if self.cell is None else _MIN_TOLERANCE_CELLS * self.cell
         max_tolerance = np.maximum(np.sqrt(np.abs(self.areas)) / _FULL_TOLERANCE_SIZE, min_tolerance)
-        kept, starts = path.simplify(allowed, stays, max_tolerance)
+        kept, starts = path.simplify(allowed, is_kept, max_tolerance)
         simplified = RingVertices(path.points[kept], starts, path.source[kept])
         if self.cell is None:
             return simplified
@@ -200,12 +204,15 @@ class OriginalOutline(RingVertices):
         closed = buffer_with_mitres(buffer_with_mitres(free, radius), -radius)
         opened = buffer_with_mitres(buffer_with_mitres(free, -radius), radius)
         thin = [shapely.difference(closed, free), shapely.difference(free, opened)]
+        # Twice, because a difference may be a collection that contains multipolygons.
         pieces = shapely.get_parts(shapely.get_parts(thin))
         x, y, right, top = shapely.bounds(pieces).T
         is_long = np.maximum(right - x, top - y) > _MIN_THIN_LENGTH * tolerance
         is_rounding = shapely.area(pieces) < _MIN_THIN_WIDTH * tolerance * shapely.length(pieces)
         pieces = pieces[is_long & ~is_rounding]
-        reach = 1e-9 if self.cell is None else 1.5 * NECK * self.cell
+        reach = _REACH_M
+        if self.cell is not None:
+            reach = _REACH_NECKS * NECK * self.cell
         part, vertex = STRtree(shapely.points(self.points)).query(pieces, "dwithin", distance=reach)
         return ThinParts(np.asarray(shapely.area(pieces)), vertex, part)
 

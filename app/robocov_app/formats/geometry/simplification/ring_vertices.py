@@ -134,7 +134,7 @@ class RingVertices:
         step = concatenate_ranges(np.zeros_like(size), size + 1)
         vertex = self.starts[ring] + (first[ring] - self.starts[ring] + step) % size[ring]
         is_inner = is_fixed[vertex] & (step > 0) & (step < size[ring])
-        # A fixed vertex ends one line and starts the next, so it occurs twice.
+        # A fixed vertex ends one line and starts the next. It occurs twice, first in the line that it ends.
         doubled = np.arange(len(vertex)).repeat(1 + is_inner)
         line = (np.cumsum(is_inner | (step == 0)) - 1)[doubled]
         line[:-1] -= doubled[:-1] == doubled[1:]

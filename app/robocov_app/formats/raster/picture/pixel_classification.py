@@ -85,9 +85,10 @@ def _describe_roles(roles: NDArray[np.uint8], options: ReadOptions) -> list[str]
 def _free_soft_edges(
     cells: Cells, picture: Brightness, roles: NDArray[np.uint8], options: ReadOptions
 ) -> None:
-    """Make the soft edges between light paint and a dark color declared free or ignored free.
+    """Free the blocked cells of soft edges around a dark color that is declared free or ignored.
 
-    Soft edges have mixed colors without a role; they would become walls around the declared color.
+    The edges between light paint and such a color have mixed colors without a role. They would become walls
+    around the declared color.
     """
     # Brightness from 0 to 1.
     declared = [
@@ -125,8 +126,8 @@ def _fill_from_around(cells: Cells, ignored: BoolArray) -> None:
         cells[top : top + STRIP_ROWS][inner] = original[low:high][row, column]
 
 
-def is_on_transparent_ground(cells: Cells) -> bool:
-    """Return whether a picture is mostly transparent, with dark paint and nothing light but soft edges."""
+def has_transparent_background(cells: Cells) -> bool:
+    """Return whether a picture is mostly transparent, with dark paint and hardly any light pixels."""
     counts = np.bincount(cells.ravel(), minlength=3)
     return bool(counts[FREE] < _MAX_LIGHT_RATIO * counts[BLOCKED] and counts[UNKNOWN] > counts[BLOCKED] > 0)
 

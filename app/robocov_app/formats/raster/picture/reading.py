@@ -24,7 +24,7 @@ from robocov_app.formats.raster.picture.pixel_classification import (
     classify_pixels,
     describe_doubts,
     drop_strokes,
-    is_on_transparent_ground,
+    has_transparent_background,
     require_free_cells,
 )
 
@@ -60,7 +60,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{source_name}: an image has no scale, {_describe_missing_scale(path)}")
     cells, notes = classify_pixels(picture, options)
     unknown = options.unknown or "obstacle"
-    if options.unknown is None and is_on_transparent_ground(cells):
+    if options.unknown is None and has_transparent_background(cells):
         unknown = "free"
         notes.append("only dark paint on a transparent ground, so transparent pixels are free")
     dropped: tuple[str, ...] = ()

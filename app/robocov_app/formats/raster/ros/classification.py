@@ -81,7 +81,7 @@ def classify_trinary(picture: Brightness, *, negate: bool, free: float, occupied
         color_sums = np.rint(np.arange(max_level + 1) * (3 * 255 / max_level)).astype(np.uint16)
         level = color_sums[level] + picture.alpha.astype(np.uint16)
         max_level = 4 * 255
-    darkness = _compute_darkness(max_level, negate)
+    darkness = _compute_darkness(max_level, negate=negate)
     table = np.full(max_level + 1, UNKNOWN, np.uint8)
     table[darkness < free] = FREE
     table[darkness > occupied] = BLOCKED
@@ -104,7 +104,7 @@ def classify_scale(
     -------
     (rows, columns) array of uint8
     """
-    darkness = _compute_darkness(picture.max_level, negate)
+    darkness = _compute_darkness(picture.max_level, negate=negate)
     occupancy = np.rint((darkness - free) / max(occupied - free, 1e-9) * 100.0)
     occupancy[darkness < free] = 0.0
     occupancy[darkness > occupied] = 100.0
@@ -122,7 +122,7 @@ def classify_raw(picture: Brightness, threshold: float) -> Cells:
     return table[picture.level]
 
 
-def _compute_darkness(max_level: int, negate: bool) -> FloatArray:
+def _compute_darkness(max_level: int, *, negate: bool) -> FloatArray:
     """Return the darkness, from 0 to 1, of each level from 0 to `max_level`."""
     shade = np.arange(max_level + 1) / max_level
     return shade if negate else 1.0 - shade

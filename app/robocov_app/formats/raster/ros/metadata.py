@@ -128,16 +128,16 @@ class _MetadataParser:
 
     def parse_origin(self) -> tuple[float, float, float]:
         """Return the pose of the lower left corner: x and y in m, and the yaw in rad."""
-        place = f"{self._source_name}: origin"
+        location = f"{self._source_name}: origin"
         origin = self._document.get("origin", ["0", "0", "0"])
         if not isinstance(origin, list) or not 2 <= len(origin) <= 3:
-            raise MapError(f"{place}: expected [x, y, yaw], got {quote(origin)}")
+            raise MapError(f"{location}: expected [x, y, yaw], got {quote(origin)}")
         texts = [*origin, "0"]  # the yaw may be missing
-        x = _parse_number(texts[0], f"{place}[0]")
-        y = _parse_number(texts[1], f"{place}[1]")
-        yaw = _parse_number(texts[2], f"{place}[2]")
-        files.require_coordinate(x, f"{place}[0]")
-        files.require_coordinate(y, f"{place}[1]")
+        x = _parse_number(texts[0], f"{location}[0]")
+        y = _parse_number(texts[1], f"{location}[1]")
+        yaw = _parse_number(texts[2], f"{location}[2]")
+        files.require_coordinate(x, f"{location}[0]")
+        files.require_coordinate(y, f"{location}[1]")
         return x, y, yaw
 
     def parse_negate(self) -> bool:

@@ -101,7 +101,7 @@ def _describe_yaw(yaw_in_file: float, yaw: float) -> list[str]:
     """Return a note if the map is rotated; `yaw` is that in the file reduced to half a turn, rad."""
     if yaw == 0.0:
         return []
-    note = f"origin: turned by {math.degrees(yaw):.4g} degrees about the lower left corner"
+    note = f"origin: rotated by {math.degrees(yaw):.4g} degrees about the lower left corner"
     if abs(yaw_in_file) > 2 * math.pi:
         radians = math.radians(yaw_in_file)
         note += f", as its yaw is {yaw_in_file:g} rad; if it was meant in degrees, write {radians:.6g}"

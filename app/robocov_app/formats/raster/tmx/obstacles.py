@@ -179,14 +179,16 @@ class ObstacleReader:
             if shape.kind and any(is_robot_name(name) for name in names):
                 x, y = self._frame.to_meters(shape.points.mean(axis=0)).tolist()
                 self._shapes.robots.append((x, y))
-            elif self._is_solid(element, labels, folded_labels, are_all_solid or layer.is_solid):
+            elif self._is_solid(
+                element, labels, folded_labels, is_layer_solid=are_all_solid or layer.is_solid
+            ):
                 self._add_shape(element, shape, labels)
             else:
                 reason = "that is not solid by name or property (--only NAME selects it)"
                 self._shapes.count_omission("object", reason)
 
     def _is_solid(
-        self, element: Element, labels: tuple[str, ...], folded_labels: set[str], is_layer_solid: bool
+        self, element: Element, labels: tuple[str, ...], folded_labels: set[str], *, is_layer_solid: bool
     ) -> bool:
         """Return whether an object is an obstacle; `folded_labels` are its labels in lower case."""
         only = self._shapes.labels.only

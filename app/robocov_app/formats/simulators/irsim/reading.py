@@ -131,11 +131,11 @@ class _GroupReader:
         for k in range(number):
             name = _get_item(names, k).get_text() if names else ""
             labels = tuple(label for label in (name, group["group_name"].get_text()) if label)
-            x, y, turn = _get_item(states, k)[:3]
+            x, y, angle = _get_item(states, k)[:3]
             if kind == "robot":
                 self._shapes.robots.append((float(x), float(y)))
             elif self._shapes.accept(labels):
-                self._add_obstacle(group, k, build_frame(x, y, turn), labels)
+                self._add_obstacle(group, k, build_frame(x, y, angle), labels)
 
     def describe_moving(self) -> list[str]:
         """Return a note about obstacles that move in IR-SIM, if there are any."""

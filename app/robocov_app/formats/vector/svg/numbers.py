@@ -3,7 +3,7 @@
 import re
 
 # Possessive quantifiers (++, *+) never backtrack, which would take forever with a million digits before an
-# invalid letter.
+# invalid character.
 DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
 NUMBER = re.compile(rf"[\s,]*+({DECIMAL})", re.ASCII)
 MAX_NUMBER = 1e30
