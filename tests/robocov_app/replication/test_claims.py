@@ -499,5 +499,5 @@ def test_the_summary_counts_verdicts():
     undecided = build_claim(1.0, 0.9, 1.1)
     assert summarize_verdicts([holds, holds, undecided]) == "Of 3 claims, 2 hold, 1 is undecided."
     assert summarize_verdicts([holds, fails, undecided, undecided]) == (
-        "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
+        "Of 4 claims, 1 holds, 1 does not hold, 2 are undecided."
     )
