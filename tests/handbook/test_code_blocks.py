@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -52,12 +51,10 @@ REPLACEMENTS = {
 
 @pytest.fixture(autouse=True)
 def working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder, sweeps in this process, and quick tracks of the benchmark with one map."""
+    """An empty working folder, sweeps in this process, and quick runs of the benchmark on one map."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", DirectExecutor)
-    for name in suite.QUICK_TRACKS:
-        track = replace(suite.TRACKS[name], maps=suite.TRACKS[name].maps[:1])
-        monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
+    monkeypatch.setattr(suite, "_select_one_per_family", lambda maps: maps[:1])
     return tmp_path
 
 
