@@ -23,7 +23,7 @@ from robocov_app.benchmark.label_placement import (
     place_labels,
 )
 from robocov_app.benchmark.ratings import Rating, shorten
-from robocov_app.benchmark.results import describe_method, shares_maps_by_messages
+from robocov_app.benchmark.results import describe_method, get_results_version, shares_maps_by_messages
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import style_axes, to_plot_color
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
@@ -33,6 +33,7 @@ from robocov_app.report.document import load_template
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.tables.table import PageTable
 from robocov_app.report.theme_css import build_theme_rules
+from robocov_app.sweep.worker import list_result_versions
 
 
 class Quantity(NamedTuple):
@@ -78,7 +79,9 @@ _MIN_RATIO = 1.01
 _MIN_LOG_RATIO = 8.0
 """Minimum ratio of the largest value to the smallest for a logarithmic axis."""
 _MAX_RATIO_TO_MEDIAN = 1e4
-"""Maximum ratio of a plotted value to the median of all entries."""
+"""Maximum ratio of a plotted value to the median of the bundled entries, or of all without bundled ones."""
+_MIN_MEDIAN_GAP = 1.0
+"""Minimum median of the gaps for this ratio, %."""
 MAX_INCOMPLETE_TABLES = 10
 """Maximum number of incomplete entries on each track that are compared with the yardsticks."""
 MAX_PLOTTED_ENTRIES = 40
@@ -100,6 +103,8 @@ class ParetoPoint(NamedTuple):
     """Median gap, %."""
     is_rival: bool
     """Whether the controller competes, which means that it does not know the whole map."""
+    is_bundled: bool = False
+    """Whether the result is part of robocov, and not from a file."""
 
 
 class ParetoPlot(NamedTuple):
@@ -173,7 +178,8 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         style=build_theme_rules(":root") + replay.read_asset("report.css"),
         marks=MARKER_PATHS,
         styles=entries.styles,
-        overviews=_build_overviews(labels, tracks, entries.information),
+        overviews=_build_overviews(labels, tracks, entries),
+        other_versions=_list_other_versions(results, labels),
         file_mark="" if all(result["is_bundled"] for result in results) else ratings.FILE_MARK,
         anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
@@ -182,6 +188,17 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         entries=_build_entries_table(labeled_results),
     )
     return escape_controls(page)
+
+
+def _list_other_versions(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> list[str]:
+    """Return the labels of the results that were made with another version, and cannot be compared."""
+    current_version = get_results_version(list_result_versions())
+    others = []
+    for result, label in zip(results, labels, strict=True):
+        version = get_results_version(result["versions"])
+        if version is not None and version != current_version:
+            others.append(label)
+    return others
 
 
 def _find_yardsticks(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> list[str]:
@@ -209,7 +226,7 @@ def _build_sort_key(rating: Rating) -> tuple[bool, float]:
 
 
 def _build_overviews(
-    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], information: Mapping[str, str]
+    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], entries: _Entries
 ) -> list[tuple[str, str, PageTable]]:
     """Build the identifier, heading and table of each ranking for which there are runs.
 
@@ -219,15 +236,15 @@ def _build_overviews(
     for ranking, heading in suite.RANKINGS.items():
         ranked_tracks = {name: tracks[name] for name in suite.RANKED_TRACKS[ranking] if name in tracks}
         if ranked_tracks:
-            overview = _build_overview(labels, ranked_tracks, information)
+            overview = _build_overview(labels, ranked_tracks, entries)
             overviews.append((f"overview-{ranking}", heading, overview))
     if not overviews:
-        overviews.append(("overview-other", "Overview", _build_overview(labels, tracks, information)))
+        overviews.append(("overview-other", "Overview", _build_overview(labels, tracks, entries)))
     return overviews
 
 
 def _build_overview(
-    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], information: Mapping[str, str]
+    labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]], entries: _Entries
 ) -> PageTable:
     """Build the table of scores and gaps on some tracks.
 
@@ -244,19 +261,21 @@ def _build_overview(
     ranked = sorted(scores, key=lambda label: -scores[label])
     not_ranked = [label for label in labels if label not in scores and by_label[label]]
     not_ranked.sort(key=str.casefold)
+    # Results from files change no rank of bundled ones.
+    compared_scores = [scores[label] for label in ranked if label in entries.bundled] or list(scores.values())
     rows = []
     for label in [*ranked, *not_ranked]:
         rank = score = ratings.NO_VALUE
         if label in scores:
-            rank = str(_compute_rank(scores[label], scores.values()))
+            rank = str(_compute_rank(scores[label], compared_scores))
             margin = ratings.format_number(100.0 * mean_scores[label].margin, ".1f")
             score = f"{100.0 * scores[label]:.1f} ± {margin}"
         cells = _build_overview_cells(by_label[label], tracks)
-        rows.append((label, information[label], rank, score, *cells))
+        rows.append((label, entries.information[label], rank, score, *cells))
     headings = [suite.format_heading(name) for name in tracks]
     head = ("Controller", "Knows", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
     notes = []
-    competing = [label for label in labels if information[label] != _WHOLE_MAP]
+    competing = [label for label in labels if entries.information[label] != _WHOLE_MAP]
     leaders = _find_unranked_leaders({label: by_label[label] for label in competing}, scores, tracks)
     if leaders:
         notes.append(
@@ -272,7 +291,7 @@ def _build_overview(
 
 
 def _compute_rank(score: float, scores: Iterable[float]) -> int:
-    """Return the rank of a score. Equal scores have the same rank."""
+    """Return the rank of a score among others. Equal scores have the same rank."""
     return 1 + sum(other > score for other in scores)
 
 
@@ -409,10 +428,12 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
                 x=quantity.compute(rating),
                 gap=100.0 * rating.gap.estimate,
                 is_rival=entries.information[rating.label] != _WHOLE_MAP,
+                is_bundled=rating.label in entries.bundled,
             )
             if np.isfinite((point.x, point.gap)).all():
                 points.append(point)
-        points = _select_points(points)
+        points, outliers = _split_outliers(points)
+        points = _select_points_for_log_axis(points)
         values = [point.x for point in points]
         if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
             continue
@@ -421,15 +442,32 @@ def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) 
         drawn, omitted = thin_out_equal_values(points)
         figure = draw_pareto_figure(drawn, quantity.axis_label)
         svg = inline_svg(figure, f"{name}-{key}", description)
-        note = ""
-        if omitted:
-            labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
-            note = (
-                f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
-                f"gap: {labels}."
-            )
+        note = _describe_omitted_points(omitted, outliers)
         plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
     return plots
+
+
+def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[ParetoPoint]) -> str:
+    """Return sentences about points that a plot does not contain; empty if there are none.
+
+    Parameters
+    ----------
+    omitted : sequence of ParetoPoint
+        Points with the same value as better ones.
+    outliers : sequence of ParetoPoint
+        Points far from all others.
+    """
+    sentences = []
+    if omitted:
+        labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
+        sentences.append(
+            f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
+            f"gap: {labels}."
+        )
+    if outliers:
+        labels = "; ".join(point.label for point in outliers)
+        sentences.append(f"Not drawn, because they are far from all others: {labels}.")
+    return " ".join(sentences)
 
 
 def _shorten_plot_label(label: str, *, is_bundled: bool) -> str:
@@ -472,18 +510,33 @@ def thin_out_equal_values(
     return [point for point in points if point not in omitted], omitted
 
 
-def _select_points(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
-    """Return the points without extreme values, which would hide the differences between the others.
+def _split_outliers(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
+    """Split points into those to draw and outliers, next to which no others could be told apart.
 
-    Points at 0 are left out as well if the others need a logarithmic axis.
+    Bundled results determine what is typical, so that no file can make them outliers.
     """
-    median = np.median([point.x for point in points]) if points else 0.0
-    selected = [point for point in points if point.x <= _MAX_RATIO_TO_MEDIAN * median]
-    positive = [point for point in selected if point.x > 0.0]
+    typical = [point for point in points if point.is_bundled] or points
+    if not typical:
+        return [], []
+    median = float(np.median([point.x for point in typical]))
+    median_gap = max(_MIN_MEDIAN_GAP, float(np.median([point.gap for point in typical])))
+    drawn: list[ParetoPoint] = []
+    outliers: list[ParetoPoint] = []
+    for point in points:
+        is_small = 0.0 < point.x < median / _MAX_RATIO_TO_MEDIAN
+        is_large = point.x > median * _MAX_RATIO_TO_MEDIAN or point.gap > median_gap * _MAX_RATIO_TO_MEDIAN
+        group = outliers if is_small or is_large else drawn
+        group.append(point)
+    return drawn, outliers
+
+
+def _select_points_for_log_axis(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
+    """Return the points without those at 0 if the others need a logarithmic axis."""
+    positive = [point for point in points if point.x > 0.0]
     values = [point.x for point in positive]
     if values and max(values) > _MIN_LOG_RATIO * min(values):
         return positive
-    return selected
+    return list(points)
 
 
 @plain_style()

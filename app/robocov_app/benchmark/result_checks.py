@@ -187,23 +187,30 @@ def check_row(row: Any, location: str) -> None:
 
 
 def check_sent_bytes(row: Row, information: str, location: str) -> None:
-    """Raise InputError if robots send messages that the information of their controller excludes.
+    """Raise InputError if robots do not send their positions, or send messages that they must not send.
 
     Parameters
     ----------
     row : dict
         Row of a run, as checked by `check_row`.
     information : str
-        Information that the controller declares.
+        Information that the controller declares. It excludes messages if it is "own".
     location : str
         Place of the row, for the message.
     """
-    if "error" in row or information != "own":
+    if "error" in row:
         return
     track = suite.TRACKS[row["track"]]
     message_rate = track.changes.get("conditions", {}).get("message_rate", 1.0 / DEFAULT_DT_S)
-    position_bytes = POSITION_BYTES * track.robots * message_rate * track.duration
-    if row["sent_bytes"] > position_bytes * (1.0 + _ROUNDING):
+    bytes_per_robot = POSITION_BYTES * message_rate * track.duration
+    min_bytes = track.survivors * bytes_per_robot
+    if row["sent_bytes"] < min_bytes * (1.0 - _ROUNDING):
+        raise InputError(
+            f"{location}: sent_bytes: expected at least {format_bound(min_bytes)} for positions, "
+            f"got {row['sent_bytes']}"
+        )
+    position_bytes = track.robots * bytes_per_robot
+    if information == "own" and row["sent_bytes"] > position_bytes * (1.0 + _ROUNDING):
         raise InputError(
             f"{location}: sent_bytes: expected at most {format_bound(position_bytes)} for positions, "
             f"got {row['sent_bytes']}. A controller whose robots send messages must declare "

@@ -169,8 +169,25 @@ def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
     entry = result["entry"]
     if entry["information"] != "shared map" or entry["source_sha256"]:
         return True
-    version = RESULTS_VERSION_PATTERN.search(str(result["versions"].get("robocov", "")))
-    return version is None or int(version[1]) >= _FIRST_VERSION_WITH_MESSAGES
+    version = get_results_version(result["versions"])
+    return version is None or version >= _FIRST_VERSION_WITH_MESSAGES
+
+
+def get_results_version(versions: Mapping[str, str]) -> int | None:
+    """Return the number that changes whenever the same runs have other results.
+
+    Parameters
+    ----------
+    versions : Mapping
+        Versions of packages, such as those of a result.
+
+    Returns
+    -------
+    int or None
+        None if the versions do not contain it.
+    """
+    version = RESULTS_VERSION_PATTERN.search(str(versions.get("robocov", "")))
+    return None if version is None else int(version[1])
 
 
 def read_result(path: Path) -> dict[str, Any]:

@@ -277,7 +277,10 @@ def test_entries_made_with_an_earlier_version_are_marked() -> None:
     earlier = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 4)"}}
     current = {**adaptive, "versions": {**adaptive["versions"], "robocov": "0.1.0 (results 5)"}}
     note = "Adaptive: made with an earlier version"
-    assert note in build_page([rapf, earlier], "Test")
+    page = build_page([rapf, earlier], "Test")
+    assert note in page
+    assert "in which the same runs have other results: Adaptive." in page
+    assert "in which the same runs have other results" not in build_page([rapf, current], "Test")
     assert "made with an earlier version" not in build_page([rapf, current], "Test")
 
 
@@ -716,7 +719,29 @@ def test_equal_scores_have_the_same_rank() -> None:
     results = [build_result(label, gap) for label, gap in (("a", 0.2), ("b", 0.2), ("c", 0.1), ("d", 0.4))]
     overview = build_tables([*results, build_bundled_rapf()]).overview
     ranks = {row[0]: row[2] for row in overview}
-    assert ranks == {"c*": "1", "a*": "2", "b*": "2", "RAPF": "4", "d*": "5"}
+    # The files change no rank of RAPF.
+    assert ranks == {"c*": "1", "a*": "1", "b*": "1", "RAPF": "1", "d*": "2"}
+    ranks = {row[0]: row[2] for row in build_tables(results).overview}
+    assert ranks == {"c*": "1", "a*": "2", "b*": "2", "d*": "4"}
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_files_do_not_remove_bundled_results_from_plots() -> None:
+    bundled = [build_bundled_rapf(), build_result("Bundled", 0.5, is_bundled=True)]
+    files = [build_result(f"Short {k}", 0.1) for k in range(5)]
+    for result in files:
+        for row in result["rows"]:
+            row["path_length_m"] = 1e-9
+    files += [build_result("Long", 0.1), build_result("Far", 1e9)]
+    for row in files[-2]["rows"]:
+        row["path_length_m"] = 1e9
+    page = build_page([*files, *bundled], "Test")
+    (path_plot,) = re.findall(r"<figcaption>Gap and path length</figcaption>.*?</figure>", page)
+    drawn, _, note = path_plot.partition("</svg>")
+    assert all(f">{label}</text>" in drawn for label in ("RAPF", "Bundled"))
+    assert "Short" not in drawn and "Long" not in drawn
+    shorts = "; ".join(f"Short {k}*" for k in range(5))
+    assert f"because they are far from all others: {shorts}; Long*; Far*." in note
 
 
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")
