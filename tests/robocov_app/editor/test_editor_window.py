@@ -320,9 +320,9 @@ def test_the_help_lists_all_keys(tmp_path: Path, size, scale: float, monkeypatch
     words: set[str] = set()
     real = help_page.render_text
 
-    def label(text, *rest):
+    def label(text, *rest, **options):
         words.add(text)
-        return real(text, *rest)
+        return real(text, *rest, **options)
 
     with open_editor(tmp_path, size=size, scale=scale) as driver:
         monkeypatch.setattr(help_page, "render_text", label)

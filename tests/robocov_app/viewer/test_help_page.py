@@ -26,9 +26,9 @@ def drawn_texts(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     texts: dict[str, int] = {}
     render_text = help_page.render_text
 
-    def render_and_list(text: str, size: int, *rest: object) -> pygame.Surface:
+    def render_and_list(text: str, size: int, *rest: object, **options: object) -> pygame.Surface:
         texts[text] = size
-        return render_text(text, size, *rest)
+        return render_text(text, size, *rest, **options)
 
     monkeypatch.setattr(help_page, "render_text", render_and_list)
     return texts

@@ -257,9 +257,9 @@ def read_lesson_page(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> str:
     """Draw the page of the lesson, and return its lines in one text."""
     lines: list[str] = []
 
-    def record_and_render(text: str, *arguments: Any) -> pygame.Surface:
+    def record_and_render(text: str, *arguments: Any, **options: Any) -> pygame.Surface:
         lines.append(text)
-        return render_text(text, *arguments)
+        return render_text(text, *arguments, **options)
 
     with monkeypatch.context() as patch:
         patch.setattr(page, "render_text", record_and_render)
