@@ -266,8 +266,10 @@ class _Callers:
 
         Everybody may read and list the files of Python and of installed packages, and Python looks for
         modules in the folders on ``sys.path``. Further actions are allowed to compilers and imports without
-        own code between them and the action.
+        own code between them and the action. Nothing needs the data of the benchmark.
         """
+        if action.event == "open" and _is_data_of_benchmark(action.paths[0]):
+            return False
         is_listing = action.event in _LISTING_EVENTS
         may_be_seen = is_listing or not action.prohibition
         if may_be_seen and action.paths and all(map(self._is_library_path, action.paths)):

@@ -77,6 +77,16 @@ def read_references_in_a_folder():
     folder = os.open(Path(suite.__file__).parents[1], os.O_RDONLY)
     os.open(f"benchmark/{suite.SUITE_FILE.name}", os.O_RDONLY, dir_fd=folder)
 
+def read_references_by_import():
+    sys.path_hooks.insert(0, open)
+    sys.path.insert(0, REFERENCES)
+    try:
+        import robocov_has_no_such_module
+    except (AttributeError, ImportError):
+        sys.path_importer_cache[REFERENCES].read()
+    finally:
+        del sys.path_hooks[0], sys.path[0]
+
 def import_missing_module():
     try:
         import robocov_has_no_such_module
@@ -88,6 +98,7 @@ ATTEMPTS = {
     "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
     "read references by a special string": lambda: open(Text(REFERENCES)),
     "read references by an object": open_by_an_object,
+    "read references by Python's import": read_references_by_import,
     "read references in an open folder": read_references_in_a_folder,
     "look up an open file of another process": lambda: os.stat(f"/proc/{os.getppid()}/fd/0"),
     "follow a link of another process": lambda: os.readlink(f"/proc/{os.getppid()}/cwd"),

@@ -45,7 +45,7 @@ def format_row(controller: str, track: str) -> str:
 RIVALS = ("rapf", "learned", "frontier-median", "greedy-submodular")
 PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_ROWS = [
-    *((controller, track) for track in PLAN_TRACKS for controller in ("rapf", "lloyd")),
+    *((controller, track) for track in PLAN_TRACKS for controller in ("tangentbug", "rapf", "lloyd")),
     *(
         (controller, "plans-small")
         for controller in (
@@ -72,7 +72,7 @@ ROWS = [
         for controller in ("atlas", "atlas-shared")
     ),
     *((controller, track) for track in ("ideal", "short-range", "large-team") for controller in RIVALS),
-    *((controller, "ideal") for controller in ("local-search", "exemplar")),
+    *((controller, "ideal") for controller in ("tangentbug", "local-search", "exemplar")),
     ("learned", "lossy"),
     *PLAN_ROWS,
     *UNKNOWN_DENSITY_ROWS,
@@ -84,6 +84,23 @@ def test_rows_agree_with_the_entries(controller: str, track: str) -> None:
     assert f"| {suite.format_heading(track)} {format_row(controller, track)}\n" in PAGE.read_text(
         encoding="utf-8"
     )
+
+
+def test_the_best_controller_with_own_information_on_large_plans_agrees_with_the_entries() -> None:
+    results = {
+        result["entry"]["controller"]: result["rows"]
+        for result in load_bundled_results()
+        if result["entry"]["information"] == "own"
+    }
+    contacts = 0
+    for track in PLAN_TRACKS:
+        rows_by_name = {
+            name: [row for row in rows if row["track"] == track] for name, rows in results.items()
+        }
+        gaps = {name: Rating(name, track, rows).gap.estimate for name, rows in rows_by_name.items() if rows}
+        assert min(gaps, key=lambda name: gaps[name]) == "tangentbug"
+        contacts += sum(row["contacts"] > 0 for row in rows_by_name["tangentbug"])
+    assert f"its robots touch something in {contacts} of 24 runs" in PAGE.read_text(encoding="utf-8")
 
 
 def test_gaps_in_the_first_table_agree_with_the_entries() -> None:
@@ -182,6 +199,20 @@ def test_failures_agree_with_the_entries(track: str, map_name: str) -> None:
     )
     row = f"| {suite.format_heading(track)} | {map_name} | {' | '.join(cells)} |"
     assert f"{row}\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+
+
+def test_path_lengths_of_atlas_agree_with_the_entries() -> None:
+    atlas, rapf = (
+        Rating(
+            name,
+            "ideal",
+            [row for row in read_result(ENTRIES / f"{name}.json.gz")["rows"] if row["track"] == "ideal"],
+        )
+        for name in ("atlas", "rapf")
+    )
+    text = FAILURES_PAGE.read_text(encoding="utf-8")
+    lengths = [rating.compute_median("path_length_m") for rating in (atlas, rapf)]
+    assert f"on the track Ideal is {lengths[0]:.1f} m, and {lengths[1]:.1f} m with `rapf`" in text
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS_OF_TUNNELS)
