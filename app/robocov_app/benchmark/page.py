@@ -1,119 +1,34 @@
-"""The page that compares results of the benchmark: tables and Pareto plots for each track."""
+"""The page that compares results of the benchmark: tables and plots for each track."""
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
 from robocov import __version__
 from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
-from robocov.typing import FloatArray
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
-from robocov_app.benchmark.label_placement import (
-    MARK_HALF_SIZE_PX,
-    compute_half_sizes,
-    compute_nearest_points,
-    place_labels,
-)
-from robocov_app.benchmark.ratings import Rating, shorten
+from robocov_app.benchmark.pareto_plots import PlottedEntry, build_plots
+from robocov_app.benchmark.ratings import Rating
 from robocov_app.benchmark.results import describe_method, get_results_version, shares_maps_by_messages
-from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import style_axes, to_plot_color
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
-from robocov_app.look.theme import LIGHT
 from robocov_app.report import replay
 from robocov_app.report.document import load_template
-from robocov_app.report.svg import inline_svg
 from robocov_app.report.tables.table import PageTable
 from robocov_app.report.theme_css import build_theme_rules
 from robocov_app.sweep.worker import list_result_versions
 
-
-class Quantity(NamedTuple):
-    """A quantity against which the gap is plotted."""
-
-    title: str
-    """Name of the quantity in the title of a plot."""
-    axis_label: str
-    """Label of the horizontal axis, with the unit."""
-    compute: Callable[[Rating], float]
-    """Returns the quantity for a rating."""
-
-
-QUANTITIES: Mapping[str, Quantity] = {
-    "path": Quantity(
-        "path length",
-        "mean path length of a robot (m)",
-        lambda rating: rating.compute_median("path_length_m"),
-    ),
-    "computing": Quantity(
-        "computing time, as reported",
-        "µs per robot and second",
-        lambda rating: 1e6 * rating.compute_rate("deciding_s"),
-    ),
-    "sent": Quantity(
-        "bytes sent",
-        "bytes a robot sends per second",
-        lambda rating: rating.compute_rate("sent_bytes"),
-    ),
-}
-PLOT_SIZE_PX = (560, 400)
-"""Size of a plot, which must have space for many labels."""
 YARDSTICKS = ("rapf", "atlas", "oracle")
 """Controllers with which incomplete entries are compared, over the runs of each entry."""
 _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
-_DPI = 72.0
-"""Resolution of the plots, at which pixels equal points."""
-_MAX_DISTANCE_WITHOUT_LINE_PX = 10.0
-"""Maximum distance of a label from its mark at which no line needs to connect them."""
-_MIN_RATIO = 1.01
-"""Minimum ratio of the largest value to the smallest for plotting a quantity."""
-_MIN_LOG_RATIO = 8.0
-"""Minimum ratio of the largest value to the smallest for a logarithmic axis."""
-_MAX_RATIO_TO_MEDIAN = 1e4
-"""Maximum ratio of a plotted value to the median of the bundled entries, or of all without bundled ones."""
-_MIN_MEDIAN_GAP = 1.0
-"""Minimum median of the gaps for this ratio, %."""
 MAX_INCOMPLETE_TABLES = 10
 """Maximum number of incomplete entries on each track that are compared with the yardsticks."""
 MAX_PLOTTED_ENTRIES = 40
 """Maximum number of entries in a plot, apart from the bundled ones; those with the highest scores."""
-_MAX_PLOT_LABEL_CHARS = 28
-"""Maximum length of a label in a plot."""
-_MAX_EQUAL_POINTS = 4
-"""Maximum number of controllers with the same value of a quantity that are all drawn."""
-
-
-class ParetoPoint(NamedTuple):
-    """A controller in a plot."""
-
-    style: CurveStyle
-    label: str
-    x: float
-    """Value of the quantity."""
-    gap: float
-    """Median gap, %."""
-    is_rival: bool
-    """Whether the controller competes, which means that it does not know the whole map."""
-    is_bundled: bool = False
-    """Whether the result is part of robocov, and not from a file."""
-
-
-class ParetoPlot(NamedTuple):
-    """A plot of the gap against a quantity."""
-
-    title: str
-    svg: str
-    note: str
-    """Sentence about controllers that are not drawn; empty if there are none."""
 
 
 class _Entries(NamedTuple):
@@ -351,7 +266,7 @@ def _build_overview_cells(
 def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> dict[str, Any]:
     """Return the template variables for the section of a track."""
     ranked = [rating for rating in track_ratings if rating.is_complete]
-    plotted = _select_ratings_to_plot(ranked, entries)
+    plotted = _select_entries_to_plot(ranked, entries)
     family_head, family_rows = ratings.build_family_rows(ranked)
     return {
         "name": name,
@@ -360,7 +275,7 @@ def _build_section(name: str, track_ratings: Sequence[Rating], entries: _Entries
         "table": _build_rating_table("Ratings", ranked, entries),
         "families": PageTable("Median gap by families of maps, %", family_head, family_rows),
         "incomplete": _build_incomplete_tables(track_ratings, entries),
-        "plots": _build_plots(name, plotted, entries),
+        "plots": build_plots(name, plotted),
         "omitted_from_plots": len(ranked) - len(plotted),
     }
 
@@ -409,261 +324,20 @@ def _break_lines(text: str) -> str:
     return text.replace(", ", ",\n")
 
 
-def _select_ratings_to_plot(track_ratings: Sequence[Rating], entries: _Entries) -> list[Rating]:
-    """Return the ratings of bundled results, and the best of the others, in the order of their scores."""
-    others = [rating for rating in track_ratings if rating.label not in entries.bundled]
-    omitted = {rating.label for rating in others[MAX_PLOTTED_ENTRIES:]}
-    return [rating for rating in track_ratings if rating.label not in omitted]
-
-
-def _build_plots(name: str, track_ratings: Sequence[Rating], entries: _Entries) -> list[ParetoPlot]:
-    """Build the plots of a track: the gap against each quantity in which controllers differ."""
-    plots = []
-    for key, quantity in QUANTITIES.items():
-        points = []
-        for rating in track_ratings:
-            point = ParetoPoint(
-                style=entries.styles[rating.label],
-                label=_shorten_plot_label(rating.label, is_bundled=rating.label in entries.bundled),
-                x=quantity.compute(rating),
-                gap=100.0 * rating.gap.estimate,
-                is_rival=entries.information[rating.label] != _WHOLE_MAP,
-                is_bundled=rating.label in entries.bundled,
-            )
-            if np.isfinite((point.x, point.gap)).all():
-                points.append(point)
-        points, outliers = _split_outliers(points)
-        points = _select_points_for_log_axis(points)
-        values = [point.x for point in points]
-        if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
-            continue
-        texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f}%" for point in points]
-        description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
-        drawn, omitted = thin_out_equal_values(points)
-        figure = draw_pareto_figure(drawn, quantity.axis_label)
-        svg = inline_svg(figure, f"{name}-{key}", description)
-        note = _describe_omitted_points(omitted, outliers)
-        plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
-    return plots
-
-
-def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[ParetoPoint]) -> str:
-    """Return sentences about points that a plot does not contain; empty if there are none.
-
-    Parameters
-    ----------
-    omitted : sequence of ParetoPoint
-        Points with the same value as better ones.
-    outliers : sequence of ParetoPoint
-        Points far from all others.
-    """
-    sentences = []
-    if omitted:
-        labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
-        sentences.append(
-            f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
-            f"gap: {labels}."
+def _select_entries_to_plot(track_ratings: Sequence[Rating], entries: _Entries) -> list[PlottedEntry]:
+    """Return the bundled entries, and the best of the others, in the order of their scores."""
+    others = [rating.label for rating in track_ratings if rating.label not in entries.bundled]
+    omitted = set(others[MAX_PLOTTED_ENTRIES:])
+    return [
+        PlottedEntry(
+            rating,
+            entries.styles[rating.label],
+            is_rival=entries.information[rating.label] != _WHOLE_MAP,
+            is_bundled=rating.label in entries.bundled,
         )
-    if outliers:
-        labels = "; ".join(point.label for point in outliers)
-        sentences.append(f"Not drawn, because they are far from all others: {labels}.")
-    return " ".join(sentences)
-
-
-def _shorten_plot_label(label: str, *, is_bundled: bool) -> str:
-    """Shorten a label for a plot; the mark of a result from a file is kept."""
-    if is_bundled:
-        return shorten(label, _MAX_PLOT_LABEL_CHARS)
-    name = label.removesuffix(ratings.FILE_MARK)
-    return shorten(name, _MAX_PLOT_LABEL_CHARS - len(ratings.FILE_MARK)) + ratings.FILE_MARK
-
-
-def thin_out_equal_values(
-    points: Sequence[ParetoPoint],
-) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
-    """Split points into those to draw and those to omit.
-
-    If many controllers have the same value of the quantity, as those that send only their positions, their
-    marks would hide each other. Then only the smallest gap of the competing controllers and the smallest gap
-    of those that know the whole map are drawn.
-
-    Parameters
-    ----------
-    points : sequence of ParetoPoint
-        At least one.
-
-    Returns
-    -------
-    drawn, omitted : list of ParetoPoint
-    """
-    counts = Counter(f"{point.x:.3g}" for point in points)
-    common_value, count = counts.most_common(1)[0]
-    if count <= _MAX_EQUAL_POINTS:
-        return list(points), []
-    equal = sorted(
-        (point for point in points if f"{point.x:.3g}" == common_value), key=lambda point: point.gap
-    )
-    best = [
-        next((point for point in equal if point.is_rival == is_rival), None) for is_rival in (True, False)
+        for rating in track_ratings
+        if rating.label not in omitted
     ]
-    omitted = [point for point in equal if point not in best]
-    return [point for point in points if point not in omitted], omitted
-
-
-def _split_outliers(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
-    """Split points into those to draw and outliers, next to which no others could be told apart.
-
-    Bundled results determine what is typical, so that no file can make them outliers.
-    """
-    typical = [point for point in points if point.is_bundled] or points
-    if not typical:
-        return [], []
-    median = float(np.median([point.x for point in typical]))
-    median_gap = max(_MIN_MEDIAN_GAP, float(np.median([point.gap for point in typical])))
-    drawn: list[ParetoPoint] = []
-    outliers: list[ParetoPoint] = []
-    for point in points:
-        is_small = 0.0 < point.x < median / _MAX_RATIO_TO_MEDIAN
-        is_large = point.x > median * _MAX_RATIO_TO_MEDIAN or point.gap > median_gap * _MAX_RATIO_TO_MEDIAN
-        group = outliers if is_small or is_large else drawn
-        group.append(point)
-    return drawn, outliers
-
-
-def _select_points_for_log_axis(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
-    """Return the points without those at 0 if the others need a logarithmic axis."""
-    positive = [point for point in points if point.x > 0.0]
-    values = [point.x for point in positive]
-    if values and max(values) > _MIN_LOG_RATIO * min(values):
-        return positive
-    return list(points)
-
-
-@plain_style()
-def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
-    """Draw the gap of controllers against another quantity. Smaller values are better in both.
-
-    A line, the Pareto front, connects the competing controllers for which no other competing controller is
-    better in both quantities.
-
-    Parameters
-    ----------
-    points : sequence of ParetoPoint
-        The controllers.
-    axis_label : str
-        Label of the horizontal axis.
-
-    Returns
-    -------
-    Figure
-    """
-    width, height = PLOT_SIZE_PX
-    figure = Figure((width / _DPI, height / _DPI), dpi=_DPI)
-    axes = figure.add_axes((0.08, 0.14, 0.9, 0.75))
-    rivals = [(point.x, point.gap) for point in points if point.is_rival]
-    front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
-    axes.plot(*front.T, color=to_plot_color(LIGHT.faint), linewidth=1.0, zorder=1)
-    for point in points:
-        _draw_pareto_point(axes, point)
-    _style_pareto_axes(axes, points, axis_label)
-    _label_pareto_points(axes, points)
-    return figure
-
-
-def _draw_pareto_point(axes: Axes, point: ParetoPoint) -> None:
-    """Draw the mark of a controller, which is filled if the controller competes."""
-    color = to_plot_color(point.style.get_color(LIGHT))
-    axes.plot(
-        [point.x],
-        [point.gap],
-        marker=point.style.mark,
-        markerfacecolor=color if point.is_rival else to_plot_color(LIGHT.background),
-        zorder=3,
-        markersize=9,
-        markeredgewidth=1.6,
-        markeredgecolor=color,
-        linestyle="",
-    )
-
-
-def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: str) -> None:
-    """Choose the scales and ticks of the axes; the horizontal scale is logarithmic for a wide range."""
-    values = [point.x for point in points]
-    if min(values) > 0.0 and max(values) > _MIN_LOG_RATIO * min(values):
-        axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.set_yscale("symlog", linthresh=1.0)  # Linear up to one percent.
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_locator(NullLocator())
-    axes.margins(x=0.12, y=0.12)
-    style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
-
-
-def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
-    """Write the label of each controller next to its mark."""
-    labels = [point.label for point in points]
-    axes.autoscale_view()  # The transformation of the data is only valid when the limits are known.
-    marks = axes.transData.transform([(point.x, point.gap) for point in points])
-    centers = place_labels(marks, labels, axes.bbox.extents)
-    half_sizes = compute_half_sizes(labels)
-    for point, mark, center, half_size in zip(points, marks, centers, half_sizes, strict=True):
-        offset = compute_nearest_points(mark, center, half_size) - mark
-        if np.linalg.norm(offset) > _MAX_DISTANCE_WITHOUT_LINE_PX:
-            _draw_label_line(axes, point, offset)
-        axes.annotate(
-            point.label,
-            (point.x, point.gap),
-            center - mark,
-            textcoords="offset points",
-            fontsize=11,
-            color=to_plot_color(LIGHT.ink),
-            ha="center",
-            va="center",
-        )
-
-
-def _draw_label_line(axes: Axes, point: ParetoPoint, offset: FloatArray) -> None:
-    """Draw the line that connects a mark with the end of its label at the given offset, px."""
-    axes.annotate(
-        "",
-        (point.x, point.gap),
-        (offset[0], offset[1]),
-        textcoords="offset points",
-        arrowprops={
-            "arrowstyle": "-",
-            "color": to_plot_color(LIGHT.faint),
-            "linewidth": 0.7,
-            "shrinkA": 0.0,
-            "shrinkB": MARK_HALF_SIZE_PX,
-        },
-        zorder=2,
-    )
-
-
-def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Find the points for which no other point is better in both values.
-
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        Pairs of values; smaller values are better.
-
-    Returns
-    -------
-    list of int
-        Indices of these points, sorted by their first value.
-
-    Examples
-    --------
-    >>> find_pareto_front([(3.0, 1.0), (1.0, 2.0), (2.0, 4.0)])
-    [1, 0]
-    """
-    front: list[int] = []
-    for k in sorted(range(len(points)), key=lambda k: points[k]):
-        if not front or points[k][1] < points[front[-1]][1]:
-            front.append(k)
-    return front
 
 
 def _describe_entries_without_messages(

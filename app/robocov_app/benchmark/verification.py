@@ -127,8 +127,8 @@ class Verification:
         Number of runs in which a process received the observations of the whole team instead.
     new_maps : int
         Number of new maps that were tried.
-    new_map_track : str or None
-        Track of the runs on new maps; None if the result has no runs on generated maps.
+    new_map_track : str
+        Track of the runs on new maps; empty if the result has no runs on generated maps.
     comparison : NewMapComparison or None
         Comparison of gaps on new maps with those on the suite.
     differences : list of str
@@ -144,7 +144,7 @@ class Verification:
     robots: int = 0
     teams: int = 0
     new_maps: int = 0
-    new_map_track: str | None = None
+    new_map_track: str = ""
     comparison: NewMapComparison | None = None
     differences: list[str] = field(default_factory=list)
     read_files: list[str] = field(default_factory=list)
@@ -322,8 +322,7 @@ def verify_result(
     _check_source(rated, identity, result, path)
     description, violations = _describe_controller(rated, code)
     # The studies determine everything but the controller, whose code must not be executed here.
-    stand_in = rated.replace_user_code()
-    studies = dict(stand_in.build_studies(_get_selection(result)))
+    studies = dict(rated.replace_user_code().build_studies(_get_selection(result)))
     tasks = _index_tasks(studies)
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     failed_count = sum("error" in row for row in rows.values())
@@ -336,11 +335,10 @@ def verify_result(
         rows.keys() & tasks.keys(), options.sample, _create_generator(seed, _SAMPLE_STREAM)
     )
     map_rng = _create_generator(seed, _MAP_STREAM)
-    new_map_track, new_maps = _sample_maps(rated, studies, options.new_maps, map_rng)
-    verification.new_map_track = new_map_track
-    new_tasks = _index_new_tasks(stand_in, new_map_track, new_maps)
-    chosen_tasks = {key: tasks[key] for key in sampled} | new_tasks
-    new_outcomes: dict[RunKey, Outcome | None] = {}
+    new_runs = _plan_new_runs(rated, studies, options.new_maps, map_rng)
+    verification.new_map_track = new_runs.track
+    chosen_tasks = {key: tasks[key] for key in sampled} | dict(new_runs.tasks)
+    outcomes: dict[RunKey, Outcome | None] = {}
     # A process that is killed may still write to the folder.
     with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX, ignore_cleanup_errors=True) as cache_folder:
         checker = _RunChecker(
@@ -352,13 +350,12 @@ def verify_result(
             cache_folder=Path(cache_folder),
         )
         for key, check in _check_runs(checker, chosen_tasks, options.workers, quiet=quiet, stop=stop):
-            verification.count(check, is_new=key in new_tasks, is_joint=checker.is_joint)
+            verification.count(check, is_new=key in new_runs.tasks, is_joint=checker.is_joint)
             verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
-            if key in new_tasks:
-                new_outcomes[key] = check.outcome
-    if new_map_track and new_outcomes and not stop.requested:
-        gaps = _compute_gaps_on_new_maps(new_map_track, new_maps, new_outcomes, options.workers, stop)
-        verification.comparison = compare_gaps(result["rows"], gaps, new_map_track, map_rng)
+            outcomes[key] = check.outcome
+    if outcomes.keys() & new_runs.tasks.keys() and not stop.requested:
+        gaps = _compute_gaps_on_new_maps(new_runs, outcomes, options.workers, stop)
+        verification.comparison = compare_gaps(result["rows"], gaps, new_runs.track, map_rng)
         verification.differences += _describe_comparison(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
     return verification
@@ -422,34 +419,38 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
     return tasks
 
 
-def _sample_maps(
+@dataclass(frozen=True)
+class _NewRuns:
+    """Runs on new maps under the conditions of one track, with their tasks by key."""
+
+    track: str = ""
+    maps: Sequence[NewMap] = ()
+    tasks: Mapping[RunKey, Task] = field(default_factory=dict)
+
+
+def _plan_new_runs(
     rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
-) -> tuple[str | None, list[NewMap]]:
+) -> _NewRuns:
     """Sample a track of a result, and new maps of the families on this track.
 
     There are none for the oracle, which needs their best placements.
     """
     if rated.controller == ORACLE:
-        return None, []
+        return _NewRuns()
     maps_by_track = {track: [study_map.name for study_map in study.maps] for track, study in studies.items()}
     track = choose_track(maps_by_track, count, rng)
     if track is None:
-        return None, []
+        return _NewRuns()
     families = dict.fromkeys(suite.FAMILY_OF[name] for name in maps_by_track[track])
-    return track, sample_new_maps(list(families), count, rng)
-
-
-def _index_new_tasks(
-    rated: RatedController, track: str | None, new_maps: Sequence[NewMap]
-) -> dict[RunKey, Task]:
-    """Return the tasks of the runs on new maps by their keys."""
-    tasks: dict[RunKey, Task] = {}
-    if track is None:
-        return tasks
+    new_maps = sample_new_maps(list(families), count, rng)
+    stand_in = rated.replace_user_code()
+    tasks = {}
     for new_map in new_maps:
-        study = rated.build_study(track, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed])
+        study = stand_in.build_study(
+            track, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed]
+        )
         tasks[NEW_MAP, new_map.name, new_map.start_seed] = next(iter(generate_tasks(study)))
-    return tasks
+    return _NewRuns(track, new_maps, tasks)
 
 
 class _RunChecker:
@@ -543,8 +544,7 @@ def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -
 
 
 def _compute_gaps_on_new_maps(
-    track: str,
-    new_maps: Sequence[NewMap],
+    new_runs: _NewRuns,
     outcomes: Mapping[RunKey, Outcome | None],
     workers: int,
     stop: Interruption,
@@ -555,7 +555,7 @@ def _compute_gaps_on_new_maps(
     user interrupted the search, are left out.
     """
     # As in the suite, the reference is a placement of the robots that are still working at the end.
-    robots = suite.TRACKS[track].survivors
+    robots = suite.TRACKS[new_runs.track].survivors
     queries = {
         new_map.name: ReferenceQuery(
             to_json(new_map.environment),
@@ -564,11 +564,11 @@ def _compute_gaps_on_new_maps(
             lattice=suite.LATTICE,
             restarts=RESTARTS,
         )
-        for new_map in new_maps
+        for new_map in new_runs.maps
     }
     references = dict(answer_queries(queries, workers, stop))
     gaps = []
-    for new_map in new_maps:
+    for new_map in new_runs.maps:
         reference = references.get(new_map.name)
         if reference is None:
             # The search was interrupted before it reached this map.

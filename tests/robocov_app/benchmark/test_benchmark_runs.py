@@ -31,10 +31,9 @@ from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import place_labels
 from robocov_app.benchmark.learned import Learned
 from robocov_app.benchmark.oracle import Oracle
-from robocov_app.benchmark.page import (
-    MAX_INCOMPLETE_TABLES,
+from robocov_app.benchmark.page import MAX_INCOMPLETE_TABLES, build_page
+from robocov_app.benchmark.pareto_plots import (
     ParetoPoint,
-    build_page,
     draw_pareto_figure,
     find_pareto_front,
     thin_out_equal_values,
@@ -91,7 +90,7 @@ def load_results_of(*controllers: str) -> list[dict[str, Any]]:
 @pytest.fixture
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the plots of the page, which take most of the time to build it."""
-    monkeypatch.setattr("robocov_app.benchmark.page._build_plots", lambda *args: [])
+    monkeypatch.setattr("robocov_app.benchmark.page.build_plots", lambda *args: [])
 
 
 def change_result(out: Path, change: Any) -> None:
@@ -334,6 +333,10 @@ def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:
     assert [point.label for point in drawn] == ["3.0", "1.0", "other"]
     assert [point.label for point in omitted] == ["2.0", "4.0", "5.0"]
     assert thin_out_equal_values([*equal[1:], other]) == ([*equal[1:], other], [])
+    # No result from a file replaces a bundled one.
+    bundled = ParetoPoint(style, "bundled", 1200.0, 6.0, is_rival=True, is_bundled=True)
+    drawn, _ = thin_out_equal_values([*equal, bundled, other])
+    assert [point.label for point in drawn] == ["3.0", "1.0", "bundled", "other"]
 
 
 @pytest.mark.usefixtures("without_plots")

@@ -1,0 +1,371 @@
+"""Pareto plots of the page: the gap of controllers against another quantity."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from robocov.typing import FloatArray
+from robocov_app.benchmark.label_placement import (
+    MARK_HALF_SIZE_PX,
+    compute_half_sizes,
+    compute_nearest_points,
+    place_labels,
+)
+from robocov_app.benchmark.ratings import FILE_MARK, Rating, shorten
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import style_axes, to_plot_color
+from robocov_app.look.curve_styles import CurveStyle
+from robocov_app.look.theme import LIGHT
+from robocov_app.report.svg import inline_svg
+
+
+class Quantity(NamedTuple):
+    """A quantity against which the gap is plotted."""
+
+    title: str
+    """Name of the quantity in the title of a plot."""
+    axis_label: str
+    """Label of the horizontal axis, with the unit."""
+    compute: Callable[[Rating], float]
+    """Returns the quantity for a rating."""
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "path": Quantity(
+        "path length",
+        "mean path length of a robot (m)",
+        lambda rating: rating.compute_median("path_length_m"),
+    ),
+    "computing": Quantity(
+        "computing time, as reported",
+        "µs per robot and second",
+        lambda rating: 1e6 * rating.compute_rate("deciding_s"),
+    ),
+    "sent": Quantity(
+        "bytes sent",
+        "bytes a robot sends per second",
+        lambda rating: rating.compute_rate("sent_bytes"),
+    ),
+}
+PLOT_SIZE_PX = (560, 400)
+"""Size of a plot, which must have space for many labels."""
+_DPI = 72.0
+"""Resolution of the plots, at which pixels equal points."""
+_MAX_DISTANCE_WITHOUT_LINE_PX = 10.0
+"""Maximum distance of a label from its mark at which no line needs to connect them."""
+_MIN_RATIO = 1.01
+"""Minimum ratio of the largest value to the smallest for plotting a quantity."""
+_MIN_LOG_RATIO = 8.0
+"""Minimum ratio of the largest value to the smallest for a logarithmic axis."""
+_MAX_RATIO_TO_MEDIAN = 1e4
+"""Maximum ratio of a plotted value to the median of the bundled entries, or of all without bundled ones."""
+_MIN_MEDIAN_GAP = 1.0
+"""Minimum median of the gaps for this ratio, %."""
+_MAX_LABEL_CHARS = 28
+"""Maximum length of a label in a plot."""
+_MAX_EQUAL_POINTS = 4
+"""Maximum number of controllers with the same value of a quantity that are all drawn."""
+
+
+class ParetoPoint(NamedTuple):
+    """A controller in a plot."""
+
+    style: CurveStyle
+    label: str
+    x: float
+    """Value of the quantity."""
+    gap: float
+    """Median gap, %."""
+    is_rival: bool
+    is_bundled: bool = False
+
+
+class ParetoPlot(NamedTuple):
+    """A plot of the gap against a quantity."""
+
+    title: str
+    svg: str
+    note: str
+    """Sentence about controllers that are not drawn; empty if there are none."""
+
+
+class PlottedEntry(NamedTuple):
+    """An entry of the benchmark on one track."""
+
+    rating: Rating
+    style: CurveStyle
+    is_rival: bool
+    """Whether the controller competes, which means that it does not know the whole map."""
+    is_bundled: bool
+    """Whether the result is part of robocov, and not from a file."""
+
+
+def build_plots(track: str, entries: Sequence[PlottedEntry]) -> list[ParetoPlot]:
+    """Build the plots of a track: the gap against each quantity in which controllers differ.
+
+    Parameters
+    ----------
+    track : str
+        Name of the track, which is the start of the ids in the plots.
+    entries : sequence of PlottedEntry
+
+    Returns
+    -------
+    list of ParetoPlot
+    """
+    plots = []
+    for key, quantity in QUANTITIES.items():
+        points, outliers = _split_outliers(_build_points(entries, quantity))
+        points = _select_points_for_log_axis(points)
+        values = [point.x for point in points]
+        if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
+            continue
+        texts = [f"{point.label}: {point.x:.3g}, gap {point.gap:.1f}%" for point in points]
+        description = f"Median gap against {quantity.axis_label}. {'; '.join(texts)}."
+        drawn, omitted = thin_out_equal_values(points)
+        figure = draw_pareto_figure(drawn, quantity.axis_label)
+        svg = inline_svg(figure, f"{track}-{key}", description)
+        note = _describe_omitted_points(omitted, outliers)
+        plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
+    return plots
+
+
+def _build_points(entries: Sequence[PlottedEntry], quantity: Quantity) -> list[ParetoPoint]:
+    """Return the points of the entries whose quantity and median gap are finite."""
+    points = []
+    for entry in entries:
+        point = ParetoPoint(
+            style=entry.style,
+            label=_shorten_label(entry.rating.label, is_bundled=entry.is_bundled),
+            x=quantity.compute(entry.rating),
+            gap=100.0 * entry.rating.gap.estimate,
+            is_rival=entry.is_rival,
+            is_bundled=entry.is_bundled,
+        )
+        if np.isfinite((point.x, point.gap)).all():
+            points.append(point)
+    return points
+
+
+def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[ParetoPoint]) -> str:
+    """Return sentences about points that a plot does not contain; empty if there are none.
+
+    Parameters
+    ----------
+    omitted : sequence of ParetoPoint
+        Points with the same value as better ones.
+    outliers : sequence of ParetoPoint
+        Points far from all others.
+    """
+    sentences = []
+    if omitted:
+        labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
+        sentences.append(
+            f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
+            f"gap: {labels}."
+        )
+    if outliers:
+        labels = "; ".join(point.label for point in outliers)
+        sentences.append(f"Not drawn, because they are far from all others: {labels}.")
+    return " ".join(sentences)
+
+
+def _shorten_label(label: str, *, is_bundled: bool) -> str:
+    """Shorten a label for a plot; the mark of a result from a file is kept."""
+    if is_bundled:
+        return shorten(label, _MAX_LABEL_CHARS)
+    name = label.removesuffix(FILE_MARK)
+    return shorten(name, _MAX_LABEL_CHARS - len(FILE_MARK)) + FILE_MARK
+
+
+def thin_out_equal_values(
+    points: Sequence[ParetoPoint],
+) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
+    """Split points into those to draw and those to omit.
+
+    If many controllers have the same value of the quantity, as those that send only their positions, their
+    marks would hide each other. Then only the smallest gap of the competing controllers and the smallest gap
+    of those that know the whole map are drawn: of bundled results, and of results from files.
+
+    Parameters
+    ----------
+    points : sequence of ParetoPoint
+        At least one.
+
+    Returns
+    -------
+    drawn, omitted : list of ParetoPoint
+    """
+    counts = Counter(f"{point.x:.3g}" for point in points)
+    common_value, count = counts.most_common(1)[0]
+    if count <= _MAX_EQUAL_POINTS:
+        return list(points), []
+    equal = sorted(
+        (point for point in points if f"{point.x:.3g}" == common_value), key=lambda point: point.gap
+    )
+    best: dict[tuple[bool, bool], ParetoPoint] = {}
+    for point in equal:
+        best.setdefault((point.is_rival, point.is_bundled), point)
+    omitted = [point for point in equal if point not in best.values()]
+    return [point for point in points if point not in omitted], omitted
+
+
+def _split_outliers(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
+    """Split points into those to draw and outliers, next to which no others could be told apart.
+
+    Bundled results determine what is typical, so that no file can make them outliers.
+    """
+    typical = [point for point in points if point.is_bundled] or points
+    if not typical:
+        return [], []
+    median = float(np.median([point.x for point in typical]))
+    median_gap = max(_MIN_MEDIAN_GAP, float(np.median([point.gap for point in typical])))
+    drawn: list[ParetoPoint] = []
+    outliers: list[ParetoPoint] = []
+    for point in points:
+        is_small = 0.0 < point.x < median / _MAX_RATIO_TO_MEDIAN
+        is_large = point.x > median * _MAX_RATIO_TO_MEDIAN or point.gap > median_gap * _MAX_RATIO_TO_MEDIAN
+        group = outliers if is_small or is_large else drawn
+        group.append(point)
+    return drawn, outliers
+
+
+def _select_points_for_log_axis(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
+    """Return the points without those at 0 if the others need a logarithmic axis."""
+    positive = [point for point in points if point.x > 0.0]
+    values = [point.x for point in positive]
+    if values and max(values) > _MIN_LOG_RATIO * min(values):
+        return positive
+    return list(points)
+
+
+@plain_style()
+def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
+    """Draw the gap of controllers against another quantity. Smaller values are better in both.
+
+    A line, the Pareto front, connects the competing controllers for which no other competing controller is
+    better in both quantities.
+
+    Parameters
+    ----------
+    points : sequence of ParetoPoint
+        The controllers.
+    axis_label : str
+        Label of the horizontal axis.
+
+    Returns
+    -------
+    Figure
+    """
+    width, height = PLOT_SIZE_PX
+    figure = Figure((width / _DPI, height / _DPI), dpi=_DPI)
+    axes = figure.add_axes((0.08, 0.14, 0.9, 0.75))
+    rivals = [(point.x, point.gap) for point in points if point.is_rival]
+    front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
+    axes.plot(*front.T, color=to_plot_color(LIGHT.faint), linewidth=1.0, zorder=1)
+    for point in points:
+        _draw_pareto_point(axes, point)
+    _style_pareto_axes(axes, points, axis_label)
+    _label_pareto_points(axes, points)
+    return figure
+
+
+def _draw_pareto_point(axes: Axes, point: ParetoPoint) -> None:
+    """Draw the mark of a controller, which is filled if the controller competes."""
+    color = to_plot_color(point.style.get_color(LIGHT))
+    axes.plot(
+        [point.x],
+        [point.gap],
+        marker=point.style.mark,
+        markerfacecolor=color if point.is_rival else to_plot_color(LIGHT.background),
+        zorder=3,
+        markersize=9,
+        markeredgewidth=1.6,
+        markeredgecolor=color,
+        linestyle="",
+    )
+
+
+def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: str) -> None:
+    """Choose the scales and ticks of the axes; the horizontal scale is logarithmic for a wide range."""
+    values = [point.x for point in points]
+    if min(values) > 0.0 and max(values) > _MIN_LOG_RATIO * min(values):
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.set_yscale("symlog", linthresh=1.0)  # Linear up to one percent.
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
+    axes.margins(x=0.12, y=0.12)
+    style_axes(axes, LIGHT, axis_label, "median gap (%)", grid="y")
+
+
+def _label_pareto_points(axes: Axes, points: Sequence[ParetoPoint]) -> None:
+    """Write the label of each controller next to its mark."""
+    labels = [point.label for point in points]
+    axes.autoscale_view()  # The transformation of the data is only valid when the limits are known.
+    marks = axes.transData.transform([(point.x, point.gap) for point in points])
+    centers = place_labels(marks, labels, axes.bbox.extents)
+    half_sizes = compute_half_sizes(labels)
+    for point, mark, center, half_size in zip(points, marks, centers, half_sizes, strict=True):
+        offset = compute_nearest_points(mark, center, half_size) - mark
+        if np.linalg.norm(offset) > _MAX_DISTANCE_WITHOUT_LINE_PX:
+            _draw_label_line(axes, point, offset)
+        axes.annotate(
+            point.label,
+            (point.x, point.gap),
+            center - mark,
+            textcoords="offset points",
+            fontsize=11,
+            color=to_plot_color(LIGHT.ink),
+            ha="center",
+            va="center",
+        )
+
+
+def _draw_label_line(axes: Axes, point: ParetoPoint, offset: FloatArray) -> None:
+    """Draw the line that connects a mark with the end of its label at the given offset, px."""
+    axes.annotate(
+        "",
+        (point.x, point.gap),
+        (offset[0], offset[1]),
+        textcoords="offset points",
+        arrowprops={
+            "arrowstyle": "-",
+            "color": to_plot_color(LIGHT.faint),
+            "linewidth": 0.7,
+            "shrinkA": 0.0,
+            "shrinkB": MARK_HALF_SIZE_PX,
+        },
+        zorder=2,
+    )
+
+
+def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Find the points for which no other point is better in both values.
+
+    Parameters
+    ----------
+    points : sequence of (float, float)
+        Pairs of values; smaller values are better.
+
+    Returns
+    -------
+    list of int
+        Indices of these points, sorted by their first value.
+
+    Examples
+    --------
+    >>> find_pareto_front([(3.0, 1.0), (1.0, 2.0), (2.0, 4.0)])
+    [1, 0]
+    """
+    front: list[int] = []
+    for k in sorted(range(len(points)), key=lambda k: points[k]):
+        if not front or points[k][1] < points[front[-1]][1]:
+            front.append(k)
+    return front
