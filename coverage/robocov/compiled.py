@@ -276,11 +276,13 @@ def import_numba() -> ModuleType:
 
 @functools.cache
 def _import_numba() -> ModuleType:
+    """Import numba, teach it the type of kernels, and report its compilations to listeners; only once."""
     is_source_root = False
     if "numba" not in sys.modules and "coverage" not in sys.modules:
         spec = importlib.util.find_spec("coverage")
         is_source_root = spec is not None and spec.origin is None
     if is_source_root:
+        # With None as its module, an import of this name fails as if there were no such package.
         sys.modules["coverage"] = None  # type: ignore[assignment]
     try:
         import numba

@@ -12,7 +12,7 @@ numbers = st.lists(st.integers(0, 4), min_size=1, max_size=30)
 
 
 @given(numbers)
-def test_groups_of_equal_values(values):
+def test_a_run_starts_where_the_value_changes(values):
     values = np.array(values)
     begin = find_run_starts(values)
     np.testing.assert_array_equal(values[begin].repeat(np.diff(begin, append=len(values))), values)

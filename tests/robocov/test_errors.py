@@ -13,7 +13,7 @@ from robocov.controllers import list_controller_classes
 from robocov.errors import InputError, Issue, MapError, format_path
 
 
-def test_the_class_hierarchy_of_errors() -> None:
+def test_errors_of_input_and_output_are_errors_of_robocov() -> None:
     assert issubclass(errors.MapError, errors.InputError)
     assert issubclass(errors.StartError, errors.InputError)
     assert issubclass(errors.ParameterError, errors.InputError)

@@ -161,7 +161,7 @@ def problems(draw):
 
 
 @given(problems())
-def test_seeds_are_different_sources(problem):
+def test_seeds_are_distinct_sources(problem):
     distance, count, rng = problem
     sources = seed_sources(distance, count, rng)
     assert sources.shape == (count,)

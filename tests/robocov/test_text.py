@@ -19,14 +19,14 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("text", HOSTILE)
-def test_what_drives_a_terminal_or_reorders_text_becomes_visible(text: str) -> None:
+def test_characters_that_control_a_terminal_or_reorder_text_are_escaped(text: str) -> None:
     escaped = escape_controls(f"a{text}b")
     assert escaped.isprintable()
     assert escaped.startswith("a\\")
 
 
 @given(st.text(st.characters()))
-def test_no_control_is_left_and_all_else_is_kept(text: str) -> None:
+def test_only_control_characters_are_escaped(text: str) -> None:
     escaped = escape_controls(text)
     assert not any(unicodedata.category(char) in ("Cc", "Cs") and char not in "\t\n" for char in escaped)
     assert not any(

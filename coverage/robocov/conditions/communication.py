@@ -239,6 +239,17 @@ class Inbox:
         )
 
 
+class PositionReports(NamedTuple):
+    """The newest positions that robots know of others from messages."""
+
+    neighbors: Neighbors
+    """The graph that links each robot to the robots whose positions it knows."""
+    positions: FloatArray
+    """(m, 2) m, the known positions, in the order of ``neighbors.indices``."""
+    ages: FloatArray
+    """(m,) s, times since these positions were sent."""
+
+
 class Radio:
     """Sends and delivers the messages of a team.
 
@@ -499,9 +510,7 @@ class Radio:
             for message, receivers in zip(messages, is_received, strict=True)
         ]
 
-    def read_reports(
-        self, inbox: Inbox, step: int, is_working: BoolArray
-    ) -> tuple[Neighbors, FloatArray, FloatArray]:
+    def read_reports(self, inbox: Inbox, step: int, is_working: BoolArray) -> PositionReports:
         """Return the newest positions that working robots have received and have not forgotten.
 
         Parameters
@@ -515,19 +524,16 @@ class Radio:
 
         Returns
         -------
-        neighbors : Neighbors
-            The graph that links each robot to the robots whose positions it knows.
-        positions : (m, 2) array, m
-            The known positions, in the order of ``neighbors.indices``.
-        ages : (m,) array, s
-            Times since these positions were sent.
+        PositionReports
         """
         silence = (step - inbox.arrival_steps) * self._dt
         is_recent = silence <= self._conditions.forget_after + TIME_TOLERANCE_S
         robot, neighbor = np.nonzero((inbox.arrival_steps >= 0) & is_recent & is_working[:, None])
         neighbors = Neighbors.from_pairs(len(is_working), robot, neighbor, self._ranges)
         ages = (step - inbox.sent_steps[robot, neighbor]) * self._dt
-        return neighbors, inbox.positions[robot, neighbor], np.asarray(ages)
+        return PositionReports(
+            neighbors=neighbors, positions=inbox.positions[robot, neighbor], ages=np.asarray(ages)
+        )
 
     def _is_sending(self, step: int) -> bool:
         """Return whether messages are sent in a step: at time zero, and once in each period of the rate."""

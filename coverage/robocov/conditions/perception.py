@@ -106,12 +106,12 @@ class Perception:
             neighbors = ideal.neighbors.restrict_to_working(is_working)
             return replace(observations, neighbors=neighbors), inbox
         inbox = self._radio.exchange_positions(inbox, step, positions, ideal.positions, is_working)
-        neighbors, reported_positions, ages = self._radio.read_reports(inbox, step, is_working)
+        reports = self._radio.read_reports(inbox, step, is_working)
         observations = replace(
             observations,
-            neighbors=neighbors,
-            reported_positions=reported_positions,
-            report_ages=ages,
+            neighbors=reports.neighbors,
+            reported_positions=reports.positions,
+            report_ages=reports.ages,
         )
         return observations, inbox
 

@@ -43,11 +43,11 @@ class AdaptiveMemory(MeasurementMemory):
     estimates: FloatArray
     """(n, k) Estimates of φ at the samples of the lattice."""
     parameters: FloatArray
-    """(n, m) a, weights of the basis functions."""
+    """(n, m) Weights a of the basis functions."""
     information_matrices: FloatArray
-    """(n, m, m) s, Λ, integrals of K K^T along the paths of the robots."""
+    """(n, m, m) s, matrices Λ: the integrals of K K^T over time, along the paths of the robots."""
     information_vectors: FloatArray
-    """(n, m) s, λ, integrals of K φ along the paths of the robots."""
+    """(n, m) s, vectors λ: the integrals of K φ over time, along the paths of the robots."""
     has_new_measurements: BoolArray
     """(n,) Whether measurements of others have arrived since the last estimate of each robot."""
     parameter_exchange: ParameterExchange
@@ -314,10 +314,11 @@ def _solve(matrices: FloatArray, right_sides: FloatArray) -> FloatArray:
         for k in range(m):
             for row in range(k + 1, m):
                 factor = matrices[i, row, k] / matrices[i, k, k]
-                if factor != 0.0:
-                    solutions[i, row] -= factor * solutions[i, k]
-                    for column in range(k, m):
-                        matrices[i, row, column] -= factor * matrices[i, k, column]
+                if factor == 0.0:
+                    continue
+                solutions[i, row] -= factor * solutions[i, k]
+                for column in range(k, m):
+                    matrices[i, row, column] -= factor * matrices[i, k, column]
         # Substitute back, from the last row to the first.
         for row in range(m - 1, -1, -1):
             for column in range(row + 1, m):
@@ -341,8 +342,8 @@ class Lattice:
     functions: FloatArray
     """(k, m) K at the samples."""
     squares: FloatArray
-    """(s, 2) m, centers of the squares with one measurement each. They divide the bounding box of the region,
-    and are rectangles unless this is a square."""
+    """(s, 2) m, centers of the squares with one measurement each. They divide the bounding box of the region
+    equally in x and in y. If the box is not a square, they are rectangles."""
     sample_covariance: FloatArray
     """(k, s) Covariances of φ at the samples and at the centers of the squares."""
     square_covariance: FloatArray

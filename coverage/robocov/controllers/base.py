@@ -250,6 +250,6 @@ class BaseController:
         Returns
         -------
         Memory
-            Or another class, `memory_type`.
+            An object of the class `memory_type`.
         """
         return self.memory_type(team)

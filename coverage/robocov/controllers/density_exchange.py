@@ -256,6 +256,7 @@ def add_received_measurements(seen: Observations, measurements: FloatArray) -> F
     if not seen.messages:
         return measurements
     measurements = measurements.copy()
+    # `known` is a row of the copy, so that assignments to its elements change the copy.
     for robot, known in enumerate(measurements):
         for message in seen.get_messages(robot):
             content = message.payload

@@ -196,7 +196,7 @@ class TangentBug(BaseController):
     We had only the paper's abstract, not the full texts of the papers; details may differ. The following
     choices are our own. The centroid of a robot's cell moves with the robot, and would draw it back from each
     detour; therefore the goal is fixed from the time when the robot starts to follow a boundary until it is
-    reached or given up. Because a boundary may be as long as the building, the robot follows it for at most
+    reached or given up. Because a boundary may be very long, the robot follows it for at most
     `detour` * 0.9**k times the distance to its goal in attempt k = 1, 2, ... It then returns to its best
     point, and comes to rest there. It tries again after the centroid has moved by `moved` times the number of
     attempts. Obstacles in a scan are enlarged by the radius of the robot and `clearance`. Robots slide along

@@ -203,9 +203,7 @@ class CoverageCost:
             If there is no robot, a robot is outside the free space, or `speeds` is not one positive number
             per robot. The message names the robot.
         """
-        positions = to_floats("positions", positions, "[x, y] of each robot in meters", InputError)
-        if not positions.size:
-            raise InputError("positions: expected at least one robot, got none")
+        positions = _to_positions(positions)
         grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)
         # A component of the free space is covered if any robot is inside it.
         is_covered: BoolArray = np.asarray(is_inside.any(axis=0))
@@ -402,12 +400,20 @@ class CoverageCost:
         Raises
         ------
         InputError
-            If the point or a robot is outside the free space.
+            If there is no robot, or the point or a robot is outside the free space.
         """
-        positions = np.asarray(positions, dtype=float)
-        point = np.asarray(point, dtype=float)
+        positions = _to_positions(positions)
+        point = to_floats("point", point, "[x, y] in meters", InputError)
         distances = self.geodesics.compute_distances(point[None], positions)[0]
         return self.geodesics.find_path(point, positions[int(distances.argmin())])
+
+
+def _to_positions(values: object) -> FloatArray:
+    """Convert the positions of robots to an array of meters; raise InputError if there is no robot."""
+    positions = to_floats("positions", values, "[x, y] of each robot in meters", InputError)
+    if not positions.size:
+        raise InputError("positions: expected at least one robot, got none")
+    return positions
 
 
 def _require_speeds(speeds: object, robot_count: int) -> FloatArray:

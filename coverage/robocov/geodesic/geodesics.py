@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import shapely
@@ -62,6 +62,17 @@ class CornerComputation(Protocol):
         self, first: int, end: int, wall_index: AngularWallIndex, indices: IntArray, lengths: FloatArray, /
     ) -> int:
         """Write rows of `indices` and `lengths`, and return their number."""
+
+
+class _CornerDistances(NamedTuple):
+    """The distances from n grid points to the k corners of the walls."""
+
+    wall_index: AngularWallIndex
+    """Index of the walls around the points."""
+    lengths: FloatArray
+    """(n, k) Distances from the points to the corners, grid steps."""
+    last_paths: CornerPaths
+    """The paths from the last of the points to the corners."""
 
 
 class Geodesics:
@@ -347,40 +358,50 @@ class Geodesics:
         """
         # A shortest path that is not straight leads from the source to a last corner, possibly via other
         # corners, and from there straight to the target.
-        index, from_sources, _ = self._compute_corner_distances(sources, must_be_straight=False)
+        from_sources = self._compute_corner_distances(sources, must_be_straight=False)
         distances = np.empty((len(sources), len(targets)))
         for first in range(0, len(targets), _TARGETS_PER_BLOCK):
             block = slice(first, first + _TARGETS_PER_BLOCK)
-            _, to_targets, _ = self._compute_corner_distances(targets[block], must_be_straight=True)
-            block_distances = np.empty((len(sources), len(to_targets)))
-            _combine_distances(self.walls, index, from_sources, targets[block], to_targets, block_distances)
-            distances[:, block] = block_distances
+            to_targets = self._compute_corner_distances(targets[block], must_be_straight=True)
+            distances[:, block] = self._combine(from_sources, targets[block], to_targets)
         return distances
 
     def _compute_corner_distances(
         self, grid_positions: FloatArray, *, must_be_straight: bool
-    ) -> tuple[AngularWallIndex, FloatArray, CornerPaths]:
+    ) -> _CornerDistances:
         """Compute the geodesic distances from n grid points to the k corners of the walls.
 
         With `must_be_straight`, the distance is infinite unless a straight path leads from the point to the
-        corner. Return an index of the walls around the points, the distances, (n, k) grid steps, and the
-        paths from the last point to the corners.
+        corner.
         """
         corner_count = len(self.corners)
-        distances = np.empty((len(grid_positions), corner_count))
+        lengths = np.empty((len(grid_positions), corner_count))
         paths = CornerPaths.allocate(corner_count)
 
         def fill_index(index: AngularWallIndex) -> AngularWallIndex | None:
-            """Fill the index, `distances` and `paths`; return None if the index has too little space."""
+            """Fill the index, `lengths` and `paths`; return None if the index has too little space."""
             has_space = _find_corner_distances(
-                self.walls, index, self.graph, grid_positions, must_be_straight, distances, paths
+                self.walls, index, self.graph, grid_positions, must_be_straight, lengths, paths
             )
             return index if has_space else None
 
         index = self.run_with_index(
             source_count=len(grid_positions), bin_count=SOURCE_BINS, compute=fill_index
         )
-        return index, distances, paths
+        return _CornerDistances(wall_index=index, lengths=lengths, last_paths=paths)
+
+    def _combine(
+        self, from_sources: _CornerDistances, targets: FloatArray, to_targets: _CornerDistances
+    ) -> FloatArray:
+        """Return the distances from the n sources to (m, 2) targets, (n, m), all in grid steps.
+
+        The distances in `to_targets` are those of straight paths.
+        """
+        distances = np.empty((len(from_sources.lengths), len(targets)))
+        _combine_distances(
+            self.walls, from_sources.wall_index, from_sources.lengths, targets, to_targets.lengths, distances
+        )
+        return distances
 
     def find_path(self, source: FloatArray, target: FloatArray) -> FloatArray:
         """Find a shortest path between two points.
@@ -402,23 +423,22 @@ class Geodesics:
             If a point is outside the free space.
         """
         ends, _ = self.snap_to_free_space(np.stack([source, target]), "endpoints")
-        index, from_source, paths = self._compute_corner_distances(ends[:1], must_be_straight=False)
-        _, to_target, _ = self._compute_corner_distances(ends[1:], must_be_straight=True)
-        distance = np.empty((1, 1))
-        _combine_distances(self.walls, index, from_source, ends[1:], to_target, distance)
-        if np.isinf(distance[0, 0]):
+        from_source = self._compute_corner_distances(ends[:1], must_be_straight=False)
+        to_target = self._compute_corner_distances(ends[1:], must_be_straight=True)
+        distance = float(self._combine(from_source, ends[1:], to_target)[0, 0])
+        if np.isinf(distance):
             return np.empty((0, 2))
         # The length of the shortest path that bends last at each corner. If none of them is as short as the
         # distance, the shortest path is straight.
-        lengths = from_source[0] + to_target[0]
+        lengths = from_source.lengths[0] + to_target.lengths[0]
         corner = NO_CORNER
-        if lengths.min(initial=np.inf) <= distance[0, 0]:
+        if lengths.min(initial=np.inf) <= distance:
             corner = int(lengths.argmin())
         # Follow the path backward from its last corner.
         path_corners = []
         while corner != NO_CORNER:
             path_corners.append(corner)
-            corner = int(paths.previous_corners[corner])
+            corner = int(from_source.last_paths.previous_corners[corner])
         path_corners.reverse()
         end_points = self.grid.to_meters(ends)
         return np.concatenate([end_points[:1], self.corners[path_corners], end_points[1:]])

@@ -8,7 +8,7 @@ import shapely
 from shapely import Polygon
 
 from robocov.arrays import compute_lengths, copy_read_only
-from robocov.errors import InputError
+from robocov.errors import InputError, quote, to_floats
 from robocov.typing import BoolArray, FloatArray
 
 SIDE_X = 0
@@ -54,7 +54,7 @@ class Region:
     Raises
     ------
     InputError
-        If the region has no area.
+        If the vertices are not finite numbers of shape (k, 2), or the region has no area.
 
     See Also
     --------
@@ -78,7 +78,12 @@ class Region:
     centroid: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        hull = shapely.convex_hull(shapely.MultiPoint(np.asarray(self.vertices, dtype=float)))
+        points = to_floats("region", self.vertices, "[x, y] of each vertex in meters", InputError)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise InputError(
+                f"region: expected finite [x, y] of each vertex in meters, got {quote(points.tolist())}"
+            )
+        hull = shapely.convex_hull(shapely.MultiPoint(points))
         if not isinstance(hull, Polygon) or hull.area <= 0.0:
             raise InputError("region: expected an outer boundary with an area above 0, got area 0")
         ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]

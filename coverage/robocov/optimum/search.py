@@ -109,7 +109,7 @@ class Optimum:
         Parameters
         ----------
         within : float
-            Maximum gap to the best restart.
+            Maximum difference from the mean distance of the best restart, as a fraction of it.
 
         Returns
         -------

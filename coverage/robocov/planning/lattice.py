@@ -277,12 +277,13 @@ def compute_distances(
             for edge in range(edges.edge_starts[node], edges.edge_starts[node + 1]):
                 end = edges.ends[edge]
                 length = distances[node] + edges.lengths[edge]
-                if length < distances[end] and length <= limit:
-                    distances[end] = length
-                    if not is_in_front[end]:
-                        front[front_size] = end
-                        is_in_front[end] = True
-                        front_size += 1
+                if length >= distances[end] or length > limit:
+                    continue
+                distances[end] = length
+                if not is_in_front[end]:
+                    front[front_size] = end
+                    is_in_front[end] = True
+                    front_size += 1
     return distances
 
 

@@ -145,12 +145,11 @@ def _count_sides(cells: NDArray[np.uint8], block_side: int, i: int, j: int, bloc
                 state = cells[neighbor_row, neighbor_column]
                 if state == FREE:
                     free_side_count += 1
-                elif state == UNKNOWN:
-                    if neighbor_row == end_row:
-                        link_count_up += 1
-                    elif neighbor_column == end_column:
-                        link_count_right += 1
-                elif state != _OUTSIDE:  # a wall or a presumed wall
+                elif state == UNKNOWN and neighbor_row == end_row:
+                    link_count_up += 1
+                elif state == UNKNOWN and neighbor_column == end_column:
+                    link_count_right += 1
+                elif state not in (UNKNOWN, _OUTSIDE):  # a wall or a presumed wall
                     wall_side_count += 1
     blocks.unknown_counts[i, j] = unknown_count
     blocks.free_side_counts[i, j] = free_side_count

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from robocov.errors import (
     describe_unknown_name,
     find_similar_names,
     format_count,
+    is_number,
     quote,
     require_number,
     require_type,
@@ -377,8 +379,10 @@ class Scenario:
         Raises
         ------
         RobocovError
-            If the run cannot start, or the controller fails.
+            If `every` is not a whole number of at least 1, the run cannot start, or the controller fails.
         """
+        if not is_number(every, Integral) or every < 1:
+            raise ParameterError(f"every: expected a whole number of at least 1, got {quote(every)}")
         modules = {} if self.source is None else self.source.modules
         with provide_modules(modules):
             if simulation is None:

@@ -15,7 +15,7 @@ from robocov.controllers.base import Controller
 from robocov.controllers.individual import IndividualController
 from robocov.defaults import DEFAULT_DT_S
 from robocov.environment import Environment, require_environment
-from robocov.errors import ParameterError, StartError, format_count, to_floats
+from robocov.errors import ParameterError, StartError, format_count, require_number, to_floats
 from robocov.observation import Decision, Message, Observations, Scans, Snapshot, check_forces
 from robocov.observation.neighbors import Neighbors
 from robocov.record import Record, Recorder
@@ -255,7 +255,13 @@ class SimulationBatch:
         Returns
         -------
         Observations
+
+        Raises
+        ------
+        ParameterError
+            If there is no such run.
         """
+        run = self._require_run(run)
         observations = self.observe()
         rows = self._rows[run]
         scans = observations.scans
@@ -271,6 +277,10 @@ class SimulationBatch:
             scans=scans,
             steering=None if observations.steering is None else observations.steering[rows],
         )
+
+    def _require_run(self, run: Any) -> int:
+        """Return the index of a run as an int; raise ParameterError unless there is such a run."""
+        return int(require_number("run", run, 0, len(self) - 1, whole=True))
 
     def _check_forces(self, forces: Any) -> FloatArray:
         """Check forces passed to `step`, and return them with one row for each robot of all runs."""
@@ -349,9 +359,12 @@ class SimulationBatch:
 
         Raises
         ------
+        ParameterError
+            If there is no such run.
         StartError
             If there is not one start for each robot, or a robot would start in a wall or in another robot.
         """
+        run = self._require_run(run)
         positions = TeamState(starts).positions
         if len(positions) != len(self.team):
             raise StartError(

@@ -145,7 +145,7 @@ def find_free_position(
         discs = shapely.buffer(shapely.points(others), circumradii, quad_segs=_QUADRANT_SEGMENTS)
         area = area.difference(shapely.union_all(discs))
     if area.is_empty:
-        raise StartError("there is no space for a robot there")
+        raise StartError(f"no space for a robot of radius {radius:g} m in map {environment.name!r}")
     x, y = find_nearest_inside(area, np.array([point], dtype=float))[0].tolist()
     return x, y
 

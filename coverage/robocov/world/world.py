@@ -235,7 +235,7 @@ class World:
         """Return the number of substeps in a step, so that no robot can cross a thin wall in a substep."""
         max_speed = self._max_team_speed
         if self._may_exceed_max_speed or len(external) > 0:
-            possible_speeds = self._compute_speeds() + self._compute_external_acceleration(external) * dt
+            possible_speeds = self._compute_speeds() + self._compute_external_accelerations(external) * dt
             max_speed = max(max_speed, float(possible_speeds.max()))
         # In a substep, a robot moves by no more than its radius relative to any obstacle.
         travel_in_radii = (max_speed + self._obstacles.max_speed) * dt / self._min_radius
@@ -316,7 +316,7 @@ class World:
         without_external = np.maximum(self.team.max_speed, speeds - self.team.max_acceleration * dt)
         with_external = without_external
         if len(external) > 0:
-            pushed_speeds = speeds + self._compute_external_acceleration(external) * dt
+            pushed_speeds = speeds + self._compute_external_accelerations(external) * dt
             with_external = np.maximum(without_external, pushed_speeds)
         return _SpeedLimits(without_external_forces=without_external, with_external_forces=with_external)
 
@@ -326,10 +326,10 @@ class World:
             return self._is_unicycle & ~external.any(axis=1)
         return self._is_unicycle
 
-    def _compute_external_acceleration(self, external: FloatArray) -> FloatArray:
-        """Return the accelerations due to external forces, (n,) m/s²; a single 0 if there are no forces."""
+    def _compute_external_accelerations(self, external: FloatArray) -> FloatArray:
+        """Return the magnitudes of the accelerations due to external forces, (n,) m/s²."""
         if len(external) == 0:
-            return np.zeros(1)
+            return np.zeros(len(self.team))
         return compute_lengths(external) / self.team.mass
 
     def _compute_speeds(self) -> FloatArray:

@@ -109,14 +109,14 @@ def test_messages_agree_with_a_simulation_of_each_message(
     known_messages = simulate_messages(conditions, ranges, walks, working)
     for step, positions in enumerate(walks):
         inbox = radio.exchange_positions(inbox, step, positions, positions, working[step])
-        neighbors, reported, ages = radio.read_reports(inbox, step, working[step])
-        robot, other = neighbors.list_pairs()
+        reports = radio.read_reports(inbox, step, working[step])
+        robot, other = reports.neighbors.list_pairs()
         pairs = sorted(known_messages[step])
         assert list(zip(robot.tolist(), other.tolist(), strict=True)) == pairs
         for k, pair in enumerate(pairs):
             message = known_messages[step][pair]
-            np.testing.assert_array_equal(reported[k], message.position)
-            assert ages[k] == pytest.approx((step - message.step) * DT)
+            np.testing.assert_array_equal(reports.positions[k], message.position)
+            assert reports.ages[k] == pytest.approx((step - message.step) * DT)
 
 
 @pytest.mark.parametrize(("delay", "dt", "steps"), [(0.14, 0.02, 7), (0.7, DT, 7), (0.71, DT, 8)])
@@ -130,7 +130,7 @@ def test_latency_and_silence_of_whole_steps_are_exact(delay: float, dt: float, s
         # The robots are out of range after the first message.
         positions = np.array([[0.0, 0.0], [9.0 * step, 0.0]])
         inbox = radio.exchange_positions(inbox, step, positions, positions, working)
-        _, reported, _ = radio.read_reports(inbox, step, working)
+        reported = radio.read_reports(inbox, step, working).positions
         if len(reported) > 0:
             steps_with_report.append(step)
     assert steps_with_report == list(range(steps, steps + 4))
@@ -179,7 +179,7 @@ def test_messages_are_lost_with_the_given_probability() -> None:
     received = 0
     for step, positions in enumerate(draw_walks(robots, steps, 1)):
         inbox = radio.exchange_positions(inbox, step, positions, positions, working)
-        _, reported, _ = radio.read_reports(inbox, step, working)
+        reported = radio.read_reports(inbox, step, working).positions
         received += len(reported)
     sent = steps * robots * (robots - 1)
     assert abs(received / sent - 0.7) < 5 * np.sqrt(0.21 / sent)

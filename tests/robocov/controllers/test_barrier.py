@@ -57,7 +57,7 @@ def list_candidates(
 
 @settings(max_examples=count_examples(60))
 @given(seed=st.integers(0, 2**32), m=st.integers(0, 9))
-def test_the_quadratic_programme_is_solved_exactly(seed: int, m: int) -> None:
+def test_the_quadratic_program_is_solved_exactly(seed: int, m: int) -> None:
     """Compare with the best of all candidates."""
     desired, normals, offsets, radius = sample_half_planes(seed, 5, m)
     best, feasible = find_nearest_allowed_points(desired, normals, offsets, radius)

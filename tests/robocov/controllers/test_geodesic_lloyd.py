@@ -134,7 +134,7 @@ def test_paths_lead_through_the_door() -> None:
     assert np.hypot(*(path[1] - [4.9, 8.0])) == pytest.approx(0.13, abs=0.02)
 
 
-def test_goals_on_the_own_side_of_a_wall_are_approached_straight() -> None:
+def test_goals_on_the_same_side_of_a_wall_are_approached_straight() -> None:
     planner = GeodesicPlanner(DOOR, 0.13, 48, radius=0.1)
     plan = planner.plan(observe(np.array([[2.0, 1.0], [1.0, 2.0]]), DOOR.region), 2.0)
     assert (plan.goals[:, 0] < 4.9).all()
@@ -173,7 +173,7 @@ def test_a_simulation_informs_the_controller_and_keeps_the_original() -> None:
     np.testing.assert_allclose(goals, fresh.observe_and_decide().decision.goals, atol=0.05)
 
 
-def test_robots_plan_by_the_robots_that_they_hear_and_the_density() -> None:
+def test_plans_depend_on_the_robots_in_range_and_the_density() -> None:
     """Two robots out of communication range of each other both move to the center of the density."""
     bell = replace(SQUARE, density=Gaussians((Gaussian((7.0, 7.0), 1.0, 1.0),), floor=0.001))
     controller = inform_controller(GeodesicLloyd(exponent=2.0), bell)

@@ -227,7 +227,7 @@ def test_a_robot_halfway_between_two_rooms_has_a_route(
     assert np.isfinite(simulation.run(1.0).positions).all()
 
 
-def test_gains_are_checked() -> None:
+def test_gains_out_of_range_are_rejected() -> None:
     with pytest.raises(ParameterError, match=r"local-search\.nodes: .*whole number from 16 to 20000"):
         make_controller("local-search", {"nodes": 50.5})
     with pytest.raises(ParameterError, match=r"'exemplar': expected a map, call inform"):

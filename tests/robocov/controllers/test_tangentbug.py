@@ -43,7 +43,7 @@ def simulate(
     return simulation.positions
 
 
-def test_a_robot_leaves_a_trap_that_holds_the_one_of_lloyd() -> None:
+def test_a_robot_leaves_a_trap_in_which_lloyd_stays() -> None:
     """The claim of TangentBug: a reachable goal is reached."""
     tangentbug = simulate(U_TRAP, [[2.5, 5.2]], 25.0, TangentBug())
     lloyd = simulate(U_TRAP, [[2.5, 5.2]], 25.0, Lloyd())

@@ -65,7 +65,7 @@ def test_all_modules_of_the_author_are_found_without_running_them(folder: Path) 
     assert pickle.loads(pickle.dumps(ControllerSource("mine.py", CONTROLLER, modules))).modules == modules
 
 
-def test_a_controller_imports_modules_beside_its_file(
+def test_a_controller_imports_modules_next_to_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "path", [*sys.path])
@@ -89,7 +89,7 @@ def test_installed_packages_are_left_out(folder: Path, monkeypatch: pytest.Monke
 
 
 def test_modules_are_imported_from_their_texts_and_leave_no_trace(
-    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+    folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (folder / "tree_a" / "leaf.py").write_text("# -*- coding: latin-1 -*-\nword = 'ü'\n", "latin-1")
     text = (

@@ -199,8 +199,20 @@ def test_errors_name_robots_outside_the_free_space():
         InputError, match=r"positions\[1\]: .*, got \[0.5, 0.5\], 0.125 m outside the free space"
     ):
         cost([[0.1, 0.1], [0.5, 0.5]])
-    with pytest.raises(InputError, match="positions: expected at least one robot"):
-        cost([])
+
+
+def test_a_cost_and_a_path_require_a_robot():
+    cost = CoverageCost(PILLAR, lattice=8)
+    for positions in ([], np.empty((0, 2))):
+        with pytest.raises(InputError, match="positions: expected at least one robot, got none"):
+            cost(positions)
+        with pytest.raises(InputError, match="positions: expected at least one robot, got none"):
+            cost.find_path(positions, np.array([0.1, 0.1]))
+
+
+def test_a_path_requires_a_point():
+    with pytest.raises(InputError, match=r"point: expected \[x, y\] in meters, got 'x'"):
+        CoverageCost(PILLAR, lattice=8).find_path([[0.1, 0.1]], "x")
 
 
 @pytest.mark.parametrize("lattice", [0, -3, 1.5, True, 5000, "64", None])

@@ -48,7 +48,7 @@ def test_teams_may_cover_different_components():
         assert_results_are_equal(result, cost(team))
 
 
-def test_no_team_has_no_result():
+def test_an_empty_array_of_teams_has_no_results():
     assert CoverageCost(TWO_ROOMS, 8).evaluate_teams(np.empty((0, 3, 2))) == []
 
 

@@ -53,7 +53,7 @@ def test_robot_at_a_closed_gap_covers_a_side(position: list[float]) -> None:
 
 
 @pytest.mark.parametrize("position", [[6.9, 0.05], [6.9000015, 0.05], [7.1, 0.05]])
-def test_path_to_a_point_at_a_closed_gap(position: list[float]) -> None:
+def test_a_point_at_a_closed_gap_may_have_a_path(position: list[float]) -> None:
     path = CoverageCost(CRACKED, 32).find_path(ROBOT, np.array(position))
     assert path.shape[1] == 2
 
@@ -99,7 +99,7 @@ def test_gaps_follow_moving_obstacles() -> None:
 
 
 @pytest.mark.parametrize("radius", [-0.1, np.inf, None])
-def test_radius_is_checked(radius: object) -> None:
+def test_an_invalid_radius_is_rejected(radius: object) -> None:
     with pytest.raises(ParameterError, match="radius"):
         CoverageCost(CRACKED, 32, radius=radius)  # type: ignore[arg-type]
 

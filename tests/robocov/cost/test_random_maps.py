@@ -177,7 +177,7 @@ def test_medium_maps_agree_with_the_brute_force(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("lattice", "robots"), [(32, 1000), (128, 1), (256, 300), (384, 50)])
-def test_lattices_and_teams_of_every_size(lattice, robots):
+def test_costs_agree_with_distances_for_lattices_and_teams_of_any_size(lattice, robots):
     environment = build_random_map("polygons", 40, 5)
     positions = draw_positions(environment, robots, 3)
     cost = CoverageCost(environment, lattice)

@@ -100,7 +100,7 @@ def test_acute_corner_is_not_an_obstacle_to_the_bar() -> None:
 
 
 @pytest.mark.parametrize(("radius", "components"), [(0.06, 2), (0.08, 1)])
-def test_courtyard_between_pillars(radius: float, components: int) -> None:
+def test_a_courtyard_is_a_component_if_the_disc_fits_in_it(radius: float, components: int) -> None:
     pillars = [build_box(x, y, x + 0.2, y + 0.2) for x in (4.0, 4.3) for y in (2.0, 2.3)]
     closed = build_hall(*pillars).close_gaps(radius)
     # A small disc fits in the courtyard, but not through the gaps. For a larger one, it is a niche.
@@ -124,7 +124,7 @@ def test_moving_obstacles_stand_at_time_zero() -> None:
 
 
 @pytest.mark.parametrize("radius", [-0.1, np.nan, np.inf, "wide"])
-def test_radius_is_checked(radius: object) -> None:
+def test_an_invalid_radius_is_rejected(radius: object) -> None:
     with pytest.raises(ParameterError, match="radius"):
         build_hall().close_gaps(radius)  # type: ignore[arg-type]
 
@@ -172,7 +172,7 @@ def test_components_are_those_of_a_disc(hall: Environment, radius: float) -> Non
 
 @settings(deadline=None, max_examples=count_examples(30))
 @given(draw_cluttered_halls())
-def test_bars_have_no_extent(hall: Environment) -> None:
+def test_closed_gaps_take_hardly_any_area(hall: Environment) -> None:
     closed = hall.close_gaps(RADIUS_M)
     assert abs(hall.free_area - closed.free_area) < 1e-4
     # Closing once is enough: no component has another gap between parts where the disc fits.

@@ -55,7 +55,7 @@ def test_the_same_seed_gives_the_same_positions(cluttered: Environment) -> None:
     assert not np.array_equal(start.sample(6, 3), start.sample(6, 4))
 
 
-def test_positions_are_those_of_the_last_version(cluttered: Environment) -> None:
+def test_a_seed_gives_the_positions_of_earlier_versions() -> None:
     """Saved studies contain starts and seeds, so positions must not change."""
     start = Start("wide", DiscStart((2.5, 2.5), 1.0), SQUARE)
     expected = [[1.9774691843, 2.9420289396], [3.157775734, 2.2890007007], [2.7120956862, 1.5850145627]]

@@ -77,7 +77,7 @@ def patch_directory(content: bytes, **changes: object) -> bytes:
 TWO = save_arrays(a=np.zeros(20_000), b=np.ones(20_000))
 
 
-def test_the_patched_file_is_read_without_the_patch() -> None:
+def test_an_archive_is_read_after_its_directory_is_rewritten() -> None:
     assert sorted(read(patch_directory(TWO))) == ["a", "b"]
 
 

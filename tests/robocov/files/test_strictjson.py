@@ -58,7 +58,7 @@ class Writer:
 
 
 @given(documents, st.data())
-def test_everything_is_found_where_it_was_written(document: Any, data: st.DataObject) -> None:
+def test_values_and_keys_are_found_where_they_were_written(document: Any, data: st.DataObject) -> None:
     writer = Writer(data)
     writer.write(document)
     for path, offset in writer.values.items():
@@ -71,7 +71,7 @@ def test_everything_is_found_where_it_was_written(document: Any, data: st.DataOb
             assert find_offset(writer.text, (*path, missing, 0), at_key=True) == offset
 
 
-def test_of_a_key_given_twice_the_last_counts() -> None:
+def test_the_last_of_two_equal_keys_counts() -> None:
     text = '{"a": {"b": 1}, "a": {"b": 2}}'
     assert text[find_offset(text, ("a", "b")) :] == "2}}"
     assert text[find_offset(text, ("a",), at_key=True) :] == '"a": {"b": 2}}'
@@ -104,5 +104,5 @@ def test_lines_end_as_editors_end_them(text: str, data: st.DataObject) -> None:
         ("[" * 1000, 2),
     ],
 )
-def test_the_place_that_is_too_deep(text: str, offset: int) -> None:
+def test_the_first_bracket_that_is_too_deep_is_found(text: str, offset: int) -> None:
     assert find_deep_nesting(text, 2) == offset

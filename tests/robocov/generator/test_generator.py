@@ -112,7 +112,7 @@ def test_maps_have_the_requested_properties(request_parameters):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["polygons", "blocks", "rooms", "mazes"])
-def test_maps_may_be_large(kind):
+def test_large_maps_with_many_obstacles_are_connected(kind):
     environment = generate_map(0, kind=kind, obstacles=250, side=50.0)
     assert len(environment.free.geoms) == 1
     assert len(environment.obstacles) > 50
@@ -137,7 +137,7 @@ def test_saved_maps_are_loaded_unchanged(tmp_path_factory, request_parameters):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", GENERATORS)
-def test_starts_have_room_for_a_team(kind):
+def test_starts_have_space_for_a_team(kind):
     for seed in range(12):
         environment = generate_map(seed, kind=kind)
         corner = environment.starts["corner"]

@@ -145,7 +145,7 @@ def test_the_grid_has_about_the_requested_number_of_cells(
 
 
 @pytest.mark.slow
-def test_no_wall_stands_in_the_start() -> None:
+def test_starts_contain_no_walls() -> None:
     for seed in range(12):
         # The corridors are narrower than the disc.
         environment = generate_map(seed, kind="mazes", obstacles=144, area=0.15)

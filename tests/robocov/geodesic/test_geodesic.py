@@ -72,7 +72,7 @@ MAZE = build_environment(
         (MAZE, (0.5, 0.5), (7.5, 7.5), np.hypot(0.5, 6.5) + 2 + 2 * np.hypot(1, 6) + np.hypot(2.5, 0.5)),
     ],
 )
-def test_distances_known_in_closed_form(environment, source, target, expected):
+def test_distances_agree_with_closed_forms(environment, source, target, expected):
     distances = Geodesics(environment)
     assert distances.compute_distances([source], [target])[0, 0] == pytest.approx(expected, abs=1e-12)
     assert distances.compute_distances([target], [source])[0, 0] == pytest.approx(expected, abs=1e-12)

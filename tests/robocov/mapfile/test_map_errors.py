@@ -244,7 +244,7 @@ def test_values_that_are_not_json_are_rejected_in_documents(value: object) -> No
         from_json(edit("extra", {"a": value}), "m")
 
 
-def test_a_misspelt_key_is_reported_before_the_missing_one() -> None:
+def test_a_misspelled_key_is_reported_before_the_missing_one() -> None:
     document = edit("boundry", DOCUMENT["boundary"], document=edit("boundary", DELETED))
     with pytest.raises(
         MapError, match=r"^map: unknown key 'boundry': did you mean 'boundary'\?.*\(and 1 more issue\)$"

@@ -222,7 +222,7 @@ def test_images_next_to_the_map_are_read_as_rasters(tmp_path):
     assert load_map(write_map(tmp_path, "phi.pgm")).density.values.tolist() == [[0.0, 1.0]]
 
 
-def test_images_of_earlier_versions_have_the_key_picture(tmp_path):
+def test_the_former_key_of_an_image_is_accepted(tmp_path):
     write_image(tmp_path / "phi.png", [[0, 255]])
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(build_document({"kind": "raster", "picture": "phi.png"})))

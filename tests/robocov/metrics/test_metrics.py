@@ -79,7 +79,7 @@ def test_a_run_shorter_than_the_window_cannot_settle() -> None:
     assert find_settling_time(np.array([0.0]), np.zeros((1, 1, 2))) is None
 
 
-def test_path_length_of_a_circle() -> None:
+def test_the_path_length_of_a_circle_is_its_circumference() -> None:
     angle = np.linspace(0, 2 * np.pi, 2001)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None, :]
     np.testing.assert_allclose(compute_path_lengths(circle), [2 * np.pi], rtol=1e-5)
@@ -103,7 +103,7 @@ def test_contacts_are_counted_when_they_begin(record: Record) -> None:
     assert count_contacts(two_robots, clearances) == 4 + 2
 
 
-def test_gaps_between_robots_of_different_size(record: Record) -> None:
+def test_gaps_are_measured_between_the_surfaces_of_robots(record: Record) -> None:
     """Robot 2, which is the largest, is farther along x than robot 1, and yet closer to robot 0."""
     positions = np.array([[[0.0, 0.0], [0.0001, 0.25], [0.62, 0.0]]])
     team = replace(record.team[:3], radius=np.array([0.1, 0.1, 0.5]))
@@ -215,7 +215,7 @@ def test_a_robot_at_rest_away_from_its_goal_is_stuck() -> None:
     assert count_stuck_robots(time, trembling, build_goals(9.0, 201)) == 1
 
 
-def test_the_window_of_a_stuck_robot_contains_its_first_moment() -> None:
+def test_the_window_of_a_stuck_robot_contains_its_first_step() -> None:
     time = np.arange(41) * 0.25
     assert (
         count_stuck_robots(time, build_trajectory(np.where(time > 5.0, 1.0, 0.0)), build_goals(9.0, 41)) == 0
@@ -274,7 +274,7 @@ def test_summaries_contain_the_metrics_of_a_run(record: Record) -> None:
     assert summary["uncovered_area_m2"] == 0.0
 
 
-def test_rapf_touches_nothing(cluttered: Environment) -> None:
+def test_rapf_has_no_contacts(cluttered: Environment) -> None:
     record = Simulation(cluttered, Rapf(), cluttered.start().sample(6), dt=0.02).run(12.0)
     assert count_contacts(record, compute_clearances(record)) == 0
 

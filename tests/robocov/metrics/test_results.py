@@ -104,7 +104,7 @@ def test_rows_are_a_data_frame(folder: Path) -> None:
     assert few.dropna().to_dict("list") == {"controller": ["rapf"], "mean_distance_m": [1.5]}
 
 
-def test_failures_are_rows(folder: Path) -> None:
+def test_failures_returns_the_rows_of_failed_runs(folder: Path) -> None:
     assert read_results(folder).failures() == ROWS[1:]
 
 

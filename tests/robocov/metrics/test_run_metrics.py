@@ -68,7 +68,7 @@ def test_the_rate_does_not_change_the_final_metrics(record: Record) -> None:
     assert np.array(fine.rows()).shape == (121, len(COLUMNS))
 
 
-def test_clearances_are_minima_since_the_previous_moment(record: Record) -> None:
+def test_clearances_are_minima_since_the_previous_sample(record: Record) -> None:
     radius = record.team.radius
     gaps = [
         np.hypot(*(record.positions[:, i] - record.positions[:, j]).T) - radius[i] - radius[j]
@@ -115,7 +115,7 @@ def test_connectivity_agrees_with_the_laplacian(n: int, reach: float, seed: int)
     assert (connectivity == 0.0) == (components > 1)
 
 
-def test_connectivity_of_known_graphs() -> None:
+def test_a_ring_and_extreme_graphs_have_their_known_connectivity() -> None:
     angle = np.arange(6) * np.pi / 3
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     # The second eigenvalue of a ring is 2 - 2 cos(2 pi / 6).

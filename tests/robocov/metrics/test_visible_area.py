@@ -78,7 +78,7 @@ def test_covered_areas_agree_with_a_fine_lattice(seed: int, n: int, reach: float
     assert areas.sensed <= min(areas.within_range, areas.visible) * (1 + 1e-9)
 
 
-def test_covered_areas_of_known_discs() -> None:
+def test_covered_areas_agree_with_discs_and_rectangles() -> None:
     square = shapely.box(0, 0, 10, 10)
     areas = compute_covered_areas(square, np.array([[5.0, 5.0]]), np.array([2.0]))
     assert areas.sensed == pytest.approx(4 * np.pi, rel=5e-5)

@@ -20,7 +20,7 @@ def build_planner(is_blocked: np.ndarray, clearance: float = 0.15) -> GridPlanne
     return GridPlanner(map_window.known_map, map_window.window, clearance)
 
 
-def test_distances_from_positions_between_nodes() -> None:
+def test_distances_from_positions_are_nearly_straight_in_an_open_room() -> None:
     planner = build_planner(build_open_room(), clearance=0.0)
     positions = np.array([[1.23, 2.07], [4.4, 1.11]])
     straight = np.hypot(*(planner.map_window.nodes[:, None] - positions).T).min(axis=0)

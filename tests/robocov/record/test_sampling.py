@@ -28,7 +28,7 @@ def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
     assert len(kept) <= len(multiples) + 1
 
 
-def test_of_two_as_near_the_earlier_stays() -> None:
+def test_of_two_equally_near_steps_the_earlier_is_selected() -> None:
     time = np.arange(26) * 0.04  # 0.1 s lies between 0.08 and 0.12 s
     assert select_nearest_steps(time, 10.0).tolist() == [0, 2, 5, 7, 10, 12, 15, 17, 20, 22, 25]
     # however the sums of steps are rounded

@@ -64,6 +64,12 @@ def test_a_record_is_thinned_and_a_run_is_stopped() -> None:
     assert len(scenario.run(every=7)) == 6
 
 
+@pytest.mark.parametrize("every", [0, -2, 1.5, None])
+def test_the_interval_of_recorded_steps_is_a_positive_whole_number(every: object) -> None:
+    with pytest.raises(ParameterError, match="every: expected a whole number of at least 1, got"):
+        rc.Scenario(ROOM, robots=1, duration=0.1).run(every=every)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("changes", "error"),
     [

@@ -77,14 +77,14 @@ def test_individual_controllers_without_begin_keep_numbers_and_memory_within_a_r
             return [0.01 * own.memory, 0.01 * own.number]
 
     starts = [ROOMS.start().sample(2, seed=seed) for seed in range(2)]
-    batch = SimulationBatch(ROOMS, StepCounter(), starts)
-    alone = [Simulation(ROOMS, StepCounter(), positions) for positions in starts]
+    batch = SimulationBatch(ROOMS, Counter(), starts)
+    alone = [Simulation(ROOMS, Counter(), positions) for positions in starts]
     for _ in range(5):
         batch.step()
         for simulation in alone:
             simulation.step()
     batch.restart(1, starts[1])
-    alone[1] = Simulation(ROOMS, StepCounter(), starts[1])
+    alone[1] = Simulation(ROOMS, Counter(), starts[1])
     for _ in range(5):
         batch.step()
         for simulation in alone:
@@ -136,6 +136,18 @@ def test_a_restart_keeps_the_memory_of_other_runs() -> None:
         batch.step()
         other.step()
     assert batch.positions[1].tobytes() == other.positions.tobytes()
+
+
+@pytest.mark.parametrize("run", [-1, 2, 0.5, None])
+@pytest.mark.parametrize("controller", [Lloyd(), StepCounter()], ids=["lloyd", "step-counter"])
+def test_a_run_that_does_not_exist_is_rejected(controller: Lloyd | StepCounter, run: object) -> None:
+    starts = np.array([ROOMS.start().sample(2, seed=seed) for seed in range(2)])
+    batch = SimulationBatch(ROOMS, controller, starts)
+    with pytest.raises(ParameterError, match="run: expected a whole number from 0 to 1, got"):
+        batch.restart(run, starts[0])  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="run: expected a whole number from 0 to 1, got"):
+        batch.observe_run(run)  # type: ignore[arg-type]
+    batch.step()
 
 
 def test_robots_observe_their_own_run_only() -> None:

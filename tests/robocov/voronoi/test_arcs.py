@@ -50,7 +50,7 @@ def test_moments_of_an_arc_agree_with_quadrature(seed: int, log_size: float, sig
 
 
 @pytest.mark.parametrize("pieces", [2, 3, 7, 40])
-def test_moments_of_a_whole_circle(pieces: int) -> None:
+def test_arcs_of_a_whole_circle_have_the_moments_of_the_disc(pieces: int) -> None:
     ((area, *first, polar),) = compute_moments(build_circle(2.0, pieces, center=(5.0, 1.0)), 1)
     assert area == pytest.approx(4 * np.pi, rel=1e-14)
     np.testing.assert_allclose(first, 4 * np.pi * np.array([5.0, 1.0]), rtol=1e-13)

@@ -81,7 +81,7 @@ def test_nine_robots_on_a_lattice_get_a_ninth_of_the_square_each() -> None:
         assert [len(polygon) for polygon in cells.polygons] == [4] * 9
 
 
-def test_three_cells_that_meet_on_the_boundary() -> None:
+def test_three_cells_may_meet_on_the_boundary() -> None:
     cells = partition(np.array([[1.0, 0.0], [3.0, 2.0], [5.0, 0.0]]), SQUARE)
     assert cells.masses == pytest.approx([4.5, 27.0, 4.5], rel=1e-13)
     assert cells.adjacency.tolist() == [[0, 1], [1, 2]]

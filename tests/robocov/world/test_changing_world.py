@@ -79,7 +79,7 @@ def test_a_robot_joins_next_to_one_that_occupies_its_position() -> None:
     assert changing.positions[1, 0] > 5.1
 
 
-def test_errors_name_a_robot_without_room_to_join() -> None:
+def test_errors_name_a_robot_without_space_to_join() -> None:
     cell = Environment("cell", ((0, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)))
     starts = np.array([[0.15, 0.15], [0.15, 0.15]])
     with pytest.raises(StartError, match=r"robot 2 joins at 0.1\d* s at .*, but there is no space"):
@@ -145,7 +145,7 @@ def test_robots_sense_failed_robots() -> None:
     np.testing.assert_array_equal(twin.observe().obstacle_points[0], obstacle_point)
 
 
-def test_robots_that_have_not_joined_touch_nothing() -> None:
+def test_robots_that_have_not_joined_have_no_contacts() -> None:
     """Until they join, all of them are at one position."""
     x, y = np.meshgrid(np.arange(12) * 0.6 + 1, np.arange(10) * 0.6 + 1)
     starts = np.column_stack([x.ravel(), y.ravel()])

@@ -65,7 +65,7 @@ def test_a_robot_leaves_an_obstacle_by_the_shortest_path():
         np.testing.assert_allclose(relocated, 4.0 + 1.1 * direction, atol=0.03)
 
 
-def test_robots_at_one_position_make_room_for_each_other():
+def test_robots_at_one_position_are_moved_apart():
     relocated = relocate_robots(EMPTY, np.full((12, 2), 4.0), Team.homogeneous(12, radius=0.2))
     assert compute_distances(relocated).min() >= 0.4
     assert np.hypot(*(relocated - 4.0).T).max() < 2.0
@@ -76,7 +76,7 @@ def test_robots_outside_the_map_move_inside():
     np.testing.assert_allclose(relocated, [[0.1, 4.0], [7.9, 7.9]], atol=0.01)
 
 
-def test_errors_name_a_robot_without_room():
+def test_errors_name_a_robot_without_space():
     team = replace(Team.homogeneous(2), radius=np.array([0.1, 5.0]))
     with pytest.raises(StartError, match=r"robot 2 of radius 5 m fits nowhere in map 'empty'"):
         relocate_robots(EMPTY, np.ones((2, 2)), team)

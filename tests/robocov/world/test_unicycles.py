@@ -254,14 +254,14 @@ def assert_nothing_is_touched(name: str, controller: Rapf | Atlas | Barrier, dur
 
 
 @pytest.mark.parametrize("name", ["rooms", "museum", "office"])
-def test_unicycles_touch_nothing_as_points_do(name: str) -> None:
+def test_unicycles_have_no_contacts_where_points_have_none(name: str) -> None:
     assert_nothing_is_touched(name, Rapf(), 15.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rooms", "museum"])
 @pytest.mark.parametrize("controller", [Rapf(), Atlas(), Barrier()], ids=lambda controller: controller.name)
-def test_unicycles_touch_nothing_in_long_runs(name: str, controller: Rapf | Atlas | Barrier) -> None:
+def test_unicycles_have_no_contacts_in_long_runs(name: str, controller: Rapf | Atlas | Barrier) -> None:
     assert_nothing_is_touched(name, controller, 40.0)
 
 

@@ -80,7 +80,7 @@ def test_a_free_position_is_kept():
 def test_a_full_map_has_no_free_position():
     assert find_free_position(CELL, RADIUS, np.array([[0.15, 0.15]]), (0.15, 0.15))
     for radius, others in ((RADIUS, np.array([[0.225, 0.225]])), (0.3, NO_ROBOTS)):
-        with pytest.raises(StartError, match="no space for a robot there"):
+        with pytest.raises(StartError, match=r"no space for a robot of radius .* m in map"):
             find_free_position(CELL, radius, others, (0.25, 0.25))
 
 

@@ -349,7 +349,9 @@ class Atlas(BaseController):
         state = replace(previous, knowledge=knowledge, next_plan_time=seen.time + period)
         robots = np.concatenate([[robot], others.robots])
         positions = np.vstack([position, others.positions])
-        if _may_skip_plan(previous, robots, positions, others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing):
+        if _may_skip_plan(
+            previous, robots, positions, is_quiet=others.is_quiet, max_move=_MAX_IDLE_MOVE * spacing
+        ):
             return state, None
 
         radius = float(team.radius[robot])
@@ -522,7 +524,7 @@ class Atlas(BaseController):
 
 
 def _may_skip_plan(
-    previous: PlannerState, robots: IntArray, positions: FloatArray, is_quiet: bool, *, max_move: float
+    previous: PlannerState, robots: IntArray, positions: FloatArray, *, is_quiet: bool, max_move: float
 ) -> bool:
     """Return whether a robot may skip its plan: it is idle, and nothing has changed since its last plan."""
     basis = previous.basis

@@ -31,7 +31,7 @@ _BLOCK = np.ones((3, 3), dtype=bool)
 
 @dataclass(frozen=True)
 class FrontierMedian(SharedMapController):
-    """Exploration of the whole building by frontiers, and then the k-median of the discovered map.
+    """Exploration of the whole region by frontiers, and then the k-median of the discovered map.
 
     *Exploration.* Frontiers are the borders between known free space and unknown space (Yamauchi 1997, and
     1998 for several robots, which share their maps). Targets on the frontiers are assigned to robots by

@@ -35,7 +35,7 @@ _MIN_FURTHER_SAVING = 1e-6
 
 @dataclass(frozen=True)
 class VoronoiGraphCoverage(SharedMapController):
-    """Placement of robots on the roadmap of the building, by distances along it.
+    """Placement of robots on a roadmap of the free space, by distances along it.
 
     The roadmap is the generalized Voronoi graph of Choset and Burdick (IJRR 19, 2000): the points with equal
     distances to two walls. The placement is that of Yun and Rus, "Distributed coverage with mobile robots on

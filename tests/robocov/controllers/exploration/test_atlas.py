@@ -202,7 +202,7 @@ def test_robots_plan_at_different_times() -> None:
     assert max(plan_times) < 2.5
 
 
-def test_gains_are_checked() -> None:
+def test_gains_out_of_range_are_rejected() -> None:
     assert make_controller("atlas", {"period": 2}) == replace(Atlas(), period=2.0)
     with pytest.raises(ParameterError, match=r"atlas-shared.threshold: expected .*, got -1"):
         make_controller("atlas-shared", {"threshold": -1})
@@ -552,17 +552,19 @@ def test_a_plan_is_skipped_only_if_nothing_has_changed() -> None:
     assert state.basis is not None and state.motion is not None
     positions = state.basis.positions
 
-    def is_skipped(state: PlannerState, group: np.ndarray, positions: np.ndarray, is_quiet: bool) -> bool:
-        return atlas._may_skip_plan(state, group, positions, is_quiet, max_move=0.1)
+    def is_skipped(
+        state: PlannerState, group: np.ndarray, positions: np.ndarray, *, is_quiet: bool = True
+    ) -> bool:
+        return atlas._may_skip_plan(state, group, positions, is_quiet=is_quiet, max_move=0.1)
 
-    assert is_skipped(state, group, positions + 0.09, True)
-    assert not is_skipped(state, group, positions + [[0.0, 0.0], [0.11, 0.0]], True)
-    assert not is_skipped(state, np.array([0, 2]), positions, True)
-    assert not is_skipped(state, group, positions, False)
-    assert not is_skipped(replace(state, motion=replace(state.motion, is_idle=False)), group, positions, True)
+    assert is_skipped(state, group, positions + 0.09)
+    assert not is_skipped(state, group, positions + [[0.0, 0.0], [0.11, 0.0]])
+    assert not is_skipped(state, np.array([0, 2]), positions)
+    assert not is_skipped(state, group, positions, is_quiet=False)
+    assert not is_skipped(replace(state, motion=replace(state.motion, is_idle=False)), group, positions)
     other_map = DiscoveredMap(state.known_map.raster, np.ones_like(state.known_map.state))
-    assert not is_skipped(replace(state, known_map=other_map), group, positions, True)
-    assert not is_skipped(replace(state, basis=None), group, positions, True)
+    assert not is_skipped(replace(state, known_map=other_map), group, positions)
+    assert not is_skipped(replace(state, basis=None), group, positions)
 
 
 def test_a_robot_starts_again_when_walls_change() -> None:

@@ -60,7 +60,7 @@ def list_scans(exchange: ScanExchange, robot: int) -> list[NumberedScan]:
     return [scan for round_scans in rounds for scan in round_scans if scan is not None]
 
 
-def test_robots_that_all_hear_each_other_share_one_log_and_one_map() -> None:
+def test_robots_in_range_of_all_others_share_one_log_and_one_map() -> None:
     simulation = build_simulation()
     run_until(simulation, 3.1)
     exchange = get_exchange(simulation)
@@ -209,7 +209,7 @@ def replay(simulation: Simulation, observations: list[Observations]) -> list[Any
 @pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=count_examples(3), phases=[Phase.generate])
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.0, 0.3, 0.8]), robot=st.integers(0, 3))
-def test_what_has_not_been_delivered_changes_nothing(name: str, seed: int, loss: float, robot: int) -> None:
+def test_undelivered_messages_change_no_decision(name: str, seed: int, loss: float, robot: int) -> None:
     """A robot decides the same, bit for bit, if all that it does not receive is replaced."""
     conditions = Conditions(loss=loss, delay=0.2, message_rate=4.0, bandwidth=4000.0, seed=seed)
     simulation = build_simulation(name, conditions, communication_range=3.0)
@@ -254,7 +254,7 @@ def test_controllers_exchange_scans(name: str) -> None:
     assert simulation.sent_bytes == len(CORNER) * (542 + 8 + 12 * len(CORNER) + 1)
 
 
-def test_reports_are_sent_if_a_neighbor_does_not_hear_all_others() -> None:
+def test_reports_are_sent_if_a_neighbor_is_not_in_range_of_all_others() -> None:
     """Robot 2, in the middle, is in range of robots 1 and 3, which are out of range of each other."""
     team = Team.homogeneous(3, communication_range=5.0)
     starts = [[6.5, 1.5], [10.0, 1.5], [13.5, 1.5]]
@@ -270,7 +270,7 @@ def test_reports_are_sent_if_a_neighbor_does_not_hear_all_others() -> None:
     assert reporters == {1}
 
 
-def test_robots_that_all_hear_each_other_send_no_reports() -> None:
+def test_robots_in_range_of_all_others_send_no_reports() -> None:
     simulation = build_simulation("atlas-shared")
     for _ in range(30):
         for messages in simulation.observe_and_decide().decision.messages:
