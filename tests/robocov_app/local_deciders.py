@@ -53,8 +53,8 @@ class LocalDecider:
 
 def run_isolated(
     task: Task, robots: Sequence[int], snapshots: list[Snapshot] | None = None
-) -> tuple[Outcome, list[str], dict[int, LocalDecider]]:
-    """Run a task as a referee does; return the outcome, the differences and the deciders of the robots."""
+) -> tuple[Outcome, IsolatedTeam, dict[int, LocalDecider]]:
+    """Run a task as a referee does; return the outcome, the team and the deciders of the robots."""
     controller = make_controller(task.controller, task.gains, source=task.source)
     scanning: Scanning | None = getattr(controller, "scanning", None)
     information = get_information(controller)
@@ -78,4 +78,4 @@ def run_isolated(
             snapshots.append(snapshot)
 
     outcome = perform(task, watch, team)
-    return outcome, team.differences, deciders
+    return outcome, team, deciders

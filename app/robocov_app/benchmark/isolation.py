@@ -32,8 +32,10 @@ shows that its decisions follow from the observations and the map, but ignores t
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any, Protocol
 
 import numpy as np
@@ -196,6 +198,10 @@ class IsolatedTeam:
     ----------
     differences : list of str
         The first difference of each robot, and messages that the robots must not send.
+    declared_bytes : int
+        Total size of the messages of all robots, as their controller declares it.
+    compressed_bytes : int
+        Total size of the compressed payloads of these messages.
     """
 
     name = label = "isolated"
@@ -214,6 +220,8 @@ class IsolatedTeam:
     ) -> None:
         self.scanning = scanning
         self.differences: list[str] = []
+        self.declared_bytes = 0
+        self.compressed_bytes = 0
         self._may_send_messages = may_send_messages
         self._has_reported_messages = False
         self._code = code
@@ -248,6 +256,7 @@ class IsolatedTeam:
         self._team_decision = team_decision
         if any(team_decision.messages):
             self._report_messages(seen.time)
+            self._measure_messages(team_decision)
         self._own_decisions = {}
         for robot, decider in list(self._robots.items()):
             own_sensor = None if sensor is None else _OwnSensor(sensor, robot)
@@ -265,6 +274,12 @@ class IsolatedTeam:
             return
         self._has_reported_messages = True
         self.differences.append(f"robots send messages from {time:.2f} s on, but declare the information own")
+
+    def _measure_messages(self, decision: Decision) -> None:
+        """Add up the declared sizes of the messages, and those of their compressed payloads."""
+        for message in chain.from_iterable(decision.messages):
+            self.declared_bytes += message.size
+            self.compressed_bytes += len(zlib.compress(message.payload))
 
     def compare_decisions(self, snapshot: Snapshot) -> None:
         """Compare the decisions of the latest step. Those of failed robots have no effect and are ignored."""

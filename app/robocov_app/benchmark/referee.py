@@ -70,12 +70,16 @@ class RunCheck:
         Everything that is not as expected, apart from the metrics of the run.
     read_files : list of str
         Files that the controller has read, apart from those of Python and installed packages.
+    declared_bytes, compressed_bytes : int
+        Total size of all messages, as declared and as compressed payloads.
     """
 
     outcome: Outcome | None
     robots: int
     differences: list[str]
     read_files: list[str] = field(default_factory=list)
+    declared_bytes: int = 0
+    compressed_bytes: int = 0
 
 
 class RefereeService:
@@ -110,7 +114,12 @@ class RefereeService:
         # Most files of the run are not needed for its row, and are not sent back.
         files = {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
         return RunCheck(
-            replace(outcome, files=files), len(robot_processes), differences, list(dict.fromkeys(read_files))
+            replace(outcome, files=files),
+            robots=len(robot_processes),
+            differences=differences,
+            read_files=list(dict.fromkeys(read_files)),
+            declared_bytes=isolated_team.declared_bytes,
+            compressed_bytes=isolated_team.compressed_bytes,
         )
 
 

@@ -131,6 +131,8 @@ class Verification:
         Track of the runs on new maps; empty if the result has no runs on generated maps.
     comparison : NewMapComparison or None
         Comparison of gaps on new maps with those on the suite.
+    declared_bytes, compressed_bytes : int
+        Total size of all messages in the runs, as declared and as compressed payloads.
     differences : list of str
         Everything that is not as expected.
     read_files : list of str
@@ -146,6 +148,8 @@ class Verification:
     new_maps: int = 0
     new_map_track: str = ""
     comparison: NewMapComparison | None = None
+    declared_bytes: int = 0
+    compressed_bytes: int = 0
     differences: list[str] = field(default_factory=list)
     read_files: list[str] = field(default_factory=list)
 
@@ -168,6 +172,8 @@ class Verification:
         if is_joint:
             self.teams += 1
         self.robots += check.robots
+        self.declared_bytes += check.declared_bytes
+        self.compressed_bytes += check.compressed_bytes
         self.read_files += [file for file in check.read_files if file not in self.read_files]
 
     @property
@@ -227,6 +233,11 @@ class Verification:
             lines.append(self._describe_new_maps(self.comparison))
         elif not self.new_maps:
             lines.append("No new maps tried. They require runs on maps of families that have a generator.")
+        if self.compressed_bytes:
+            lines.append(
+                f"Messages: {self.declared_bytes / 1e3:,.0f} kB as the controller declares their sizes, "
+                f"{self.compressed_bytes / 1e3:,.0f} kB as compressed content."
+            )
         if self.read_files:
             lines.append(
                 f"The controller has read files that are not part of its source code, such as "

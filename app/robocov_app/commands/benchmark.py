@@ -254,6 +254,8 @@ def _verify(options: Arguments) -> int:
         "new_maps": verification.new_maps,
         "new_maps_track": verification.new_map_track if verification.new_maps else None,
         "new_maps_p_value": None if comparison is None else comparison.p_value,
+        "declared_message_bytes": verification.declared_bytes,
+        "compressed_message_bytes": verification.compressed_bytes,
         "read_files": verification.read_files,
         "differences": differences,
     }

@@ -83,9 +83,9 @@ def build_task(controller: str) -> Task:
 
 def isolate(controller: str) -> list[str]:
     """Return how the decisions of a robot differ if it gets only its own measurements."""
-    outcome, differences, _ = run_isolated(build_task(controller), [2])
+    outcome, team, _ = run_isolated(build_task(controller), [2])
     assert outcome.error is None
-    return differences
+    return team.differences
 
 
 def record_forces(task: Task) -> list[FloatArray]:

@@ -29,6 +29,7 @@ from robocov_app.benchmark.new_maps import (
     sample_new_maps,
 )
 from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
+from robocov_app.benchmark.referee import RunCheck
 from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
 from robocov_app.benchmark.running import run_benchmark
 from robocov_app.benchmark.verification import (
@@ -148,10 +149,10 @@ def isolate(controller: str, track: str, robots: Sequence[int]) -> list[str]:
     The run must have the same metrics as without isolation.
     """
     task = build_task(controller, track)
-    outcome, differences, _ = run_isolated(task, robots)
+    outcome, team, _ = run_isolated(task, robots)
     assert outcome.error is None
     assert outcome.metrics == perform(task).metrics
-    return differences
+    return team.differences
 
 
 SLOW = ("atlas", "adaptive", "boosting", "visibility", "geodesic-lloyd", "diffeomorphism", "barrier")
@@ -186,11 +187,13 @@ def test_robots_that_share_maps_decide_by_their_own_observations(
     longer = replace(suite.TRACKS[track], duration=4.0)
     monkeypatch.setitem(suite.TRACKS, track, longer)  # type: ignore[arg-type]
     snapshots: list[Snapshot] = []
-    outcome, differences, _ = run_isolated(build_task(controller, track), [2, 3], snapshots)
+    outcome, team, _ = run_isolated(build_task(controller, track), [2, 3], snapshots)
     assert outcome.error is None
     # Robots of gp-ucb have nothing to send if they know that the density is the same everywhere.
     assert any(any(snapshot.seen.messages) for snapshot in snapshots) == (controller != "gp-ucb")
-    assert differences == []
+    assert team.differences == []
+    # Compressed payloads contain the names of classes.
+    assert team.compressed_bytes <= 5 * team.declared_bytes
     assert outcome.metrics == perform(build_task(controller, track)).metrics
 
 
@@ -201,8 +204,8 @@ def test_robots_of_the_oracle_decide_by_the_observations_of_the_team() -> None:
 
 def test_observations_of_others_are_hidden_from_an_isolated_robot() -> None:
     snapshots: list[Snapshot] = []
-    _, differences, deciders = run_isolated(build_task("atlas", "short-range"), [2], snapshots)
-    assert differences == []
+    _, team, deciders = run_isolated(build_task("atlas", "short-range"), [2], snapshots)
+    assert team.differences == []
     for snapshot, hidden in zip(snapshots, deciders[2].received, strict=True):
         seen = snapshot.seen
         neighbors = seen.neighbors.list_neighbors(2)
@@ -237,6 +240,23 @@ def test_messages_with_hidden_knowledge_are_detected(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + FALSE_MESSAGES)
     (difference,) = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", [2])
     assert "decides differently" in difference
+
+
+def test_messages_that_are_larger_than_declared_are_shown(tmp_path: Path) -> None:
+    code = WITH_MESSAGES.replace("size=24", "size=1").replace(
+        "own.position]", "own.position, os.urandom(9000)]"
+    )
+    (tmp_path / "mine.py").write_text(IMPORTS + code)
+    _, team, _ = run_isolated(build_task(f"{tmp_path / 'mine.py'}:Mine", "lossy"), [])
+    # Within 1.5 s, six robots decide 91 times.
+    assert team.declared_bytes == 6 * 91
+    assert team.compressed_bytes > 6 * 91 * 9000
+    verification = Verification(seed=0, rows=1)
+    verification.count(
+        RunCheck(None, 0, [], declared_bytes=540, compressed_bytes=4_900_000), is_new=False, is_joint=False
+    )
+    expected = "Messages: 1 kB as the controller declares their sizes, 4,900 kB as compressed content."
+    assert expected in verification.describe()
 
 
 def test_messages_that_are_not_declared_are_reported(tmp_path: Path) -> None:
