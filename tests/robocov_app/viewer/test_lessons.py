@@ -290,6 +290,43 @@ def test_the_closing_page_lists_skipped_tasks(tmp_path: Path, monkeypatch: pytes
         assert "skipped" not in read_lesson_page(driver, monkeypatch)
 
 
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1280, 800)])
+def test_the_closing_page_ends_above_its_buttons(
+    tmp_path: Path, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_viewer(tmp_path, size=size) as driver:
+        driver.window.lesson.is_unattended = False
+        driver.press_key("f2")
+        lesson = driver.window.lesson.player
+        assert lesson is not None
+        lesson.first_answers = {2: 1}
+        for _ in LESSON.chapters:
+            lesson.skip(1)
+        assert lesson.state == "closing"
+        ends: list[tuple[str, float]] = []
+        write = page.LessonPage._write
+
+        def record_and_write(self: page.LessonPage, text: str, size: float, *arguments: Any, **options: Any):
+            if self.y == self.layout.panel.top + page._PAGE_TOP_PX * self.scale:
+                ends.clear()  # The first text of another try.
+            ends.append((text, self.y + size * self.scale))
+            write(self, text, size, *arguments, **options)
+
+        monkeypatch.setattr(page.LessonPage, "_write", record_and_write)
+        driver.window.draw()
+        written = [text for text, _ in ends]
+        assert any(text.startswith("Task skipped") for text in written)
+        top = min(area.box.top for area in driver.window.lesson.click_areas if area.name in ("back", "next"))
+        scale = driver.window.layout.scale
+        bar_top = top - (page.LessonPage.progress_above_bottom - page.LessonPage.buttons_above_bottom) * scale
+        dots = [area.box.top for area in driver.window.lesson.click_areas if area.name.startswith("chapter")]
+        lowest = min([bar_top, *dots])
+        hint = ends.pop()
+        assert hint[0].startswith("Space")
+        titles = [chapter.title for chapter in LESSON.chapters]
+        assert max(end for text, end in ends if text not in titles) <= lowest
+
+
 def test_an_own_lesson_can_be_played_again(tmp_path: Path) -> None:
     path = write_short_lesson(tmp_path)
     with open_viewer(tmp_path) as driver:

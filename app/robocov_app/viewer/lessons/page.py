@@ -112,7 +112,7 @@ _BUTTON_RADIUS_PX = 6
 _BUTTON_GAP_PX = 10
 _BUTTON_TEXT_PX = 14
 _HINT_ABOVE_BOTTOM_PX = 26
-_TEXT_SIZES_PX = (14.0, 13.0, 12.0)
+_TEXT_SIZES_PX = (14.0, 13.0, 12.0, 11.0)
 """Sizes of the text; the first one at which the page fits is used."""
 _LINE_HEIGHT = 1.5
 """Distance of lines in text sizes."""
@@ -417,13 +417,20 @@ class LessonPage:
         return mix(theme.panel, theme.ink, _CLOSED_ANSWER_STRENGTH)
 
     def _draw_chapters(self) -> None:
-        """Draw the list of chapters above the progress bar; in a small window, a row of dots."""
+        """Draw the list of chapters above the progress bar; in a small window, a row of dots.
+
+        On the closing page, they are left out if there is no space.
+        """
         scale = self.scale
         count = len(self.lesson.lesson.chapters)
         self.y += _CHAPTERS_TOP_PX * scale
         bottom = self.bottom - (self.progress_above_bottom + _CHAPTERS_BOTTOM_PX) * scale
         free_height = bottom - self.y
-        self.fits = free_height >= _DOTS_ROW_PX * scale
+        has_space = free_height >= _DOTS_ROW_PX * scale
+        if self.lesson.state is LessonState.CLOSING and not has_space:
+            self.fits = free_height >= 0
+            return
+        self.fits = has_space
         if free_height < _MIN_CHAPTER_ROW_PX * scale * count:
             self._draw_dots(bottom - _DOTS_ROW_PX * scale)
             return
