@@ -388,6 +388,13 @@ class TestRobots:
         expected = record.team.radius * painter.camera.zoom
         np.testing.assert_allclose(compute_drawn_radii(canvas, scene), expected, atol=0.26)
 
+    @pytest.mark.parametrize("count", [6, 50])
+    def test_robots_of_a_dense_team_are_large_enough_to_show_their_colors(self, count):
+        positions = np.random.default_rng(0).uniform(3.0, 3.1, (count, 2))
+        radii, painter = compute_radii(positions, radius_m=0.01)
+        min_radius = {6: 5.0, 50: 3.0}[count]
+        assert radii.min() >= min_radius * painter.scale - 0.25
+
     @pytest.mark.parametrize("shape", ["clump", "pair"])
     def test_robots_of_equal_size_have_discs_of_equal_size(self, shape):
         positions = {

@@ -19,6 +19,10 @@ from robocov_app.render.scene import Scene
 READABLE_RADIUS_PX = 9.0
 """Radius of robots that are not in a crowd: their numbers are readable."""
 MIN_RADIUS_PX = 2.4
+"""Minimum radius of robots in large teams."""
+_MIN_VISIBLE_RADIUS_PX = 5.0
+"""Minimum radius of robots in small teams: their colors are visible even while they overlap."""
+_MAX_SMALL_TEAM = 20
 MIN_NUMBER_SIZE_PX = 6.6
 """Text size, px of the surface, that digits need to be drawn sharply; smaller numbers are left out."""
 MIN_SCALED_NUMBER_SIZE_PX = 5.2
@@ -90,12 +94,18 @@ def _compute_drawn_radii(scene: Scene, camera: Camera, scale: float) -> FloatArr
 
 
 def _compute_readable_radius(scene: Scene, camera: Camera, scale: float) -> float:
-    """Return the radius of the discs of robots that are not larger, px; about half of them do not overlap."""
+    """Return the radius of the discs of robots that are not larger, px.
+
+    About half of the discs do not overlap, unless the team is so dense that they would be too small to see.
+    """
     spacing = scene.spacing
     if spacing is None:
         spacing = measure_spacing(scene.now.positions)
     half_spacing_px = 0.5 * spacing * camera.zoom
-    return float(np.clip(half_spacing_px, MIN_RADIUS_PX * scale, READABLE_RADIUS_PX * scale))
+    # The more robots overlap, the larger is the area that they cover.
+    min_radius_px = _MIN_VISIBLE_RADIUS_PX * np.sqrt(_MAX_SMALL_TEAM / len(scene.team))
+    min_radius_px = np.clip(min_radius_px, MIN_RADIUS_PX, _MIN_VISIBLE_RADIUS_PX)
+    return float(np.clip(half_spacing_px, min_radius_px * scale, READABLE_RADIUS_PX * scale))
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:
