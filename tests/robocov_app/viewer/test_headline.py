@@ -12,7 +12,8 @@ from driven_window import Driver, open_viewer
 from sample_sessions import RPF
 
 from robocov_app.render.canvas import Canvas
-from robocov_app.viewer.chart.captions import HEADLINE_TEXT_PX
+from robocov_app.render.fonts import measure_text
+from robocov_app.viewer.chart.captions import _HEADLINE_LEFT_PX, HEADLINE_TEXT_PX
 from robocov_app.viewer.window.status import MIN_UNCOVERED_AREA_M2, describe_cut_off
 
 
@@ -44,6 +45,25 @@ def test_the_mean_distance_is_a_large_number_with_its_unit(
     driver.window.chart.draw(driver.window.screen)
     value = driver.session.timeline.panes[0].distance_curve.values[-1]
     assert drawn_texts[f"{value:.3f} m"] == HEADLINE_TEXT_PX
+
+
+@pytest.mark.parametrize("value", [2.5, 12.392, 88.888, 888.888])
+def test_the_large_number_ends_within_the_chart(
+    driver: Driver, drawn_texts: dict[str, float], value: float
+) -> None:
+    driver.run_frames(2)
+    displayed = driver.session.displayed
+    pane = driver.session.timeline.panes[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(displayed), "get_costs", lambda self, name: (0.0, {pane.number: value}))
+        drawn_texts.clear()
+        driver.window.chart.draw(driver.window.screen)
+    (number,) = [text for text, size in drawn_texts.items() if size == HEADLINE_TEXT_PX]
+    assert float(number.removesuffix(" m")) == pytest.approx(value, abs=0.5)
+    frame = driver.window.chart._frame
+    left = frame.times.right + _HEADLINE_LEFT_PX * frame.scale
+    width = measure_text(number, round(HEADLINE_TEXT_PX * frame.scale), True)
+    assert left + width <= driver.window.layout.chart.width
 
 
 @pytest.mark.parametrize("pane_count", [1, 2])

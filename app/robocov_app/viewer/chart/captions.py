@@ -21,6 +21,7 @@ _RIGHT_PX = 6
 _BOTTOM_PX = 8
 _NOTE_LINE_PX = 13.0
 HEADLINE_TEXT_PX = 23.0
+_MAX_HEADLINE_DECIMALS = 3
 _HEADLINE_LEFT_PX = 16
 _HEADLINE_TITLE_UP_PX = 22
 _HEADLINE_NOTE_DOWN_PX = 22
@@ -76,13 +77,22 @@ def _draw_headline(canvas: Canvas, frame: ChartFrame, value: float, note: str) -
     middle = 0.5 * frame.layout.chart.height
     title = (left, middle - _HEADLINE_TITLE_UP_PX * frame.scale)
     canvas.draw_text(frame.quantity.short_title, title, color=theme.faint, size=theme.small_text)
-    number = f"{value:.3f} {frame.quantity.unit}"
-    canvas.draw_text(number, (left, middle), bold=True, size=HEADLINE_TEXT_PX)
     width = frame.layout.chart.width - left - _RIGHT_PX * frame.scale
+    number = _fit_headline(canvas, value, frame.quantity.unit, width)
+    canvas.draw_text(number, (left, middle), bold=True, size=HEADLINE_TEXT_PX)
     row = middle + _HEADLINE_NOTE_DOWN_PX * frame.scale
     for line in wrap_text(note, canvas.scale_text_size(theme.text), width, bold=True):
         canvas.draw_text(line, (left, row), color=theme.error, bold=True, size=theme.text)
         row += _HEADLINE_NOTE_LINE_PX * frame.scale
+
+
+def _fit_headline(canvas: Canvas, value: float, unit: str, width: float) -> str:
+    """Return a value with its unit, with as many decimals as fit into a width, px."""
+    for decimals in range(_MAX_HEADLINE_DECIMALS, 0, -1):
+        text = f"{value:.{decimals}f} {unit}"
+        if canvas.measure_text(text, HEADLINE_TEXT_PX, bold=True) <= width:
+            return text
+    return f"{value:.0f} {unit}"
 
 
 def _draw_only_caption(
