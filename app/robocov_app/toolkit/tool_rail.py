@@ -6,7 +6,7 @@ from typing import Any
 from pygame import Rect, Surface
 
 from robocov_app.look.theme import Theme
-from robocov_app.toolkit.commands.command import Command, CommandTable
+from robocov_app.toolkit.commands.command import SHIFT_SYMBOL, Command, CommandTable, abbreviate_shift
 from robocov_app.toolkit.overlay import draw_edge
 from robocov_app.toolkit.sentence_case import to_sentence_case
 from robocov_app.toolkit.tools.tool import Tool, Toolbox
@@ -28,7 +28,6 @@ _GROUP_GAP_PX = 7.0
 _GROUP_LINE_PX = 26.0
 """Length of this line."""
 _COUNT_TOLERANCE = 1e-6
-_SHIFT_SYMBOL = "⇧"
 
 
 class ToolRail(CommandPart):
@@ -149,7 +148,7 @@ def _abbreviate_key(key_text: str) -> str:
     >>> _abbreviate_key("Shift+S")
     '⇧S'
     """
-    short = key_text.replace("Shift+", _SHIFT_SYMBOL)
-    if len(short.lstrip(_SHIFT_SYMBOL)) == 1:
+    short = abbreviate_shift(key_text)
+    if len(short.lstrip(SHIFT_SYMBOL)) == 1:
         return short
     return ""

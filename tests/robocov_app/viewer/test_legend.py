@@ -12,6 +12,8 @@ import pygame
 import pytest
 
 from robocov.mapfile import load_map
+from robocov_app.look import legend
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import create_flat_canvas
@@ -181,6 +183,42 @@ def test_presets_and_the_menu_have_every_layer(tmp_path: Path) -> None:
         assert window.viewer.view.layers == next(p.layers for p in LAYER_PRESETS if p.name == "why")
         window.run_command("cancel")
         assert not window.layer_bar.is_open
+
+
+@pytest.mark.parametrize("width", [900, 1100, 1280, 1920])
+def test_the_keys_in_the_menu_do_not_touch_the_titles(width: int, tmp_path: Path) -> None:
+    drawn: list[tuple[int, float, float]] = []
+
+    def record_text(canvas: Canvas, text: str, position, *arguments, anchor="left", **options) -> float:
+        width = canvas.measure_text(text, options.get("size", canvas.theme.text))
+        left = position[0] - (width if anchor == "right" else 0.0)
+        drawn.append((round(position[1]), left, left + width))
+        return width
+
+    with open_window(tmp_path, size=(width, 700)) as window:
+        click(window, find_chips(window)["layers"])
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Canvas, "draw_text", record_text)
+            window.run_frame(1 / 30)
+        scale = window.layout.scale
+        rows = window.layer_bar.rows
+    menu_rows = [box for chip, box in rows if chip.kind == "row"]
+    assert menu_rows
+    for box in menu_rows:
+        texts = sorted(
+            (left, right) for y, left, right in drawn if box.collidepoint(left, y) and right > left
+        )
+        for (_, end), (start, _) in itertools.pairwise(texts):
+            assert start - end >= 2 * scale
+
+
+def test_different_marks_of_goals_share_a_chip(tmp_path: Path) -> None:
+    with open_window(tmp_path, "rapf", "atlas", n_frames=2) as window:
+        window.viewer.view.layers = window.viewer.view.layers | {"goals"}
+        window.run_frame(1 / 30)
+        (chip,) = [chip for chip, _ in window.layer_bar.chips if chip.command == "layer:goals"]
+        assert {entry.style for entry in chip.entries} == {legend.CELL_CENTROID, legend.GOAL}
+        assert "".join(chip.texts) == "Goals"
 
 
 def test_a_key_goes_through_the_presets(tmp_path: Path) -> None:

@@ -210,4 +210,5 @@ def build_goals_legend(scene: Scene) -> list[LegendEntry]:
     """Build the legend of goals, with the mark that is drawn."""
     if scene.now.decision.goals is None:
         return []
-    return [LegendEntry(legend.GOAL, _build_cross_glyph(_choose_goal_mark(scene)))]
+    mark = _choose_goal_mark(scene)
+    return [LegendEntry(legend.GOAL, _build_cross_glyph(mark), style=mark)]

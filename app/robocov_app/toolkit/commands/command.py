@@ -10,6 +10,8 @@ from robocov.errors import InputError, describe_unknown_name
 from robocov_app.toolkit.window.input import format_key, get_key_name
 
 Action = Callable[..., object]
+SHIFT_SYMBOL = "⇧"
+"""Stands for the Shift key where space is short."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,15 @@ class Argument:
     description: str
     parse: Callable[[str], object] = str
     list_values: Callable[[], Iterable[str]] = tuple
+
+
+def abbreviate_shift(key_text: str) -> str:
+    """Return the text of a key combination with a symbol for the Shift key.
+
+    >>> abbreviate_shift("Alt+Shift+S")
+    'Alt+⇧S'
+    """
+    return key_text.replace("Shift+", SHIFT_SYMBOL)
 
 
 @dataclass(frozen=True)

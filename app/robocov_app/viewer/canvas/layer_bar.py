@@ -10,7 +10,7 @@ from robocov_app.look.theme import LIGHT, Theme
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers.layer import Layer
 from robocov_app.render.scene import Scene
-from robocov_app.toolkit.commands.command import CommandTable
+from robocov_app.toolkit.commands.command import CommandTable, abbreviate_shift
 from robocov_app.toolkit.keyboard_focus import BasicFocusGroup
 from robocov_app.toolkit.overlay import create_flat_canvas, draw_card
 from robocov_app.toolkit.tools.pointer import Pixel
@@ -331,7 +331,9 @@ class LayerBar(BasicFocusGroup):
             entries = build_layer_entries(layer, scenes)
             chip = Chip("row", f"layer:{layer.name}", entries, layer.title, is_on)
             box = Rect(x, round(y), column.width - round(4 * scale), round(row_height))
-            key_text = self._commands[chip.command].key_text if has_keys else ""
+            key_text = ""
+            if has_keys:
+                key_text = abbreviate_shift(self._commands[chip.command].key_text)
             is_hovered = _get_id(chip) == self._hovered
             draw_menu_row(canvas, chip, box, title=layer.title, key_text=key_text, is_hovered=is_hovered)
             self.rows.append((chip, box))

@@ -87,16 +87,19 @@ def build_layer_entries(layer: Layer, scenes: Sequence[Scene]) -> tuple[LegendEn
     -------
     tuple of LegendEntry
         Empty if no scene has anything to draw in this layer. A single symbol has the title of the layer, so
-        that all chips name what they show and hide in the same way. If the controllers of some panes have no
-        goals, the text says so.
+        that all chips name what they show and hide in the same way. Symbols with the same meaning share the
+        text of the last one. If the controllers of some panes have no goals, the text says so.
     """
     legends = [layer.legend(scene) for scene in scenes if layer.can_draw(scene)]
     entries = merge_legends(legends, lambda entry: entry.key)
+    texts = {entry.text for entry in entries}
     chip_entries = []
-    for entry in entries:
-        text = layer.title if len(entries) == 1 else entry.text
+    for number, entry in enumerate(entries, 1):
+        text = layer.title if len(texts) == 1 else entry.text
         text = _MARK_TEXTS.get(entry.text, text)
         text = to_sentence_case(text)
+        if entry.text in {other.text for other in entries[number:]}:
+            text = ""
         if entry is entries[-1]:
             text += _describe_exceptions(layer, scenes)
         chip_entries.append(LegendEntry(text, entry.draw, entry.style))
