@@ -1,5 +1,7 @@
 """Drawings over a window: cards, tags, messages, the status line, a veil."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import pygame
 from pygame import Rect, Surface
@@ -39,6 +41,8 @@ _MAX_MESSAGE_OVERHANG_PX = 6
 """Distance by which messages may extend below the arena, which is free of text."""
 _MESSAGE_TOP_PX = 40
 """Distance of a message from the top of the arena, which leaves the chips of layers visible."""
+_MESSAGE_GAP_PX = 8
+"""Minimum distance of a message from texts next to it; texts that are closer are hidden."""
 _TAG_MARGIN_PX = 6
 _TAG_HEIGHT_PX = 20
 _TAG_RADIUS_PX = 4
@@ -217,6 +221,7 @@ def draw_message(
     *,
     is_error: bool,
     is_at_top: bool = False,
+    strip_texts: Iterable[Rect] = (),
 ) -> Rect | None:
     """Draw a message over the strip at the bottom of the arena; nothing if the text is empty.
 
@@ -236,6 +241,8 @@ def draw_message(
         Whether it is drawn in the color of errors.
     is_at_top : bool
         Whether it is at the top of the arena instead, below the chips of layers.
+    strip_texts : iterable of pygame.Rect
+        Texts in the strip, px. Those that the message would cover in part are hidden.
 
     Returns
     -------
@@ -264,6 +271,10 @@ def draw_message(
         box.center = middle, round(bottom - _MESSAGE_STRIP_PX * scale / 2)
         box.bottom = min(box.bottom, round(bottom + _MAX_MESSAGE_OVERHANG_PX * scale))
     box.clamp_ip(screen.get_rect())
+    occupied = box.inflate(2 * round(_MESSAGE_GAP_PX * scale), 0)
+    for strip_text in strip_texts:
+        if occupied.colliderect(strip_text):
+            screen.fill(theme.background, strip_text)
     fill = theme.panel
     edge = mix(theme.panel, theme.ink, _EDGE_STRENGTH)
     if is_error:

@@ -6,6 +6,11 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
+from drawn_strip_texts import (
+    MESSAGES_OF_ALL_LENGTHS,
+    check_only_boxes_have_texts,
+    check_texts_are_complete_or_hidden,
+)
 from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
@@ -348,6 +353,19 @@ def test_the_window_is_drawn_in_every_theme_and_size(driver: EditorDriver) -> No
         for tab in EditorPanel.tabs:
             driver.window.panel.show_tab(tab)
             driver.run_frames(1, 0.2)
+
+
+def test_a_message_hides_texts_below_the_map_that_it_would_cover_in_part(driver: EditorDriver) -> None:
+    driver.run_frames(1)
+    boxes = driver.window.canvas.strip_texts
+    without_message = driver.copy_frame()
+    check_only_boxes_have_texts(without_message, boxes, driver.window.layout.arena)
+    for text in MESSAGES_OF_ALL_LENGTHS:
+        driver.editor.show_message(text)
+        driver.run_frames(1, seconds=0.0)
+        message_box = driver.window.message_box
+        assert message_box is not None
+        check_texts_are_complete_or_hidden(driver.copy_frame(), without_message, boxes, message_box)
 
 
 def test_a_screenshot_is_saved(driver: EditorDriver, tmp_path: Path) -> None:

@@ -7,16 +7,22 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
+from drawn_strip_texts import (
+    MESSAGES_OF_ALL_LENGTHS,
+    check_only_boxes_have_texts,
+    check_texts_are_complete_or_hidden,
+)
 from driven_window import open_viewer
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_sessions import RAPF
+from sample_sessions import RAPF, RPF
 
 from robocov_app.look.theme import LIGHT
 from robocov_app.render.annotations.scale_bar import STRIP_HEIGHT_PX
 from robocov_app.render.fonts import measure_text
 from robocov_app.toolkit.overlay import draw_message, wrap_text
 from robocov_app.toolkit.window.layout import Box
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.window import status_display
 from robocov_app.viewer.window.screen_video import copy_pixels
 
@@ -72,6 +78,27 @@ def test_messages_of_one_or_two_lines_leave_the_map_and_the_chart_visible(
         strip_top = top + height - STRIP_HEIGHT_PX * layout.scale
         assert rows.min() >= strip_top - MAX_COVERED_PX * layout.scale
         assert rows.max() < top + height + MAX_COVERED_PX * layout.scale
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize("controllers", [(RAPF,), (RAPF, RPF)], ids=["one pane", "two panes"])
+def test_a_message_hides_texts_below_the_map_that_it_would_cover_in_part(
+    controllers: tuple[ControllerChoice, ...], scale: float, tmp_path: Path
+) -> None:
+    size = (round(900 * scale), round(600 * scale))
+    with open_viewer(tmp_path, *controllers, size=size, scale=scale) as driver:
+        boxes = driver.window.canvas.find_strip_texts(driver.window.screen)
+        assert len(boxes) == 2
+        without_message = driver.copy_frame()
+        if len(controllers) == 1:
+            arena = driver.window.layout.arena
+            check_only_boxes_have_texts(without_message, boxes, arena)
+        for text in MESSAGES_OF_ALL_LENGTHS:
+            driver.viewer.show_message(text)
+            driver.run_frames(1, seconds=0.0)
+            message_box = driver.window.message_box
+            assert message_box is not None
+            check_texts_are_complete_or_hidden(driver.copy_frame(), without_message, boxes, message_box)
 
 
 def test_a_click_removes_a_message_and_does_nothing_else(tmp_path: Path) -> None:

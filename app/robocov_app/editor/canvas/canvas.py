@@ -96,6 +96,8 @@ class EditorCanvas:
         Position of the cursor in the window, px; None while it is not over the map.
     camera : Camera
         The view, in pixels of the arena: its upper left corner is (0, 0).
+    strip_texts : list of Rect
+        Boxes of the scale bar and of the status line below the map, px of the window.
     """
 
     def __init__(self, editor: Editor, *, has_tools: bool = True) -> None:
@@ -103,6 +105,7 @@ class EditorCanvas:
         self._has_tools = has_tools
         self.sheet = Sheet()
         self.entries: list[LegendEntry] = []
+        self.strip_texts: list[Rect] = []
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.cursor_pixel: Point | None = None
@@ -340,6 +343,11 @@ class EditorCanvas:
             facts.pop(0)
         text = shorten_to_width(FACT_SEPARATOR.join(facts), text_size, max_width)
         canvas.draw_text(text, (box.width - scale_bar.EDGE_PX * scale, height / 2), anchor="right")
+        text_strip = scale_bar.find_strip(Rect(self.layout.arena), scale)
+        self.strip_texts = [
+            scale_bar.place_left(text_strip, scale_bar.measure_bar(canvas), scale),
+            scale_bar.place_right(text_strip, canvas.measure_text(text), scale),
+        ]
 
 
 def _find_hidden_keys(

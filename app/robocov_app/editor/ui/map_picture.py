@@ -40,6 +40,7 @@ class EditorMapPicture:
             self._canvas.theme,
             scale,
             is_error=editor.has_error_message,
+            strip_texts=self._canvas.strip_texts,
         )
         return surface
 

@@ -338,7 +338,13 @@ class EditorWindow(CommandWindow):
         self.sheet_handle.draw(self.screen, layout, theme)
         is_error = editor.has_error_message
         self.message_box = draw_message(
-            self.screen, editor.message, layout.arena, theme, layout.scale, is_error=is_error
+            self.screen,
+            editor.message,
+            layout.arena,
+            theme,
+            layout.scale,
+            is_error=is_error,
+            strip_texts=self.canvas.strip_texts,
         )
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)

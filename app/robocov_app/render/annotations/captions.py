@@ -1,14 +1,12 @@
 """The caption above a pane, and the status line below the arena."""
 
-from robocov_app.look.lengths import format_scale_length
 from robocov_app.render.annotations.legend_strip import PADDING_PX, ROW_HEIGHT_PX
 from robocov_app.render.annotations.scale_bar import (
-    BAR_TEXT_GAP_PX,
     EDGE_PX,
     STRIP_HEIGHT_PX,
-    choose_bar_length,
     draw_bar,
     is_low_pane,
+    measure_bar,
 )
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import measure_text, shorten_to_width
@@ -50,19 +48,30 @@ def _list_shorter_costs(cost: str) -> list[str]:
 
 def draw_status(canvas: Canvas, scene: Scene) -> None:
     """Draw the name of the controller, the time, the coverage cost and the map below the arena."""
-    length = choose_bar_length(canvas)
-    bar_width = length * canvas.camera.zoom + canvas.measure_text(format_scale_length(length), bold=True)
-    left = (EDGE_PX + BAR_TEXT_GAP_PX + _STATUS_GAP_PX) * canvas.scale + bar_width
+    name, text = _choose_status(canvas, scene)
     right = canvas.surface.get_width() - EDGE_PX * canvas.scale
     y = canvas.surface.get_height() - 0.5 * STRIP_HEIGHT_PX * canvas.scale
-    size = canvas.scale_text_size(canvas.theme.text)
-    name = shorten_to_width(scene.label, size, right - left, bold=True)
-    text = fit_status(scene, size, right - left - canvas.measure_text(name, bold=True))
     canvas.draw_text(text, (right, y), anchor="right")
     name_right = right
     if text:
         name_right -= canvas.measure_text(text)
     canvas.draw_text(name, (name_right, y), anchor="right", bold=True)
+
+
+def measure_status(canvas: Canvas, scene: Scene) -> float:
+    """Return the width of the status line below the arena, px."""
+    name, text = _choose_status(canvas, scene)
+    return canvas.measure_text(name, bold=True) + canvas.measure_text(text)
+
+
+def _choose_status(canvas: Canvas, scene: Scene) -> tuple[str, str]:
+    """Return the name of the controller and the facts of the status line, as far as they fit."""
+    left = (EDGE_PX + _STATUS_GAP_PX) * canvas.scale + measure_bar(canvas)
+    right = canvas.surface.get_width() - EDGE_PX * canvas.scale
+    size = canvas.scale_text_size(canvas.theme.text)
+    name = shorten_to_width(scene.label, size, right - left, bold=True)
+    text = fit_status(scene, size, right - left - canvas.measure_text(name, bold=True))
+    return name, text
 
 
 def fit_status(scene: Scene, size: int, width: float) -> str:

@@ -1,6 +1,9 @@
 """The scale bar, in the strip below the arena or in the caption of a low pane."""
 
 from collections.abc import Set
+from math import ceil
+
+from pygame import Rect
 
 from robocov_app.look.lengths import format_scale_length, round_down
 from robocov_app.render.annotations.legend_strip import MARGIN_PX
@@ -12,6 +15,9 @@ EDGE_PX = MARGIN_PX + 2.0
 """Space at the sides of texts."""
 STRIP_HEIGHT_PX = 34.0
 """Height of the strip below the arena."""
+_STRIP_TEXT_HEIGHT_PX = 22.0
+_STRIP_TEXT_MARGIN_PX = 2.0
+"""Space in the box of a text of the strip, to the left and right of the text."""
 _MAX_LOW_PANE_PX = 240.0
 _MIN_BAR_PX = 30.0
 """Minimum space for the scale bar, px of the surface."""
@@ -71,6 +77,33 @@ def draw_bar(canvas: Canvas, left: float, y: float) -> float:
     canvas.surface.fill(ink, (round(left), round(y - thickness / 2), round(bar_width), thickness))
     text_left = bar_width + BAR_TEXT_GAP_PX * canvas.scale
     return text_left + canvas.draw_text(format_scale_length(length), (left + text_left, y), bold=True)
+
+
+def find_strip(pane: Rect, scale: float) -> Rect:
+    """Return the part of the strip below the map of a pane that contains texts, px."""
+    strip = Rect(0, 0, pane.width - 2 * round(EDGE_PX * scale), round(_STRIP_TEXT_HEIGHT_PX * scale))
+    strip.center = pane.centerx, pane.bottom - round(0.5 * STRIP_HEIGHT_PX * scale)
+    return strip
+
+
+def place_left(strip: Rect, width: float, scale: float) -> Rect:
+    """Return the box of a text, or of the scale bar, of a given width, px, at the left end of a strip."""
+    margin = ceil(_STRIP_TEXT_MARGIN_PX * scale)
+    return Rect(strip.left - margin, strip.top, ceil(width) + 2 * margin, strip.height)
+
+
+def place_right(strip: Rect, width: float, scale: float) -> Rect:
+    """Return the box of a text of a given width, px, at the right end of a strip."""
+    box = place_left(strip, width, scale)
+    box.right = strip.right + ceil(_STRIP_TEXT_MARGIN_PX * scale)
+    return box
+
+
+def measure_bar(canvas: Canvas) -> float:
+    """Return the width of the scale bar and its text, px."""
+    length = choose_bar_length(canvas)
+    text_width = canvas.measure_text(format_scale_length(length), bold=True)
+    return length * canvas.camera.zoom + BAR_TEXT_GAP_PX * canvas.scale + text_width
 
 
 def choose_bar_length(canvas: Canvas) -> float:

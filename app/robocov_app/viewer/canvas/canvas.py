@@ -10,6 +10,14 @@ from robocov.environment import Environment, Point
 from robocov_app.look.colors import mix
 from robocov_app.look.hues import choose_robot_hues
 from robocov_app.look.theme import Theme
+from robocov_app.render.annotations.captions import measure_status
+from robocov_app.render.annotations.scale_bar import (
+    find_strip,
+    is_low_pane,
+    measure_bar,
+    place_left,
+    place_right,
+)
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.crowding import measure_spacing
 from robocov_app.render.layer_catalog import build_pane_layers, build_standard_layers
@@ -270,6 +278,23 @@ class ViewerCanvas:
                 bar = pygame.Rect(rect.topleft, (rect.width, bar_height))
                 controller = self.viewer.session.timeline.panes[pane].controller
                 screen.fill(theme.get_controller_color(controller.name), bar)
+
+    def find_strip_texts(self, screen: pygame.Surface) -> list[pygame.Rect]:
+        """Return the boxes of the scale bars and of the status line below the maps, px of the screen."""
+        boxes: list[pygame.Rect] = []
+        shown = zip(self._scenes, self._painters, self.layout.panes, strict=False)
+        for index, (scene, painter, pane) in enumerate(shown):
+            scale = painter.scale
+            names = painter.visible & {layer.name for layer in painter.layers}
+            if is_low_pane(pane.height, scale, names):
+                continue
+            canvas = self._build_canvas(screen.subsurface(pygame.Rect(pane)), index, scene)
+            strip = find_strip(pygame.Rect(pane), scale)
+            if "scale_bar" in names:
+                boxes.append(place_left(strip, measure_bar(canvas), scale))
+            if "status" in names:
+                boxes.append(place_right(strip, measure_status(canvas, scene), scale))
+        return boxes
 
     @property
     def layers(self) -> list[Layer]:

@@ -1,6 +1,7 @@
 """The window without its buttons, drawn in the size of the screen of a phone."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import pygame
@@ -90,7 +91,8 @@ class ViewerMapPicture:
             self._lesson_areas, _, _ = draw_lesson_sheet(
                 surface, layout, theme, lesson, None, has_buttons=is_controlling
             )
-        self._sources.status.draw_message(surface, layout, theme)
+        find_strip_texts = partial(self._canvas.find_strip_texts, surface)
+        self._sources.status.draw_message(surface, layout, theme, find_strip_texts)
         return surface
 
     def find_window_pixel(self, pixel: tuple[float, float]) -> tuple[float, float]:

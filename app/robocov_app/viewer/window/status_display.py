@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pygame
 
 from robocov_app.look.theme import Theme
@@ -62,8 +64,23 @@ class StatusDisplay:
         """Hide the suggestion that is shown, until there is another one."""
         self._dismissed_suggestion = self._suggestion
 
-    def draw_message(self, screen: pygame.Surface, layout: Layout, theme: Theme) -> pygame.Rect | None:
+    def draw_message(
+        self,
+        screen: pygame.Surface,
+        layout: Layout,
+        theme: Theme,
+        find_strip_texts: Callable[[], list[pygame.Rect]],
+    ) -> pygame.Rect | None:
         """Draw the progress of a seek, the status message, or a suggestion.
+
+        Parameters
+        ----------
+        screen : pygame.Surface
+        layout : Layout
+        theme : Theme
+        find_strip_texts : callable
+            Returns the boxes of the texts below the map, px. Those that the message would cover in part are
+            hidden.
 
         Returns
         -------
@@ -88,6 +105,7 @@ class StatusDisplay:
             layout.scale,
             is_error=is_error,
             is_at_top=is_at_top,
+            strip_texts=find_strip_texts() if message else (),
         )
 
     def _choose_suggestion(self) -> str:

@@ -1,6 +1,7 @@
 """The viewer's window, which handles events, advances time and draws frames."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import pygame
@@ -375,7 +376,8 @@ class ViewerWindow(CommandWindow):
         if not has_lesson and layout.has_panel:
             self.panel.draw(self.screen)
         self.sheet_handle.draw(self.screen, layout, self.theme)
-        self.message_box = self._status.draw_message(self.screen, layout, self.theme)
+        find_strip_texts = partial(self.canvas.find_strip_texts, self.screen)
+        self.message_box = self._status.draw_message(self.screen, layout, self.theme, find_strip_texts)
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)
