@@ -38,15 +38,18 @@ class Omissions:
 
 
 def format_plural(count: int, noun: str) -> str:
-    """Return a count with its noun, including nouns that end in y or x.
+    """Return a count with its noun, including nouns whose plural ends in -es or -ies.
 
     Examples
     --------
-    >>> format_plural(2, "box")
-    '2 boxes'
+    >>> format_plural(2, "box"), format_plural(2, "geometry"), format_plural(2, "way")
+    ('2 boxes', '2 geometries', '2 ways')
     """
-    if count == 1 or not noun.endswith(("y", "x")):
-        return format_count(count, noun)
-    if noun.endswith("y"):
+    if count == 1:
+        return f"{count} {noun}"
+    ending = noun[-2:].lower()
+    if ending in ("ch", "sh") or ending.endswith("x"):
+        return f"{count} {noun}es"
+    if noun.endswith("y") and ending[0] not in "aeiouy":
         return f"{count} {noun[:-1]}ies"
-    return f"{count} {noun}es"
+    return format_count(count, noun)
