@@ -19,7 +19,7 @@ from robocov.controllers.individual import unwrap_controller
 from robocov.cost import CoverageResult
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_LATTICE, DEFAULT_ROBOTS
 from robocov.environment import Environment
-from robocov.errors import ParameterError, RobocovError, format_count, quote
+from robocov.errors import ParameterError, RobocovError, format_area, format_count, quote
 from robocov.mapfile import save_map
 from robocov.metrics import CostHistory, compute_cost_history
 from robocov.record import Record
@@ -326,7 +326,7 @@ def render_environment_html(environment: Environment) -> str:
     left, right = frame.to_pixels(bar_ends)[:, 0] / (frame.width / 100)
     starts = ", ".join(environment.starts) or "uniform"
     facts = (
-        f"{width:.4g} × {high_y - low_y:.4g} m, {environment.free_area:.4g} m² free, "
+        f"{width:.4g} × {high_y - low_y:.4g} m, {format_area(environment.free_area)} free, "
         f"{format_count(len(environment.obstacles), 'obstacle')}; "
         f"start{'s' if len(environment.starts) > 1 else ''} {starts}"
     )

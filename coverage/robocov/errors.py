@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from decimal import Decimal
 from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices that lead to a value, from the outermost object inwards."""
+_MIN_WHOLE_AREA_M2 = 1000.0
+"""Areas from this one on are written without decimals."""
 _MAX_QUOTED_CHARACTERS = 60
 """Longer values and names are cut in messages."""
 _MAX_LISTED_NAMES = 3
@@ -548,6 +551,29 @@ def format_count(count: int, noun: str) -> str:
     ('1 robot', '6 robots')
     """
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def format_area(area: float, digits: int = 4) -> str:
+    """Format an area without an exponent.
+
+    Parameters
+    ----------
+    area : float, m²
+    digits : int
+        Number of significant digits. Areas from 1000 m² on are whole numbers.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_area(12.3456), format_area(12345.6), format_area(999.6, 3)
+    ('12.35 m²', '12346 m²', '1000 m²')
+    """
+    if area >= _MIN_WHOLE_AREA_M2:
+        return f"{area:.0f} m²"
+    return f"{Decimal(f'{area:.{digits}g}'):f} m²"
 
 
 def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:

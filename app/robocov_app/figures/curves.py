@@ -166,11 +166,13 @@ def _format_end_value(value: float, unit: str) -> str:
     """Return the last value of a curve as text, without its unit; see `format_end_label`."""
     if abs(value) >= _MIN_EXPONENT_VALUE:
         return f"{value:.4g}"
+    # The option z writes values that round to zero without a minus sign.
     if unit == "%":
-        return f"{value:.1f}"
+        return f"{value:z.1f}"
     if unit == "m" or abs(value) < _MIN_SHORT_VALUE:
-        return f"{value:.3f}"
-    if abs(value) < _MIN_THOUSANDS_VALUE:
+        return f"{value:z.3f}"
+    # Rounding to four digits may reach the limit, from which on they would have an exponent.
+    if float(f"{abs(value):.4g}") < _MIN_THOUSANDS_VALUE:
         return f"{value:.4g}"
     return f"{value:,.0f}"
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, format_area, quote
 from robocov.record import Record
 from robocov_app.figures import map_drawing, run_drawing
 from robocov_app.figures.contact_points import find_contact_points
@@ -63,7 +63,9 @@ def plot_environment(
     """
     theme = get_theme(theme)
     if axes is None:
-        facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
+        facts = (
+            f"{format_area(environment.area)} inside the boundary, {format_area(environment.free_area)} free"
+        )
         handles = map_drawing.build_map_handles(environment, theme)
         map_page = _create_map_page(environment, theme, size, handles, title=environment.name, facts=facts)
         map_drawing.draw_map(map_page.axes, environment, theme)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from robocov.errors import format_count
+from robocov.errors import format_area, format_count
 
 _JSON_KEYS = {
     "size": "size_m",
@@ -21,15 +21,6 @@ _JSON_KEYS = {
     "removed_area": "removed_area_m2",
 }
 """JSON keys of the fields that have a unit."""
-_MIN_WHOLE_AREA_M2 = 1000.0
-"""Areas from this one on are written without decimals."""
-
-
-def format_area(area: float, digits: int = 4) -> str:
-    """Format an area with a number of significant digits, without an exponent."""
-    if area >= _MIN_WHOLE_AREA_M2:
-        return f"{area:.0f} m²"
-    return f"{area:.{digits}g} m²"
 
 
 def _label_lines(label: str, lines: tuple[str, ...]) -> list[str]:

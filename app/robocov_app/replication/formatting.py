@@ -25,11 +25,14 @@ def format_amount(value: float, unit: str = "") -> str:
     ('5.1%', '0.643', '1.004')
     >>> format_amount(1.5, "m"), format_amount(6420.9, "J")
     ('1.5 m', '6,421 J')
+    >>> format_amount(-0.012, "%"), format_amount(-0.0001, "%")
+    ('−1.2%', '0%')
     """
     if not math.isfinite(value):
         return NO_VALUE
     if value < 0.0:
-        return "−" + format_amount(-value, unit)
+        text = format_amount(-value, unit)
+        return text if text == "0%" else f"−{text}"
     if unit == "%":
         percent = 100.0 * value
         has_decimal = percent < 99.95 and round(percent, 1) % 1

@@ -3,7 +3,7 @@
 import numpy as np
 
 from robocov.environment import Environment
-from robocov.errors import format_count
+from robocov.errors import format_area, format_count
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.density_text import describe_density
@@ -45,7 +45,7 @@ def describe_map(environment: Environment) -> str:
     text = (
         f"Map {environment.name}: {high_x - low_x:.4g} m by {high_y - low_y:.4g} m "
         f"{_describe_obstacles(environment)}, "
-        f"{environment.free_area:.4g} m² free, {blocked:.0f}% of the known region blocked"
+        f"{format_area(environment.free_area)} free, {blocked:.0f}% of the known region blocked"
     )
     density = describe_density(environment)
     if density:

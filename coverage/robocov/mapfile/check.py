@@ -25,7 +25,7 @@ from robocov.environment import (
     find_narrowest_gap,
     find_overlaps,
 )
-from robocov.errors import StartError, format_count, format_path, summarize_names
+from robocov.errors import StartError, format_area, format_count, format_path, summarize_names
 from robocov.typing import FloatArray
 
 MANY_VERTICES = 5000
@@ -369,10 +369,10 @@ def _find_component_warnings(environment: Environment, radius: float) -> Iterato
             pocket_areas.append(component.area)
             continue
         point = component.representative_point()
-        yield f"sealed room of {component.area:.3g} m² around [{point.x:.4g}, {point.y:.4g}]"
+        yield f"sealed room of {format_area(component.area, 3)} around [{point.x:.4g}, {point.y:.4g}]"
     if pocket_areas:
         pockets = format_count(len(pocket_areas), "sealed pocket")
-        yield f"{pockets} smaller than a robot, {sum(pocket_areas):.2g} m² in total"
+        yield f"{pockets} smaller than a robot, {format_area(sum(pocket_areas), 2)} in total"
 
 
 def _find_start_warnings(environment: Environment, radius: float) -> Iterator[str]:

@@ -290,6 +290,16 @@ def test_sealed_rooms_and_pockets_are_reported():
     ]
 
 
+def test_the_area_of_a_large_sealed_room_is_written_without_an_exponent():
+    frame = PolygonObstacle(
+        ((20.0, 20.0), (70.0, 20.0), (70.0, 70.0), (20.0, 70.0)),
+        (((25.0, 25.0), (65.0, 25.0), (65.0, 65.0), (25.0, 65.0)),),
+    )
+    boundary = ((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0))
+    message = list_warnings(build_hall(frame, boundary=boundary))
+    assert message == ["the room of 1600 m² around (45, 45) is sealed: it has no entrance"]
+
+
 def test_a_start_that_is_too_narrow_for_larger_robots_is_a_warning():
     room = PolygonObstacle(
         ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0)), (((3.0, 3.0), (3.8, 3.0), (3.8, 3.8), (3.0, 3.8)),)

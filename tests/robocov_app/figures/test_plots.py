@@ -639,6 +639,12 @@ def test_names_are_not_interpreted_as_formulas(tmp_path):
     save_figure(plot_cost([curve]), tmp_path / "cost.svg")
 
 
+def test_areas_of_large_maps_are_written_without_an_exponent() -> None:
+    environment = Environment("campus", ((0, 0), (200, 0), (200, 150), (0, 150)))
+    texts = list_texts(plot_environment(environment))
+    assert any("30000 m² inside the boundary, 30000 m² free" in text for text in texts)
+
+
 @pytest.mark.parametrize(
     ("value", "unit", "label"),
     [
@@ -646,8 +652,10 @@ def test_names_are_not_interpreted_as_formulas(tmp_path):
         (3.14159, "s", "RAPF  3.142 s"),
         (252.845, "J", "RAPF  252.8 J"),
         (73.946, "%", "RAPF  73.9%"),
+        (9999.96, "J", "RAPF  10,000 J"),
         (12345.6, "J", "RAPF  12,346 J"),
         (2.0, "", "RAPF  2.000"),
+        (-0.01, "%", "RAPF  0.0%"),
     ],
 )
 def test_final_values_have_few_digits(value: float, unit: str, label: str) -> None:

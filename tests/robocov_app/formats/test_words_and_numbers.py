@@ -8,6 +8,7 @@ import pytest
 import shapely
 from shapely import MultiPolygon, Polygon
 
+from robocov.errors import format_area
 from robocov_app.formats.files import parse_yaml
 from robocov_app.formats.geometry.cells.corners import sharpen_corners
 from robocov_app.formats.geometry.cells.grid_map import _format_share
@@ -19,7 +20,6 @@ from robocov_app.formats.geometry.polygons import format_decimal
 from robocov_app.formats.geometry.shapes.enclosed_area import Rule, find_enclosed_area
 from robocov_app.formats.omissions import format_plural
 from robocov_app.formats.preview.plotting import _format_number
-from robocov_app.formats.reports import format_area
 from robocov_app.formats.unsupported import describe_unsupported_file
 from robocov_app.formats.vector.svg.path_data import parse_path
 from robocov_app.formats.vector.svg.style import parse_declarations
@@ -27,6 +27,7 @@ from robocov_app.formats.vector.svg.style import parse_declarations
 
 def test_numbers_are_formatted_readably() -> None:
     assert (format_area(30083.2), format_area(0.123456)) == ("30083 m²", "0.1235 m²")
+    assert (format_area(999.6, 3), format_area(0.00001234, 2)) == ("1000 m²", "0.000012 m²")
     assert (format_decimal(1.5, 3), format_decimal(-0.0001, 3), format_decimal(1200.0, 0)) == (
         "1.5",
         "0",
@@ -34,7 +35,23 @@ def test_numbers_are_formatted_readably() -> None:
     )
     assert (_format_share(1, 100_000), _format_share(500, 1000)) == ("<0.1%", "50.0%")
     assert (_format_number(1761234.5), _format_number(35.2789)) == ("1\u202f761\u202f234", "35.28")
-    assert (format_plural(2, "empty geometry"), format_plural(2, "box")) == ("2 empty geometries", "2 boxes")
+
+
+@pytest.mark.parametrize(
+    ("noun", "plural"),
+    [
+        ("hole", "holes"),
+        ("box", "boxes"),
+        ("empty geometry", "empty geometries"),
+        ("way", "ways"),
+        ("mesh", "meshes"),
+        ("HATCH", "HATCHes"),
+        ("y", "ys"),
+    ],
+)
+def test_omitted_shapes_have_the_plural_of_their_kind(noun: str, plural: str) -> None:
+    assert format_plural(1, noun) == f"1 {noun}"
+    assert format_plural(2, noun) == f"2 {plural}"
 
 
 def test_smaller_cells_have_round_sizes() -> None:

@@ -17,6 +17,7 @@ from robocov.errors import (
     OutputError,
     ParameterError,
     describe_error,
+    format_area,
     format_count,
     require_number,
 )
@@ -185,7 +186,7 @@ def _describe_map(report: MapReport) -> str:
     if report.narrowest_gap is not None:
         passages = f"narrowest passage {report.narrowest_gap.width:.3f} m"
     obstacles = format_count(report.obstacle_count, "obstacle")
-    free_area = f"{report.free_area:.4g} of {report.area:.4g} m² free"
+    free_area = f"{format_area(report.free_area)} of {format_area(report.area)} free"
     return f"{free_area}, {passages}, {obstacles}, {report.vertex_count} vertices"
 
 

@@ -9,6 +9,7 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import MAX_SAGITTA_M, Gap, Point, find_narrow_gaps, find_narrowest_gap
+from robocov.errors import format_area
 from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.editor.model.geometry import compute_center
 from robocov_app.editor.model.sketch import Item, Sketch
@@ -219,7 +220,7 @@ def _build_reach_warnings(
     sealed_area = sum(part.area for part in swept[1:])
     message = (
         f"robots of radius {radius:g} m cannot pass between {len(swept)} parts of the free space: "
-        f"{sealed_area:.3g} m² are cut off from the largest"
+        f"{format_area(sealed_area, 3)} are cut off from the largest"
     )
     return [Problem(message, cut_off, is_error=False, kind="cut off")]
 

@@ -11,7 +11,7 @@ from shapely import MultiPoint, MultiPolygon, Polygon
 from robocov import environment as env
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import Point, Ring
-from robocov.errors import MapError, StartError, format_count, summarize_names
+from robocov.errors import MapError, StartError, format_area, format_count, summarize_names
 from robocov.mapfile.models import MAX_COORDINATE_M, MAX_SIZE_M
 from robocov.mapfile.rules import check_rules
 from robocov.mapfile.structure import validate_document
@@ -250,13 +250,13 @@ def _warn_of_sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem
     rooms = others[: len(others) - len(pockets)]  # parts are sorted by area, the largest first
     for room in rooms:
         position = format_position(*room.representative_point().coords[0])
-        message = f"the room of {room.area:.3g} m² around {position} is sealed: it has no entrance"
+        message = f"the room of {format_area(room.area, 3)} around {position} is sealed: it has no entrance"
         yield Problem(message, room, is_error=False, kind="sealed")
     if pockets:
         area = sum(pocket.area for pocket in pockets)
         verb = "are" if len(pockets) > 1 else "is"
         count = format_count(len(pockets), "sealed pocket")
-        message = f"{count} {verb} smaller than a robot, {area:.2g} m² in total"
+        message = f"{count} {verb} smaller than a robot, {format_area(area, 2)} in total"
         yield Problem(message, MultiPolygon(pockets), is_error=False, kind="sealed")
 
 

@@ -10,10 +10,10 @@ import shapely
 from pygame import Rect, Surface
 
 from robocov.environment import Point
+from robocov.errors import format_area
 from robocov_app.editor.ui.importing.file_colors import ColorSheet
 from robocov_app.editor.ui.importing.service import Imported
 from robocov_app.formats.geometry.conversion.comparison import ImportComparison
-from robocov_app.formats.reports import format_area
 from robocov_app.look.colors import Color
 from robocov_app.look.theme import Theme
 from robocov_app.render.camera import Camera

@@ -12,12 +12,11 @@ from scipy import ndimage
 from shapely import Polygon
 
 from robocov.environment import Point
-from robocov.errors import MapError
+from robocov.errors import MapError, format_area
 from robocov.typing import BoolArray, FloatArray
 from robocov_app.formats.files import require_coordinate
 from robocov_app.formats.foreign_map import ForeignMap
 from robocov_app.formats.geometry.cells.vectorize import count_polygon_vertices, outline_cells
-from robocov_app.formats.reports import format_area
 
 Cells: TypeAlias = NDArray[np.uint8]
 """(rows, columns) array of `FREE`, `BLOCKED` and `UNKNOWN`, the top row first."""

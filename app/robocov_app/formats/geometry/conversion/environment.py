@@ -5,7 +5,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 
 from robocov.environment import Environment
-from robocov.errors import MapError, format_count, to_one_line
+from robocov.errors import MapError, format_area, format_count, to_one_line
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, count_vertices, describe_vertex_count
 from robocov_app.formats.foreign_map import ForeignMap
@@ -29,7 +29,7 @@ from robocov_app.formats.geometry.conversion.starts import (
 from robocov_app.formats.geometry.conversion.validity import build_valid_boundary, build_valid_free_space
 from robocov_app.formats.geometry.polygons import round_polygons
 from robocov_app.formats.geometry.simplification.simplify import SimplifiedSpace, simplify_free_space
-from robocov_app.formats.reports import ImportReport, format_area
+from robocov_app.formats.reports import ImportReport
 
 MAX_OBSTACLES = 8_000
 MAX_VERTICES = 50_000
@@ -195,9 +195,8 @@ def _simplify(unsimplified: MultiPolygon, original: MultiPolygon, conversion: Co
         simple = simplify_free_space(plan, allowed, foreign.cell, conversion.radius)
         free = round_polygons(simple.free, conversion.digits)
         if free.is_empty:
-            raise MapError(
-                f"{conversion.source_name}: only {original.area:.3g} m² are free: is the scale right?"
-            )
+            free_area = format_area(original.area, 3)
+            raise MapError(f"{conversion.source_name}: only {free_area} are free: is the scale right?")
         if measure_deviation(unsimplified, free).distance <= tolerance + conversion.grid:
             break
     conversion.changed += simple.changed

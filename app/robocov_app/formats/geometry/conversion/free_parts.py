@@ -7,12 +7,11 @@ import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
-from robocov.errors import MapError, format_count
+from robocov.errors import MapError, format_area, format_count
 from robocov.typing import BoolArray
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.conversion.validity import MAX_CRUMB_M2
 from robocov_app.formats.geometry.crossings import extract_sides
-from robocov_app.formats.reports import format_area
 
 MAX_FILE_ROBOTS = 1000
 """Number of robots in a file that are considered."""
@@ -89,7 +88,7 @@ def select_parts(free: MultiPolygon, conversion: Conversion) -> PartSelection:
         is_kept = np.arange(len(parts)) == index
     kept: list[Polygon] = parts[is_kept].tolist()
     if not kept:
-        largest = f"no part of the free space is larger than {area[0]:.3g} m²"
+        largest = f"no part of the free space is larger than {format_area(area[0], 3)}"
         min_size = f"{conversion.min_obstacle_area:g} m²"
         raise MapError(f"{conversion.source_name}: {largest}, expected one of at least {min_size}")
     offered_positions = _report_dropped_parts(parts, is_kept, conversion)
@@ -126,7 +125,7 @@ def drop_specks(parts: list[Polygon], conversion: Conversion) -> list[Polygon]:
         else:
             result.append(Polygon(part.exterior, rings))
     if specks:
-        count = f"{format_count(len(specks), 'obstacle')} smaller than {min_area:.3g} m²"
+        count = f"{format_count(len(specks), 'obstacle')} smaller than {format_area(min_area, 3)}"
         conversion.dropped.append(f"{count}, {_format_total_area(specks)} (--specks 0 keeps them)")
     if crumbs:
         count = format_count(len(crumbs), "hole")

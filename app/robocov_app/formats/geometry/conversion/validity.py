@@ -5,10 +5,9 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.errors import MapError
+from robocov.errors import MapError, format_area
 from robocov_app.formats.geometry.conversion.conversion_options import Conversion
 from robocov_app.formats.geometry.polygons import list_polygons, make_valid, to_multipolygon
-from robocov_app.formats.reports import format_area
 
 MAX_CRUMB_M2 = 1e-4
 """Obstacles and parts of the free space with a smaller area are rounding errors."""

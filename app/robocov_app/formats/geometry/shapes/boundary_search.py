@@ -7,7 +7,7 @@ import shapely
 from shapely import LineString, MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.errors import MapError, quote
+from robocov.errors import MapError, format_area, quote
 from robocov.typing import FloatArray
 from robocov_app.formats.geometry.polygons import to_multipolygon
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing
@@ -75,7 +75,7 @@ def find_surrounding(drawing: Drawing, floors: frozenset[ClosedOutline] = frozen
     """
     enclosed = _find_outer_edge(drawing, floors)
     if enclosed is not None:
-        source = f"the outer edge of the walls, around {enclosed.area:.4g} m²"
+        source = f"the outer edge of the walls, around {format_area(enclosed.area)}"
         return Boundary(MultiPolygon([enclosed]), source)
     around = get_or_default(drawing.options.around, DEFAULT_AROUND_M)
     everything = [*drawing.areas, *(line.solid for line in drawing.lines)]
@@ -232,12 +232,14 @@ def _join_outlines(drawing: Drawing, largest: ClosedOutline, members: set[Closed
         source = "the only closed outline"
         if len(drawing.outlines) > 1:
             name = f", {quote(largest.labels[0])}," if largest.labels else ""
-            source = f"the largest closed outline{name} of {largest.filled_area:.4g} m²"
+            source = f"the largest closed outline{name} of {format_area(largest.filled_area)}"
         return Boundary(largest.area, source, frozenset(members))
     # In the order of the file, because the order of a set differs from run to run.
     areas = [outline.area for outline in drawing.outlines if outline in members]
     joined = close_gaps(areas, drawing.snap)
-    source = f"{len(members)} closed outlines that contain the others, together {joined.area.area:.4g} m²"
+    source = (
+        f"{len(members)} closed outlines that contain the others, together {format_area(joined.area.area)}"
+    )
     gaps = joined.describe() if joined.number else ""
     return Boundary(joined.area, source, frozenset(members), gaps=gaps)
 

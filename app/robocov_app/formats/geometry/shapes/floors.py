@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
 
+from robocov.errors import format_area
 from robocov_app.formats.colors import WHITE, describe_color_counts
 from robocov_app.formats.geometry.polygons import to_multipolygon, unite
 from robocov_app.formats.geometry.shapes.drawings import Boundary, Drawing, InterpretationReport, get_outlines
@@ -17,7 +18,6 @@ from robocov_app.formats.geometry.shapes.painting import (
     is_pale,
     split_alternating,
 )
-from robocov_app.formats.reports import format_area
 
 _LOWEST_ORDER = -1
 """Drawing order below that of all paint in a file."""

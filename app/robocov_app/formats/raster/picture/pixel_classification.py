@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from robocov.errors import MapError, format_count
+from robocov.errors import MapError, format_area, format_count
 from robocov.typing import BoolArray
 from robocov_app.formats.colors import ROLE_CODES, ROLES, Role, RoleCode
 from robocov_app.formats.geometry.cells.grid_map import BLOCKED, FREE, UNKNOWN, Cells
 from robocov_app.formats.geometry.cells.strokes import MAX_STROKE_PIXELS, remove_thin_strokes
 from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.raster.picture.brightness import OPAQUE_ALPHA, STRIP_ROWS, Brightness
-from robocov_app.formats.reports import format_area
 
 _MAX_LIGHT_RATIO = 0.02
 """Maximum ratio of light to dark pixels in a drawing on a transparent ground: light ones are soft edges."""
