@@ -183,8 +183,7 @@ def _build_overview(
         rank = score = ratings.NO_VALUE
         if label in scores:
             rank = str(_compute_rank(scores[label], compared_scores))
-            margin = ratings.format_number(100.0 * mean_scores[label].margin, ".1f")
-            score = f"{100.0 * scores[label]:.1f} ± {margin}"
+            score = _format_mean_score(mean_scores[label])
         cells = _build_overview_cells(by_label[label], tracks)
         rows.append((label, entries.information[label], rank, score, *cells))
     headings = [suite.format_heading(name) for name in tracks]
@@ -203,6 +202,14 @@ def _build_overview(
         notes.append(f"Without runs on these tracks: {'; '.join(missing)}.")
     caption = "Scores, and median gaps on each track, %"
     return PageTable(caption, head, rows, text_columns=frozenset({1}), notes=tuple(notes))
+
+
+def _format_mean_score(mean_score: ratings.MeanScore) -> str:
+    """Format a score in percent, with half the width of its interval if it has one."""
+    score = f"{100.0 * mean_score.score:.1f}"
+    if np.isnan(mean_score.margin):
+        return score
+    return f"{score} ± {100.0 * mean_score.margin:.1f}"
 
 
 def _compute_rank(score: float, scores: Iterable[float]) -> int:

@@ -28,8 +28,8 @@ _NORMAL_QUANTILE = 1.96
 _VARIANT_PREFIX = "dense-"
 """Beginning of the names of maps that are equal to others, apart from their density."""
 MIN_INTERVAL_MAPS = 12
-"""Minimum number of maps for an interval. A 95% bootstrap interval contains the true value in 82% of all
-cases with 5 maps, and in 92% with 12."""
+"""Minimum number of maps for an interval. With six maps, the interval of a median contains nearly all values,
+and with twelve about half of them. Intervals of means would be too narrow with few maps."""
 FILE_MARK = "*"
 """End of the labels of results that are not bundled: they are from files, whose content may be wrong."""
 _MAX_LABEL_CHARS = 100
@@ -271,7 +271,7 @@ class MeanScore(NamedTuple):
 
     score: float
     margin: float
-    """Half the width of the 95% interval over maps; nan if there is only one map."""
+    """Half the width of the 95% interval over maps; nan for fewer than `MIN_INTERVAL_MAPS`."""
 
 
 def compute_mean_score(track_ratings: Collection[Rating]) -> MeanScore:
@@ -297,7 +297,7 @@ def compute_mean_score(track_ratings: Collection[Rating]) -> MeanScore:
             contributions[name] += weight * (run_score - rating.score)
     score = float(np.mean([rating.score for rating in track_ratings]))
     map_count = len(contributions)
-    if map_count < 2:
+    if map_count < MIN_INTERVAL_MAPS:
         return MeanScore(score, np.nan)
     variance = sum(value**2 for value in contributions.values()) * map_count / (map_count - 1)
     return MeanScore(score, _NORMAL_QUANTILE * float(np.sqrt(variance)))

@@ -88,7 +88,7 @@ class Arguments(JsonOption):
     robots: int = 2
     """Number of robots that verify checks in each repeated run."""
     new_maps: int = 5
-    """Number of new maps on which verify runs the controller, at most one of each family."""
+    """Number of new maps on which verify runs the controller, at most one of each family, on one track."""
     seed: int | None = None
     """Seed of verify for the sample, the robots and the new maps; by default a new one is drawn."""
     alone: bool = False

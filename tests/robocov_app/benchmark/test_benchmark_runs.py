@@ -408,8 +408,11 @@ def test_the_interval_of_the_mean_score_is_over_maps() -> None:
     assert once.margin == pytest.approx(1.96 * scores.std(ddof=1) / np.sqrt(len(names)))
     assert ratings.compute_mean_score([build_rating((0, 1))]) == pytest.approx(once)
     assert ratings.compute_mean_score([build_rating((0,)), build_rating((0, 1))]) == pytest.approx(once)
-    single = replace(build_rating((0,)), rows=build_rating((0,)).rows[:1])
-    assert np.isnan(ratings.compute_mean_score([single]).margin)
+    rating = build_rating((0,))
+    for map_count in (ratings.MIN_INTERVAL_MAPS - 1, ratings.MIN_INTERVAL_MAPS):
+        few = replace(rating, rows=rating.rows[:map_count])
+        has_margin = bool(np.isfinite(ratings.compute_mean_score([few]).margin))
+        assert has_margin == (map_count == ratings.MIN_INTERVAL_MAPS)
 
 
 def test_intervals_require_at_least_12_maps() -> None:
