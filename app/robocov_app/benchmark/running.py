@@ -16,6 +16,7 @@ from robocov_app.benchmark.results import (
     build_row,
     describe_method,
     identify_suite,
+    read_result,
 )
 from robocov_app.sweep.ledger import Ledger
 from robocov_app.sweep.study.study import Study
@@ -67,14 +68,15 @@ def run_benchmark(
     Raises
     ------
     InputError
-        If the folder contains anything other than a benchmark, or if robots send messages although the
-        controller does not declare it.
+        If the folder contains anything other than a benchmark, or the result of another controller or of
+        other gains, or if robots send messages although the controller does not declare it.
     ParameterError
         If the controller, a track or a map is unknown.
     """
     _check_folder(out)
     studies = dict(controller.build_studies(selection))
     entry = controller.describe(next(iter(studies.values())))
+    _check_entry(out, entry)
     rows: list[Row] = []
     for track, study in studies.items():
         folder = out / TRACKS_FOLDER / track
@@ -111,6 +113,27 @@ def _check_folder(out: Path) -> None:
         foreign = {path.name for path in out.iterdir()} - {RESULT_FILE, TRACKS_FOLDER}
     if foreign or (out.exists() and not out.is_dir()):
         raise InputError(f"{out}: expected an empty folder or a benchmark; choose another --out")
+
+
+def _check_entry(out: Path, entry: dict[str, Any]) -> None:
+    """Raise InputError if a folder contains the result of another controller, or of other gains.
+
+    A result of the same controller is replaced, also after its file has changed.
+    """
+    if not (out / RESULT_FILE).is_file():
+        return
+    expected = _name_entry(entry)
+    present = _name_entry(read_result(out)["entry"])
+    if present != expected:
+        raise InputError(
+            f"{out}: expected no result or that of {expected}, got that of {present}; choose another --out"
+        )
+
+
+def _name_entry(entry: dict[str, Any]) -> str:
+    """Return the controller of an entry and the gains that were set."""
+    gains = " ".join(f"{name}={value}" for name, value in sorted(entry["set"].items()))
+    return f"{entry['controller']} with {gains}" if gains else entry["controller"]
 
 
 def _read_rows(track: str, study: Study, folder: Path) -> Iterator[Row]:

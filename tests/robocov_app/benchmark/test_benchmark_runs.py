@@ -565,6 +565,17 @@ def test_finished_runs_are_reused(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert run_short_benchmark(tmp_path / "out") == expected
 
 
+@pytest.mark.usefixtures("short_runs")
+def test_the_result_of_another_controller_or_of_other_gains_is_kept(tmp_path: Path) -> None:
+    run_short_benchmark(tmp_path, "rapf", k_rep=0.5)
+    content = (tmp_path / RESULT_FILE).read_bytes()
+    expectation = "expected no result or that of {}, got that of rapf with k_rep=0.5; choose another --out"
+    for controller in ("lloyd", "rapf"):
+        with pytest.raises(InputError, match=expectation.format(controller)):
+            run_short_benchmark(tmp_path, controller)
+    assert (tmp_path / RESULT_FILE).read_bytes() == content
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
