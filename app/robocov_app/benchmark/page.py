@@ -12,6 +12,7 @@ from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.pareto_plots import PlottedEntry, build_plots
+from robocov_app.benchmark.rated_controller import RatedController
 from robocov_app.benchmark.ratings import Rating
 from robocov_app.benchmark.results import describe_method, get_results_version, shares_maps_by_messages
 from robocov_app.look.curve_styles import MARKER_PATHS, CurveStyle, choose_curve_styles
@@ -368,9 +369,11 @@ def _build_entries_table(labeled_results: Iterable[tuple[str, Mapping[str, Any]]
     for label, result in labeled_results:
         entry = result["entry"]
         gains = ", ".join(f"{name} {value}" for name, value in entry["gains"].items())
-        source = "built in"
+        source = "installed package"
         if entry["source_sha256"]:
             source = f"source {entry['source_sha256'][:12]}"
+        elif RatedController(entry["controller"], {}).is_built_in:
+            source = "built in"
         origin = "robocov"
         if not result["is_bundled"]:
             # A file can contain any name and any hash.

@@ -133,6 +133,8 @@ class Verification:
         Comparison of gaps on new maps with those on the suite.
     declared_bytes, compressed_bytes : int
         Total size of all messages in the runs, as declared and as compressed payloads.
+    has_unidentified_code : bool
+        Whether the controller is from an installed package, whose code the result does not identify.
     differences : list of str
         Everything that is not as expected.
     read_files : list of str
@@ -150,6 +152,7 @@ class Verification:
     comparison: NewMapComparison | None = None
     declared_bytes: int = 0
     compressed_bytes: int = 0
+    has_unidentified_code: bool = False
     differences: list[str] = field(default_factory=list)
     read_files: list[str] = field(default_factory=list)
 
@@ -237,6 +240,11 @@ class Verification:
             lines.append(
                 f"Messages: {self.declared_bytes / 1e3:,.0f} kB as the controller declares their sizes, "
                 f"{self.compressed_bytes / 1e3:,.0f} kB as compressed content."
+            )
+        if self.has_unidentified_code:
+            lines.append(
+                "The controller is from an installed package. The result does not identify its code, and may "
+                "have been made with another version."
             )
         if self.read_files:
             lines.append(
@@ -338,6 +346,7 @@ def verify_result(
     rows = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
     failed_count = sum("error" in row for row in rows.values())
     verification = Verification(seed, rows=len(rows), failed_rows=failed_count)
+    verification.has_unidentified_code = not rated.is_built_in and code.source is None
     verification.differences += [f"its controller tried {violation}" for violation in violations]
     verification.differences += _compare_descriptions(result["entry"], {**identity, **asdict(description)})
     verification.differences += _compare_without_running(result, rows, tasks)

@@ -764,12 +764,17 @@ def test_files_do_not_remove_bundled_results_from_plots() -> None:
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")
 def test_the_code_of_an_entry_in_a_file_is_a_claim() -> None:
     forged = build_result("\u0410tlas", 0.1, controller="atlas", source_sha256=None)
-    page = build_page([forged, build_result("Mine", 0.1), build_bundled_rapf()], "Test")
+    plugin = build_result("Zigzag", 0.1, controller="zigzag", source_sha256=None)
+    page = build_page([forged, build_result("Mine", 0.1), plugin, build_bundled_rapf()], "Test")
     entries = page.partition("<span>Entries</span>")[2].partition("</table>")[0]
     codes = re.findall(r"<td[^>]*>((?:according|built|source).*?)</td>", entries)
-    # In alphabetical order: Mine, RAPF, and a label that begins with a Cyrillic letter.
-    claim = "according to the file:"
-    assert codes == [f"{claim} source 111111111111", "built in", f"{claim} built in"]
+    # In alphabetical order: Mine, RAPF, Zigzag, and a label that begins with a Cyrillic letter.
+    assert codes == [
+        "according to the file: source 111111111111",
+        "built in",
+        "according to the file: installed package",
+        "according to the file: built in",
+    ]
 
 
 @pytest.mark.usefixtures("short_ideal_track")

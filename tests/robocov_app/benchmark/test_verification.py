@@ -576,6 +576,13 @@ def test_the_number_of_failed_runs_is_reported() -> None:
     assert not any("failed" in line for line in replace(some, failed_rows=0).describe())
 
 
+def test_unidentified_code_of_an_installed_package_is_reported() -> None:
+    some = Verification(seed=0, rows=10, runs=3)
+    assert not any("installed package" in line for line in some.describe())
+    unidentified = replace(some, has_unidentified_code=True)
+    assert any("The controller is from an installed package." in line for line in unidentified.describe())
+
+
 def build_rows(gap: float, spread: float = 0.0) -> list[dict[str, Any]]:
     rng = np.random.default_rng(0)
     names = [name for names in suite.FAMILIES.values() for name in names]
