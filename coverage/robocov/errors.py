@@ -576,6 +576,26 @@ def format_area(area: float, digits: int = 4) -> str:
     return f"{Decimal(f'{area:.{digits}g}'):f} m²"
 
 
+def format_position(x: float, y: float) -> str:
+    """Format a position to the millimeter, however far it is from the origin.
+
+    Parameters
+    ----------
+    x, y : float, m
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> format_position(4.0, 3.0456), format_position(385123.25, -0.0001)
+    ('[4, 3.046]', '[385123.25, 0]')
+    """
+    # Adding 0.0 turns -0.0 into 0.0.
+    return f"[{round(x, 3) + 0.0:.10g}, {round(y, 3) + 0.0:.10g}]"
+
+
 def describe_unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the message for an unknown name, which suggests the most similar known names.
 

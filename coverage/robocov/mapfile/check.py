@@ -25,7 +25,14 @@ from robocov.environment import (
     find_narrowest_gap,
     find_overlaps,
 )
-from robocov.errors import StartError, format_area, format_count, format_path, summarize_names
+from robocov.errors import (
+    StartError,
+    format_area,
+    format_count,
+    format_path,
+    format_position,
+    summarize_names,
+)
 from robocov.typing import FloatArray
 
 MANY_VERTICES = 5000
@@ -313,7 +320,7 @@ def _find_warnings(environment: Environment, gap: Gap | None, radius: float) -> 
     yield from _find_path_warnings(environment)
     yield from _find_component_warnings(environment, radius)
     if gap is not None and gap.width < 2 * radius:
-        ends = " and ".join(f"[{x:.4g}, {y:.4g}]" for x, y in gap.between)
+        ends = " and ".join(format_position(x, y) for x, y in gap.between)
         yield (
             f"the gap between {ends} is {gap.width:.3g} m wide: a robot of radius {radius:g} m cannot pass"
         )
@@ -369,7 +376,7 @@ def _find_component_warnings(environment: Environment, radius: float) -> Iterato
             pocket_areas.append(component.area)
             continue
         point = component.representative_point()
-        yield f"sealed room of {format_area(component.area, 3)} around [{point.x:.4g}, {point.y:.4g}]"
+        yield f"sealed room of {format_area(component.area, 3)} around {format_position(point.x, point.y)}"
     if pocket_areas:
         pockets = format_count(len(pocket_areas), "sealed pocket")
         yield f"{pockets} smaller than a robot, {format_area(sum(pocket_areas), 2)} in total"

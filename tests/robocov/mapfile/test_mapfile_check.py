@@ -80,6 +80,14 @@ def test_a_gap_that_no_robot_can_pass_is_a_warning() -> None:
     assert check_map(environment, radius=0.07).warnings == ()
 
 
+def test_positions_far_from_the_origin_are_written_in_full() -> None:
+    x = 385000.0
+    y = 5819000.0
+    boundary = [[x, y], [x + 100, y], [x + 100, y + 50], [x, y + 50]]
+    environment = build_room(build_block(x + 40, y, 1, 50), boundary=boundary)
+    assert list_warnings(environment) == ["sealed room of 2000 m² around [385020, 5819025]"]
+
+
 def test_sealed_rooms_and_pockets_are_warnings() -> None:
     # The wall leaves 24 m² in the west and 30 m² in the east. Half of the pocket of 0.05 m by 1 m is filled.
     environment = build_room(

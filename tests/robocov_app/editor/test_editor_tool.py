@@ -56,6 +56,7 @@ def test_lengths_and_angles_are_formatted() -> None:
         "(1.00, 0.00) m",
         "(1.25, 0)",
     )
+    assert format_position(385123.25, 5819000.0625) == "(385123.25, 5819000.062)"
     assert describe_path(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5)) == "0.5 m/s, loop of 6 m in 12 s"
     assert find_free_name(Sketch(starts=(("start", UniformStart()),)), "start") == "start 2"
     assert translate_message('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, position 2: x"

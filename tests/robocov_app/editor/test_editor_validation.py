@@ -104,7 +104,7 @@ BOX = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
         ),
         (
             build_hall(boundary=((0.0, 0.0), (1e8, 0.0), (0.0, 5.0))),
-            "boundary: (1e+08, 0) is too far away: coordinates must be within 10000 km of the origin",
+            "boundary: (100000000, 0) is too far away: coordinates must be within 10000 km of the origin",
             (1e8, 0.0),
             BOUNDARY,
         ),

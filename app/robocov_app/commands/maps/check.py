@@ -11,7 +11,14 @@ import tyro
 from rich.console import Console
 
 from robocov.defaults import DEFAULT_RADIUS_M
-from robocov.errors import InputError, MapError, format_count, format_path, require_number
+from robocov.errors import (
+    InputError,
+    MapError,
+    format_count,
+    format_path,
+    format_position,
+    require_number,
+)
 from robocov.mapfile import find_map_file, load_map
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.commands.options import JsonOption
@@ -287,6 +294,6 @@ def _format_narrowest_gap(report: MapReport) -> str:
     """Return the width of the narrowest passage, and the points at its ends, as text."""
     if report.narrowest_gap is None:
         return "none"
-    (x1, y1), (x2, y2) = report.narrowest_gap.between
+    start, end = report.narrowest_gap.between
     width = report.narrowest_gap.width
-    return f"{width:.3f} m, between [{x1:.4g}, {y1:.4g}] and [{x2:.4g}, {y2:.4g}]"
+    return f"{width:.3f} m, between {format_position(*start)} and {format_position(*end)}"

@@ -63,8 +63,9 @@ class Problem:
 
 
 def format_position(x: float, y: float) -> str:
-    """Format a position, m, for messages, for example "(1.5, 2)"."""
-    return f"({x:.5g}, {y:.5g})"
+    """Format a position, m, to the millimeter for messages, for example "(1.5, 2)"."""
+    # Adding 0.0 turns -0.0 into 0.0.
+    return f"({round(x, 3) + 0.0:.10g}, {round(y, 3) + 0.0:.10g})"
 
 
 def translate_message(message: str, sketch: Sketch) -> str:
