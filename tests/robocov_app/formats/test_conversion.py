@@ -117,7 +117,7 @@ def test_specks_are_removed() -> None:
     crumb = ROOM - box(7, 7, 7.001, 7.02)
     environment, report = build_environment(build_foreign_map(crumb), Shaping(), "plan")
     assert len(environment.obstacles) == 2
-    assert report.dropped == ("1 hole, 2e-05 m², due to rounding",)
+    assert report.dropped == ("1 hole, 0.00002 m², due to rounding",)
 
 
 def test_noise_depends_on_the_format() -> None:
