@@ -144,6 +144,22 @@ def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path)
         assert {"Attraction", "Robot repulsion", "Obstacle repulsion"} <= set(list_texts(window))
 
 
+@pytest.mark.parametrize("width", [900, 1280])
+def test_a_lesson_shows_no_presets_next_to_its_chips(tmp_path: Path, width: int) -> None:
+    def has_presets() -> bool:
+        return any(command.startswith("preset") for command in find_chips(window))
+
+    with open_window(tmp_path, size=(width, 720)) as window:
+        assert has_presets()
+        window.run_command("tour")
+        window.run_frame(1 / 30)
+        assert "layer:force_attraction" in find_chips(window)
+        assert not has_presets()
+        window.run_command("tour")
+        window.run_frame(1 / 30)
+        assert has_presets()
+
+
 def test_chips_of_a_lesson_disappear_with_it(tmp_path: Path) -> None:
     with open_window(tmp_path) as window:
         before = find_chips(window)

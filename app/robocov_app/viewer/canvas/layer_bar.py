@@ -74,6 +74,8 @@ class LayerBar(BasicFocusGroup):
         Box of the menu when it was drawn last, px.
     max_menu_width : float or None
         Maximum width of the menu at scale 1, px; None if it may be as wide as the arena.
+    has_presets : bool
+        Whether the bar has chips of the presets, which are also in the menu.
     """
 
     def __init__(self, view: ViewState, commands: CommandTable, run_command: Callable[[str], object]) -> None:
@@ -86,6 +88,7 @@ class LayerBar(BasicFocusGroup):
         self._run_command = run_command
         self.menu_box = Rect(0, 0, 0, 0)
         self.max_menu_width: float | None = None
+        self.has_presets = True
         self._hovered = ""
         self._offered: set[str] = set()  # layers with a chip: visible now, or hidden one by one
         self._visible: set[str] = set()  # layers that were visible when the bar was drawn last
@@ -207,7 +210,8 @@ class LayerBar(BasicFocusGroup):
         presets: list[Chip] = []
         if "legend" in self._view.layers:
             chips = self._list_layer_chips(layers, scenes)
-            presets = self._list_preset_chips()
+            if self.has_presets:
+                presets = self._list_preset_chips()
 
         @cache
         def measure(chip: Chip) -> int:

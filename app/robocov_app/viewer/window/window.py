@@ -378,6 +378,8 @@ class ViewerWindow(CommandWindow):
         self.sheet_handle.draw(self.screen, layout, self.theme)
         find_strip_texts = partial(self.canvas.find_strip_texts, self.screen)
         self.message_box = self._status.draw_message(self.screen, layout, self.theme, find_strip_texts)
+        # A preset would replace the layers of a chapter, and leave the lesson.
+        self.layer_bar.has_presets = self.lesson.shown is None
         self.layer_bar.draw(self.screen, layout, self.theme, self.canvas.layers, self.canvas.scenes)
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)
