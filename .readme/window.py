@@ -148,7 +148,7 @@ def record_tour(name: str) -> None:
     launcher = ViewerLauncher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
     with launcher.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
-        window.do("tour")
+        window.run_command("tour")
         assert window.lesson.player is not None
         for frame in range(round(window.lesson.player.duration * HEADLESS_FPS)):
             if window.lesson.player is None:
