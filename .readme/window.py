@@ -26,6 +26,7 @@ from robocov_app.viewer.window.screen_video import copy_pixels
 
 if TYPE_CHECKING:
     from robocov_app.editor.ui.window import EditorWindow
+    from robocov_app.viewer.start.page import ThemeName
     from robocov_app.viewer.window.window import ViewerWindow
 
 HERE = Path(__file__).parent
@@ -37,7 +38,7 @@ METERS_PER_PIXEL = 0.025
 BLUE = (74, 111, 165)
 
 
-def draw_window(theme: str, name: str) -> None:
+def draw_window(theme: ThemeName, name: str) -> None:
     """Run the viewer for 12 s, with a robot failing after 6 s, and save a screenshot."""
     session = Session(
         SessionScenario(
@@ -64,7 +65,7 @@ def draw_window(theme: str, name: str) -> None:
         save_screenshot(window, PICTURES / name)
 
 
-def draw_editor(theme: str, name: str) -> None:
+def draw_editor(theme: ThemeName, name: str) -> None:
     """Add a showcase to a museum, drag it until it is aligned with the others, and save a screenshot."""
     path = find_map_file("museum")
     launcher = EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True)
@@ -110,7 +111,7 @@ def draw_floor_plan(path: Path) -> None:
     image.save(path)
 
 
-def draw_import_dialog(theme: str, name: str) -> None:
+def draw_import_dialog(theme: ThemeName, name: str) -> None:
     """Open the import dialog for a floor plan, mark the color of a room as free, and save a screenshot."""
     with TemporaryDirectory() as folder:
         plan = Path(folder) / "flat.png"
@@ -159,7 +160,8 @@ def record_tour(name: str) -> None:
 
 
 if __name__ == "__main__":
-    for window_theme, suffix in (("light", ""), ("dark", "-dark")):
+    suffixes: dict[ThemeName, str] = {"light": "", "dark": "-dark"}
+    for window_theme, suffix in suffixes.items():
         draw_window(window_theme, f"window{suffix}.png")
         draw_editor(window_theme, f"editor{suffix}.png")
         draw_import_dialog(window_theme, f"import{suffix}.png")

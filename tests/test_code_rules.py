@@ -36,6 +36,8 @@ def test_the_code_is_formatted_by_ruff() -> None:
 @pytest.mark.slow
 def test_mypy_finds_nothing() -> None:
     assert_succeeds("-m", "mypy")
+    # The scripts that draw the images of README and handbook, which no other test runs.
+    assert_succeeds("-m", "mypy", *map(str, sorted(ROOT.glob(".readme/*.py"))))
 
 
 def test_imports_follow_the_layers_in_pyproject() -> None:
