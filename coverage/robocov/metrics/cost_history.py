@@ -91,7 +91,7 @@ def compute_cost_history(
     Raises
     ------
     ParameterError
-        If `record` or `cost` has the wrong type.
+        If `record` or `cost` has the wrong type, or the rate is negative or not finite.
 
     See Also
     --------
@@ -156,6 +156,11 @@ def select_sampled_steps(record: Record, rate: float) -> list[int]:
     -------
     list of int
         Indices of the time steps, ascending.
+
+    Raises
+    ------
+    ParameterError
+        If the rate is negative or not finite.
     """
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)

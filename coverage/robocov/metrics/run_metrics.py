@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robocov.arrays import compute_point_distances
-from robocov.errors import ParameterError, format_count, quote
+from robocov.errors import format_count
 from robocov.metrics.clearance import compute_clearances, measure_robot_gaps
 from robocov.metrics.communication import compute_sent_rate
 from robocov.metrics.connectivity import Connectivity, measure_connectivity
@@ -181,8 +181,6 @@ def compute_run_metrics(
     >>> rc.compute_run_metrics(record, rate=1.0).time
     array([0., 1., 2.])
     """
-    if not 0.0 <= rate < np.inf:
-        raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
     steps = select_nearest_steps(record.time, rate)
     areas = []
     graphs = []

@@ -307,8 +307,6 @@ class Record(Drawable):
         ParameterError
             If the rate is negative or not finite.
         """
-        if not 0.0 <= rate < np.inf:
-            raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
         return self._select_steps(select_nearest_steps(self.time, rate))
 
     def _select_steps(self, steps: slice | IntArray) -> Record:

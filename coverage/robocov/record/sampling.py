@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from robocov.errors import ParameterError, is_number, quote
 from robocov.typing import FloatArray, IntArray
 
 TIME_ROUNDING_S = 5e-7
@@ -28,11 +29,18 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
         Indices of the selected time steps, ascending. Of two steps that are equally near to a multiple, the
         earlier one is selected. If the rate is at least that of the steps, all steps are selected.
 
+    Raises
+    ------
+    ParameterError
+        If the rate is negative or not finite.
+
     Examples
     --------
     >>> select_nearest_steps(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]), rate=1.0)
     array([0, 2, 5])
     """
+    if not is_number(rate) or not 0.0 <= rate < np.inf:
+        raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
     last = len(time) - 1
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov.errors import ParameterError
 from robocov.record import select_nearest_steps
 
 
 @given(st.integers(1, 300), st.floats(1e-3, 0.5), st.floats(0.0, 60.0), st.sampled_from([0.0, 12.5]))
 def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
-    """Each multiple is asked for its nearest moment, not each moment for its nearest multiple."""
+    """Each multiple selects its nearest step; it is not each step that selects its nearest multiple."""
     time = begin + np.arange(count) * dt
     kept = select_nearest_steps(time, rate)
     assert kept[0] == 0 and kept[-1] == count - 1
@@ -26,6 +27,12 @@ def test_the_nearest_to_every_multiple_stays(count, dt, rate, begin) -> None:
     )
     # and no more than those
     assert len(kept) <= len(multiples) + 1
+
+
+@pytest.mark.parametrize("rate", [-1.0, np.nan, np.inf, "fast", None])
+def test_rates_that_are_negative_or_not_finite_are_rejected(rate: object) -> None:
+    with pytest.raises(ParameterError, match="rate: expected a finite number of at least 0 Hz, got"):
+        select_nearest_steps(np.arange(3.0), rate)  # type: ignore[arg-type]
 
 
 def test_of_two_equally_near_steps_the_earlier_is_selected() -> None:
