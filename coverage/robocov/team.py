@@ -225,7 +225,7 @@ class Team:
         Raises
         ------
         ParameterError
-            If a value is out of range.
+            If a value is not a number, or out of range.
         """
         if not is_number(n, Integral) or n < 1:
             raise ParameterError(f"robots: expected a whole number of at least 1, got {quote(n)}")
@@ -240,9 +240,7 @@ class Team:
             "track_width": _choose_track_width(kinematics, track_width, radius),
             "turning_rate": turning_rate,
         }
-        columns = {
-            name: np.full(n, to_floats(f"team.{name}", value, "a number")) for name, value in values.items()
-        }
+        columns = {name: np.full(n, _to_number(name, value)) for name, value in values.items()}
         return cls(**columns)
 
     @classmethod
@@ -344,6 +342,15 @@ class Team:
             raise _build_json_error(document, "robots", expected=f"a whole number from 1 to {MAX_ROBOTS}")
         columns = {name: _read_column(document, name, robot_count) for name in PARAMETERS}
         return cls(**columns)
+
+
+def _to_number(name: str, value: object) -> float:
+    """Return the value of a parameter as a float; raise ParameterError if it is not a single number."""
+    number = to_floats(f"team.{name}", value, "a number")
+    # NumPy converts None to nan.
+    if value is None or number.ndim > 0:
+        raise ParameterError(f"team.{name}: expected a number, got {quote(value)}")
+    return float(number)
 
 
 def _choose_track_width(kinematics: str | None, track_width: float, radius: float) -> float:

@@ -349,9 +349,11 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     Raises
     ------
     ParameterError
-        If a gain is unknown (the message suggests the most similar name), if a value is not allowed, or if
-        the constructor of a user's class raises an error.
+        If `values` is not a mapping, a gain is unknown (the message suggests the most similar name), a value
+        is not allowed, or the constructor of a user's class raises an error.
     """
+    if not isinstance(values, Mapping):
+        raise ParameterError(f"gains: expected a mapping of names to values, got {quote(values)}")
     gains = get_gains(kind)
     controller_name = getattr(kind, "name", kind.__name__)
     checked_values = {}

@@ -129,14 +129,15 @@ def build_lattice(geodesics: Geodesics, lattice: int) -> tuple[Sites, Tiles]:
         # Column c of `is_inside` says which cells are in component c of the free space.
         is_inside = geodesics.count_windings(geodesics.grid.snap(centers)) == 1
         is_free = is_inside.any(axis=1)
-        all_cells.append(cells[is_free])
-        all_components.append(is_inside[is_free].argmax(axis=1))
-    cells = np.concatenate(all_cells)
-    if not len(cells):
+        if is_free.any():
+            all_cells.append(cells[is_free])
+            all_components.append(is_inside[is_free].argmax(axis=1))
+    if not all_cells:
         raise ParameterError(
             f"lattice: expected at least one site in the free space, got none with {lattice} cells along a "
             "side; choose a finer lattice"
         )
+    cells = np.concatenate(all_cells)
     cells.setflags(write=False)
     points = copy_read_only(_compute_centers(cells, lattice, spacing, geodesics.grid.origin))
     sites = Sites(lattice, spacing, points, cells)

@@ -20,7 +20,7 @@ from robocov.arrays import copy_read_only
 from robocov.cost import CoverageCost
 from robocov.defaults import DEFAULT_RADIUS_M
 from robocov.environment import GRID_M, Environment, compute_center_areas
-from robocov.errors import ParameterError, require_number
+from robocov.errors import InputError, ParameterError, require_number, to_floats
 from robocov.geodesic.angular_index import AngularWallIndex
 from robocov.geodesic.geodesics import SOURCE_BINS, Geodesics
 from robocov.lower_bound.profit_bounds import (
@@ -202,7 +202,8 @@ def compute_lower_bound(
         radius=radius,
         progress=lambda fraction: report(_PROGRESS_BEFORE_TABLE * fraction),
     )
-    dual = _Dual.build(cost, np.asarray(positions, dtype=float), radius)
+    checked_positions = to_floats("positions", positions, "[x, y] of each robot in meters", InputError)
+    dual = _Dual.build(cost, checked_positions, radius)
     proof = _search_best_proof(dual, precision, report)
     report(1.0)
     mean_distance = max(proof.bound, 0.0) / dual.total_weight

@@ -24,6 +24,7 @@ from robocov.environment import (
     compute_swept_area,
     find_narrowest_gap,
     find_overlaps,
+    require_environment,
 )
 from robocov.errors import (
     StartError,
@@ -179,6 +180,11 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     MapReport
         Measures and warnings.
 
+    Raises
+    ------
+    ParameterError
+        If `environment` is not a map.
+
     See Also
     --------
     load_map : Load a map, and check that it is valid.
@@ -189,6 +195,7 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     >>> rc.check_map(rc.load_map("square")).free_area
     100.0
     """
+    require_environment(environment)
     gap = find_narrowest_gap(environment.free)
     density = environment.density
     density_kind = None

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robocov.errors import InputError
 from robocov.observation.close_pairs import find_pairs_in_range
 from robocov.typing import BoolArray, FloatArray, IntArray
 
@@ -97,7 +98,19 @@ class Neighbors:
         Returns
         -------
         Neighbors
+
+        Raises
+        ------
+        InputError
+            If there is no robot with one of these indices.
         """
+        for indices in (robot, neighbor):
+            # Kernels do not check bounds: they would read memory beyond the arrays.
+            if len(indices) > 0 and not 0 <= indices.min() <= indices.max() < robot_count:
+                raise InputError(
+                    f"neighbors: expected indices of {robot_count} robots, "
+                    f"got {indices.min()} to {indices.max()}"
+                )
         indptr = np.zeros(robot_count + 1, dtype=np.intp)
         np.cumsum(np.bincount(robot, minlength=robot_count), out=indptr[1:])
         return cls(robot_count, ranges, indptr, neighbor)

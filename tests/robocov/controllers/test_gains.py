@@ -141,3 +141,9 @@ def test_a_controller_without_gains_takes_none() -> None:
 
     with pytest.raises(ParameterError, match=r"Plain\.k: controller 'Plain' has no gains"):
         instantiate_controller(Plain, {"k": 1.0})
+
+
+@pytest.mark.parametrize("gains", [3, ["k_rep"], "k_rep"])
+def test_gains_that_are_no_mapping_are_rejected(gains: object) -> None:
+    with pytest.raises(ParameterError, match="gains: expected a mapping of names to values, got"):
+        make_controller("rapf", gains)  # type: ignore[arg-type]

@@ -54,6 +54,11 @@ def test_a_lattice_without_a_free_cell_is_rejected():
         build_lattice(Geodesics(build_environment(CircleObstacle((4.0, 3.0), 0.5))), 1)
 
 
+def test_a_map_without_free_space_is_rejected():
+    with pytest.raises(ParameterError, match="lattice: expected at least one site in the free space"):
+        CoverageCost(build_environment(CircleObstacle((4.0, 2.5), 5.0)), 8)
+
+
 def test_values_of_sites_are_arranged_as_an_image_of_the_lattice():
     cost = CoverageCost(build_environment(CircleObstacle((4.5, 1.5), 0.4)), 4)
     image = cost.to_grid(cost([[2.5, 1.5]]).owners)

@@ -204,6 +204,7 @@ def test_the_same_call_gives_the_same_bits():
         ({"lattice": 0}, ParameterError, "lattice: expected a whole number from 1 to 4096, got 0"),
         ({"positions": [[3.0, 3.0]]}, InputError, "positions[0]: expected a point inside the boundary"),
         ({"positions": []}, InputError, "positions: expected at least one robot, got none"),
+        ({"positions": "x"}, InputError, "positions: expected [x, y] of each robot in meters, got 'x'"),
     ],
 )
 def test_invalid_parameters_are_named(parameters, error, message):

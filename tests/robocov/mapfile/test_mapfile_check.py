@@ -10,7 +10,7 @@ import pytest
 
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment
-from robocov.errors import StartError
+from robocov.errors import ParameterError, StartError
 from robocov.mapfile import from_json
 from robocov.mapfile.check import MapReport, check_map, describe_vertex_count
 
@@ -221,3 +221,9 @@ def test_the_unreachable_area_is_computed_when_it_is_read(monkeypatch: pytest.Mo
     report.to_dict()
     report.to_dict()
     assert radii == [0.2]
+
+
+@pytest.mark.parametrize("environment", [None, "rooms", 3])
+def test_a_value_that_is_no_map_is_rejected(environment: object) -> None:
+    with pytest.raises(ParameterError, match="environment: expected a map"):
+        check_map(environment)  # type: ignore[arg-type]

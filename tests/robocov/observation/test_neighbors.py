@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from voronoi_cases import SQUARE
 
+from robocov.errors import InputError
 from robocov.observation import Observations
 from robocov.observation.close_pairs import find_close_pairs
 from robocov.observation.neighbors import Neighbors
@@ -71,3 +72,9 @@ def test_near_neighbors_are_within_communication_range() -> None:
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 2), (2, 1)]
     np.testing.assert_allclose(distance, 0.5)
     np.testing.assert_allclose(offset, [[-0.5, 0.0], [0.5, 0.0]])
+
+
+@pytest.mark.parametrize(("robot", "neighbor"), [([0], [2]), ([2], [0]), ([-1], [0]), ([0], [-1])])
+def test_pairs_of_robots_that_do_not_exist_are_rejected(robot: list[int], neighbor: list[int]) -> None:
+    with pytest.raises(InputError, match="neighbors: expected indices of 2 robots, got"):
+        Neighbors.from_pairs(2, np.array(robot), np.array(neighbor))

@@ -20,6 +20,12 @@ def test_a_homogeneous_team_has_the_limits_of_the_paper() -> None:
     assert (team.max_speed == 1.0).all()
 
 
+@pytest.mark.parametrize("radius", [[0.1, 0.2], [0.1, 0.2, 0.3], "large", None])
+def test_a_homogeneous_team_has_one_value_of_each_parameter(radius: object) -> None:
+    with pytest.raises(ParameterError, match=r"team\.radius: expected a number, got"):
+        Team.homogeneous(2, radius=radius)  # type: ignore[arg-type]
+
+
 @given(
     st.lists(
         st.tuples(st.floats(0.01, 1), st.one_of(st.just(np.inf), st.floats(0, 50))), min_size=1, max_size=9
