@@ -38,6 +38,17 @@ def list_lifetimes(record: Record) -> list[tuple[float, float | None]]:
     return lifetimes
 
 
+def format_seconds(seconds: float) -> str:
+    """Format a duration with up to two decimals, and without an exponent for long runs.
+
+    Examples
+    --------
+    >>> format_seconds(60.0), format_seconds(59.98333), format_seconds(20000.0)
+    ('60 s', '59.98 s', '20000 s')
+    """
+    return f"{round(seconds, 2):.10g} s"
+
+
 def describe_map(environment: Environment) -> str:
     """Describe a map in one sentence."""
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -70,7 +81,7 @@ def describe_run(record: Record, history: CostHistory | None) -> str:
     setup = f"{record.label} on map {record.environment.name}: trajectories of {robots}"
     if record.start:
         setup += f" from start {record.start}"
-    sentences = [f"{setup} over {duration:.4g} s."]
+    sentences = [f"{setup} over {format_seconds(duration)}."]
     events = _list_events(record)
     if events:
         text = ", ".join(event for _, event in sorted(events))

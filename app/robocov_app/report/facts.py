@@ -6,6 +6,7 @@ from typing import Any
 from robocov.errors import format_count
 from robocov_app.render.density_text import describe_density
 from robocov_app.report.analysis.groups import format_gains, format_setting
+from robocov_app.report.descriptions import format_seconds
 from robocov_app.report.results.result import ReportedResult, ReportedRun, replace_unprintable
 from robocov_app.sweep.study.parameters import UNITS, format_parameter
 
@@ -58,7 +59,7 @@ def list_facts(result: ReportedResult) -> list[tuple[str, str]]:
     ]
     duration = result.facts.get("duration_s")
     if duration is not None:
-        facts.append(("Duration", f"{duration:.4g} s"))
+        facts.append(("Duration", format_seconds(duration)))
     period = result.facts.get("dt_s")
     if period is not None:
         facts.append(("Control period", f"{1000 * period:.4g} ms"))

@@ -214,7 +214,7 @@ def test_hairs_are_removed_and_counted(tmp_path: Path) -> None:
     assert report.removed == 1
     assert report.removed_area == pytest.approx(3.5e-5)
     assert report.moved < 1e-4
-    assert report.changed == ("removed 1 hair (slits, spurs) thinner than 0.2 mm, 3.5e-05 m²",)
+    assert report.changed == ("removed 1 hair (slits, spurs) thinner than 0.2 mm, 0.000035 m²",)
     assert len(environment.boundary) == 4
     spur = MultiPolygon([box(0, 0, 5, 5) | box(4, 2, 9, 2.0001)])
     assert remove_hairs(spur, 2e-4, 0.02).hair_count == 1

@@ -109,6 +109,8 @@ def test_facts_are_complete_and_short() -> None:
     assert facts["Seeds"] == "0 to 29"
     assert facts["Robots"] == "4, 6"
     assert facts["Duration"] == "6 s"
+    long_facts = dict(list_facts(replace(result, facts={**result.facts, "duration_s": 20000.0})))
+    assert long_facts["Duration"] == "20000 s"
     assert facts["Team"] == "max speed 1 m/s, unlimited communication range, mass 1 to 2 kg"
     assert facts["Versions"] == "python 3.11.7, robocov 0.1.0"
     assert facts["Control period"] == "100 ms"

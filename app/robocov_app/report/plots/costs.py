@@ -13,6 +13,7 @@ from robocov_app.figures.curves import DISTANCE
 from robocov_app.figures.final_values import Sample, plot_final_values
 from robocov_app.figures.page import ValueAxis
 from robocov_app.report.analysis.scaling import compute_medians, scale_distances
+from robocov_app.report.descriptions import format_seconds
 from robocov_app.report.plots.plot import (
     FINAL_DISTANCE_LABEL,
     LARGE_PANEL_SIZE_PX,
@@ -113,7 +114,8 @@ def _build_cost_plot(panel: Panel, bands: list[Band], maximum: float) -> PagePlo
         axis_label = DISTANCE
         unit = " m"
     band_descriptions = "; ".join(_describe_band(band, unit) for band in bands)
-    description = f"{axis_label} against time, up to {bands[0].time[-1]:.4g} s. {band_descriptions}."
+    end = format_seconds(bands[0].time[-1])
+    description = f"{axis_label} against time, up to {end}. {band_descriptions}."
     # The unit is in the label of the axis, because there is little space for the names of the curves.
     draw = partial(plot_cost_bands, bands, value_axis=ValueAxis(axis_label, value_range=(0.0, maximum)))
     return build_panel_plot(panel, description, draw, size=LARGE_PANEL_SIZE_PX)
