@@ -145,6 +145,15 @@ def test_arrows_of_the_lesson_keep_their_words_in_a_small_window(tmp_path: Path)
 
 
 @pytest.mark.parametrize("width", [900, 1280])
+def test_the_shading_of_a_density_is_explained(tmp_path: Path, width: int) -> None:
+    session = Session(SessionScenario(load_map("hospital")))
+    launcher = ViewerLauncher(session, "hospital", tmp_path, size=(width, 720), headless=True, lattice=16)
+    with launcher.window() as window:
+        window.run_frame(1 / 30)
+        assert "Density φ" in list_texts(window)
+
+
+@pytest.mark.parametrize("width", [900, 1280])
 def test_a_lesson_shows_no_presets_next_to_its_chips(tmp_path: Path, width: int) -> None:
     def has_presets() -> bool:
         return any(command.startswith("preset") for command in find_chips(window))

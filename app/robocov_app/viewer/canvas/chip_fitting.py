@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from robocov_app.viewer.canvas.layer_chips import Chip
 
-_DROPPED_FIRST = ("robots", "obstacles", "failed", "density")
+_DROPPED_FIRST = ("robots", "obstacles", "failed")
 """Layers with symbols that need no explanation; their chips are left out first if space is short."""
 
 

@@ -220,7 +220,10 @@ class LayerBar(BasicFocusGroup):
         def fits(some_chips: Sequence[Chip]) -> bool:
             return sum(measure(chip) for chip in [menu, *some_chips]) <= width - 2 * margin + gap
 
-        standard_commands = {f"layer:{layer.name}" for layer in layers if layer.is_default}
+        # Few maps have a density, so that the user may not know its shading.
+        standard_commands = {
+            f"layer:{layer.name}" for layer in layers if layer.is_default and layer.name != "density"
+        }
         more = Chip("more", PRESETS_COMMAND, label="…")
         fitted = fit_chips(chips, presets, more, standard_commands, fits)
         placed = []
