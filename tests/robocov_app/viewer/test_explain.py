@@ -52,7 +52,17 @@ def test_format_length(meters, text):
 
 @pytest.mark.parametrize(
     ("newtons", "text"),
-    [(0, "0 N"), (4e-4, "0 N"), (0.0042, "4 mN"), (0.314, "0.31 N"), (2, "2.0 N"), (12.3, "12 N")],
+    [
+        (0, "0 N"),
+        (4e-4, "0 N"),
+        (0.0042, "4 mN"),
+        (0.022, "22 mN"),
+        (0.0994, "99 mN"),
+        (0.0996, "0.10 N"),
+        (0.314, "0.31 N"),
+        (2, "2.0 N"),
+        (12.3, "12 N"),
+    ],
 )
 def test_format_force(newtons, text):
     assert format_force(newtons) == text
@@ -159,6 +169,21 @@ def test_three_balancing_forces_are_named():
     assert report.verdict == "at rest 2.0 m short of its goal: the forces balance"
     balance = "the pull to its goal (1.0 N) and the repulsion of obstacles (1.0 N) and wind (1.0 N) balance"
     assert balance in list_texts(report)
+
+
+def test_forces_of_a_creeping_robot_do_not_balance_without_viscosity():
+    report = build_report(
+        [[3.4, 5]],
+        goals=[[3.4, 5.09]],
+        points=[[4, 5]],
+        velocities=[[0, 0.004]],
+        environment=ROOMS,
+        attraction=[[0, 0.022]],
+        repulsion_obstacle=[[0, -0.007]],
+    )
+    assert report.verdict == "at rest 9 cm from its goal"
+    assert "pulled with 22 mN toward its goal, 9 cm away" in list_texts(report)
+    assert not any("balance" in text for text in list_texts(report))
 
 
 @pytest.mark.parametrize(("force", "is_reported"), [(1.99, False), (2.03, False), (2.2, True)])

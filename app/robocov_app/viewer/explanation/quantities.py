@@ -11,6 +11,8 @@ _MAX_NUMBER = 1e6
 _NO_DECIMALS = 9.95
 _ONE_DECIMAL = 0.995
 _TWO_DECIMALS = 0.00995
+_MAX_MILLINEWTONS_N = 0.0995
+"""Smaller forces are written in mN, so that they keep two digits."""
 _MIN_NUMBER = 0.005
 """Smaller numbers are rounded to 0."""
 _DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
@@ -60,10 +62,10 @@ def format_length(meters: float) -> str:
 def format_force(newtons: float) -> str:
     """Format the magnitude of a force in a suitable unit.
 
-    >>> [format_force(force) for force in (0.0042, 0.314)]
-    ['4 mN', '0.31 N']
+    >>> [format_force(force) for force in (0.0042, 0.022, 0.314)]
+    ['4 mN', '22 mN', '0.31 N']
     """
-    if MIN_FORCE_N <= newtons < _TWO_DECIMALS:
+    if MIN_FORCE_N <= newtons < _MAX_MILLINEWTONS_N:
         return f"{1000 * newtons:.0f} mN"
     return f"{format_number(newtons)} N"
 

@@ -20,7 +20,7 @@ from robocov_app.viewer.explanation.situation import (
 
 MAX_NAMED_FORCES = 3
 _MIN_SPEED_M_S = 0.005  # slower robots are described as at rest
-_PAIR_FRACTION = 0.2  # two forces balance if their sum is below this fraction of the larger one
+_BALANCE_FRACTION = 0.2  # forces balance if their sum is below this fraction of the largest one
 _STRAIGHT_ALIGNMENT = 0.9  # cosine above which a force points straight at something, or straight away from it
 _NEIGHBOR_RATIO = 1.5  # the second neighbor is named if it is at most this many times as far as the first
 _FAST_ACCELERATION = 1.001  # fraction of the maximum acceleration above which the acceleration is limited
@@ -202,7 +202,8 @@ def _list_rest_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
         name = _name_force_with_size(situation, pressing)
         return [f"{prefix}{name} presses it against {situation.holding_names}"]
     balancing = _find_balancing_forces(forces)
-    if not situation.is_balanced or len(balancing) < 2:
+    # While a robot still creeps, viscosity is one of the forces that cancel, and the others do not balance.
+    if not situation.is_balanced or len(balancing) < 2 or not _cancel(list(forces.values())):
         return []
     names = " and ".join(_name_force_with_size(situation, kind) for kind in balancing)
     return [f"{prefix}{names} balance"]
@@ -215,10 +216,14 @@ def _compute_component(force: complex, direction: complex) -> float:
 def _find_balancing_forces(forces: dict[str, complex]) -> list[str]:
     """Return the kinds of the two strongest forces if they cancel, or else of the three strongest."""
     strongest = sorted(forces, key=lambda kind: -abs(forces[kind]))
-    pair = sum((forces[kind] for kind in strongest[:2]), 0j)
-    is_pair = abs(pair) < _PAIR_FRACTION * abs(forces[strongest[0]])
+    is_pair = _cancel([forces[kind] for kind in strongest[:2]])
     named = strongest[: 2 if is_pair else MAX_NAMED_FORCES]
     return [kind for kind in forces if kind in named]
+
+
+def _cancel(forces: list[complex]) -> bool:
+    """Return whether the sum of forces is much smaller than the largest of them."""
+    return abs(sum(forces)) < _BALANCE_FRACTION * max(map(abs, forces))
 
 
 def _name_force_with_size(situation: RobotSituation, kind: str) -> str:
