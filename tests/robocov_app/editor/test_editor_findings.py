@@ -156,6 +156,23 @@ def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) 
         assert any(guide.kind == "angle" for guide in driver.editor.tool.guides)
 
 
+def test_typed_text_is_complete_at_the_lower_edge_of_the_map(tmp_path: Path) -> None:
+    with open_editor(tmp_path, build_sheet(), size=(1280, 720)) as driver:
+        heights = []
+        for cursor_y in (5.0, 0.0):
+            driver.press_key("b")
+            driver.click_at((4, cursor_y))
+            before = driver.copy_frame()
+            driver.type("3")
+            after = driver.copy_frame()
+            pixel_x = round(driver.find_pixel((4, cursor_y))[0])
+            column = np.abs(after - before)[:, pixel_x + 20].max(axis=1)
+            heights.append(np.ptp(np.flatnonzero(column)))
+            driver.press_key("escape", times=3)
+        assert heights[0] > 10
+        assert heights[1] == heights[0]
+
+
 def wait_until(driver: EditorDriver, condition: Callable[[], bool]) -> None:
     """Run the window until a condition holds that depends on a thread."""
     end = time.monotonic() + 30.0

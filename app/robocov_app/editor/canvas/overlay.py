@@ -419,7 +419,7 @@ def draw_typed_text(canvas: Canvas, text: str, pixel: Point) -> None:
     box = Rect(0, 0, width + round(TEXT_BOX_SPACE_PX * scale), round(TEXT_BOX_HEIGHT_PX * scale))
     offset = TEXT_BOX_OFFSET_PX * scale
     box.topleft = (round(pixel[0] + offset), round(pixel[1] + offset))
-    box.clamp_ip(surface.get_rect())
+    box.clamp_ip(surface.get_clip())  # the texts below the map would cover it
     radius = round(TEXT_BOX_RADIUS_PX * scale)
     pygame.draw.rect(surface, theme.panel, box, border_radius=radius)
     pygame.draw.rect(surface, theme.accent, box, canvas.scale_width(EDGE_LINE_PX), border_radius=radius)
