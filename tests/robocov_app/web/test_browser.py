@@ -660,6 +660,20 @@ def touch(shared_phone):
     return move_fingers
 
 
+def test_a_phone_shows_no_buttons_of_the_window_before_it_opens(shared_phone):
+    """They did nothing yet, and their labels were clipped."""
+    script = """
+        const listShown = () => [...document.querySelectorAll("#touch .window")].filter(b => b.offsetParent);
+        document.body.className = "";
+        const onTablet = listShown().length;
+        document.body.className = "blank";
+        const before = listShown().length;
+        document.body.className = "phone";
+        return [onTablet, before];
+    """
+    assert shared_phone.run_script(script) == [4, 0]
+
+
 def test_a_finger_drags_with_the_left_button(touch):
     dragged = touch(*([(40 + 10 * k, 300)] for k in range(5)))
     assert dragged == [("button", 1, 40), ("button", 1, 80)]
