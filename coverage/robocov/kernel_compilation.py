@@ -244,13 +244,26 @@ def compile_in_background() -> Iterator[None]:
     if folder is None or are_kernels_compiled(ALL_EXAMPLES):
         yield
         return
-    compilation = _BackgroundCompilation(folder)
+    global _background_compilation
+    compilation = _background_compilation = _BackgroundCompilation(folder)
     interpret_kernels(compilation.must_interpret)
     try:
         yield
     finally:
         interpret_kernels(None)
+        _background_compilation = None
         compilation.close()
+
+
+def is_compiling_in_background() -> bool:
+    """Return whether another process is compiling kernels, so that some of them run as Python and are slow.
+
+    Returns
+    -------
+    bool
+        Whether the process that `compile_in_background` has started is still running.
+    """
+    return _background_compilation is not None and not _background_compilation.has_ended
 
 
 class _BackgroundCompilation:
@@ -270,6 +283,11 @@ class _BackgroundCompilation:
         self._import = threading.Thread(target=import_numba, daemon=True)
         self._import.start()
         self._process = _start_compilation_process()
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process has compiled all kernels, or has failed."""
+        return self._process is None or self._process.poll() is not None
 
     def must_interpret(self, kernel: str, arguments: tuple[Any, ...]) -> bool:
         """Return whether a kernel must run as Python because its machine code is not ready."""
@@ -292,7 +310,7 @@ class _BackgroundCompilation:
     def _poll(self) -> None:
         """Read which kernels have been compiled."""
         # This is determined before the list is read, because the process completes the list before it ends.
-        has_ended = self._process is None or self._process.poll() is not None
+        has_ended = self.has_ended
         # There may be no list yet.
         with suppress(OSError, ValueError):
             self._compiled = json.loads(self._list_file.read_text(encoding="utf-8"))
@@ -305,6 +323,10 @@ class _BackgroundCompilation:
         if self._process is not None:
             with self._process:  # Leaving the block closes the pipe and waits for the end of the process.
                 self._process.kill()
+
+
+_background_compilation: _BackgroundCompilation | None = None
+"""The other process of `compile_in_background`; None outside its ``with`` block."""
 
 
 def _start_compilation_process() -> subprocess.Popen[bytes] | None:

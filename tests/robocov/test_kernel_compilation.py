@@ -31,6 +31,7 @@ from robocov.kernel_compilation import (
     call_planning_kernels,
     compile_in_background,
     compile_kernels,
+    is_compiling_in_background,
 )
 from robocov.simulation import Simulation
 from robocov.team import Team
@@ -126,6 +127,23 @@ def test_without_a_cache_examples_are_called_each_time(monkeypatch: pytest.Monke
     assert calls == ["first", "second"]
     with compile_in_background():
         assert not is_interpreting(), "machine code of another process could not be loaded"
+
+
+def test_another_process_compiles_until_it_ends(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def start_reading_process() -> subprocess.Popen[bytes]:
+        """Start a process that compiles nothing, and ends with its standard input."""
+        return subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE)
+
+    monkeypatch.setattr(kernel_compilation, "_start_compilation_process", start_reading_process)
+    assert not is_compiling_in_background()
+    with compile_in_background():
+        assert is_compiling_in_background()
+        compilation = kernel_compilation._background_compilation
+        assert compilation is not None and compilation._process is not None
+        assert compilation._process.stdin is not None
+        compilation._process.stdin.close()
+        wait_until(lambda: not is_compiling_in_background())
+    assert not is_compiling_in_background()
 
 
 def test_a_kernel_is_interpreted_for_types_without_machine_code(

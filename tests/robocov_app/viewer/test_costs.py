@@ -258,6 +258,20 @@ def test_requests_wait_until_the_map_is_prepared(stubbed):
     assert [request.time for request in worker.requests[1:]] == [1.0]
 
 
+def test_a_cost_that_waits_for_the_compiler_says_so(stubbed, monkeypatch):
+    costs, worker = stubbed
+    monkeypatch.setattr(module, "is_compiling_in_background", lambda: True)
+    monkeypatch.setattr(module, "are_kernels_compiled", lambda examples: False)
+    costs.set_environment(HALL)
+    assert costs.state == "cost: compiling, once per version"
+    worker.progress = 0.25, 3.0
+    costs.poll()
+    assert costs.state == "cost: preparing the map, 25%, 3 s left", "which begins when all is compiled"
+    monkeypatch.setattr(module, "are_kernels_compiled", lambda examples: True)
+    costs.set_environment(HALL)
+    assert costs.state == "cost: preparing the map"
+
+
 def test_panes_take_turns(ready):
     costs, worker = ready
     turns = []

@@ -59,6 +59,16 @@ def test_the_status_line_contains_pauses_videos_and_delays(viewer: Presenter) ->
     assert "1×" in list_facts(viewer, 60.0, 0.0, None), "an open list is no delay"
 
 
+def test_the_status_line_says_that_a_simulation_is_slow_while_kernels_are_compiled(
+    viewer: Presenter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robocov_app.viewer.window.status.is_compiling_in_background", lambda: True)
+    viewer.session.playback.is_playing = True
+    assert "1×" in list_facts(viewer, 60.0, 60.0, None)
+    viewer.session.playback.clock.is_behind = True
+    assert "1× (running at 0.5× while compiling)" in list_facts(viewer, 60.0, 30.0, None)
+
+
 def test_an_open_list_does_not_change_the_measured_rate(viewer: Presenter) -> None:
     runner = SessionRunner(viewer)
     viewer.session.playback.is_playing = True

@@ -13,7 +13,12 @@ from robocov.cost import CoverageCost, CoverageResult, Sites, TimeVaryingCost
 from robocov.defaults import DEFAULT_LATTICE, DEFAULT_RADIUS_M
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
-from robocov.kernel_compilation import call_cost_kernels, compile_kernels
+from robocov.kernel_compilation import (
+    are_kernels_compiled,
+    call_cost_kernels,
+    compile_kernels,
+    is_compiling_in_background,
+)
 from robocov.typing import FloatArray
 from robocov_app.jobs.messages import Channel, Codec
 from robocov_app.jobs.workers import DirectWorker, LatestWorker, Worker
@@ -253,6 +258,8 @@ class Costs:
     def _prepare_map(self) -> None:
         self._is_prepared = False
         self.state = "cost: preparing the map"
+        if is_compiling_in_background() and not are_kernels_compiled([call_cost_kernels]):
+            self.state = "cost: compiling, once per version"
         self._pending = self._map_request
         self._pending_pane = None
         self._worker.put(self._map_request)

@@ -3,6 +3,7 @@
 import shapely
 
 from robocov.environment import Point
+from robocov.kernel_compilation import is_compiling_in_background
 from robocov_app.viewer.costs.costs import KnownCost
 from robocov_app.viewer.model import ViewerModel
 from robocov_app.viewer.session.clock import format_speed
@@ -88,7 +89,8 @@ def _describe_speed(viewer: ViewerModel, step_rate: float) -> str:
     # An open dialog suspends playback; the last measured rate would be out of date.
     if playback.is_playing and playback.clock.is_behind and not playback.is_suspended:
         actual = step_rate * session.timeline.scenario.dt
-        return f"{speed} (running at {actual:.1f}×)"
+        cause = " while compiling" if is_compiling_in_background() else ""
+        return f"{speed} (running at {actual:.1f}×{cause})"
     return speed
 
 
