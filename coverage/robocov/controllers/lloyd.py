@@ -63,7 +63,7 @@ class Lloyd(BaseController):
 
     name = "lloyd"
     label = "Lloyd"
-    summary = "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
+    summary = "Lloyd's algorithm: each robot moves to the centroid of its cell and ignores obstacles"
 
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the target", high=100.0)
     response_time: float = response_time_gain()

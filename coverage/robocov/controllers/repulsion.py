@@ -114,7 +114,7 @@ class Rpf(BaseController):
 
     name = "rpf"
     label = "RPF"
-    summary = "repulsion from robots and the closest obstacle only, (23)-(25)"
+    summary = "repulsion only: by robots and by the nearest obstacle point, equations (23) to (25)"
 
     k_rep: float = gain(3.0, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(4.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
@@ -200,7 +200,7 @@ class Rapf(BaseController):
 
     name = "rapf"
     label = "RAPF"
-    summary = "the paper's controller: short-range repulsion + attraction to the cell's centroid, (23)-(28)"
+    summary = "the paper's controller: attraction to the centroid and repulsion, equations (23) to (28)"
 
     k_rep: float = gain(0.3, "N m³", "strength of the repulsion, (24)")
     rho_0: float = gain(2.0, "m", "range of the repulsion, (24)", low=0.01, high=1e4)
@@ -519,7 +519,7 @@ class Dispersion(BaseController):
 
     name = "dispersion"
     label = "Dispersion"
-    summary = "local dispersion: away from near robots, along obstacles (Batalin and Sukhatme 2002)"
+    summary = "local dispersion: away from nearby robots, along obstacles (Batalin and Sukhatme 2002)"
     scanning = Scanning(rays=36, period=0.1)
 
     reach: float = gain(5.0, "m", "distance up to which a robot moves away from others", low=0.01, high=1e4)

@@ -505,7 +505,7 @@ def describe_controllers(names: Iterable[str], shown: Iterable[str]) -> dict[str
     Examples
     --------
     >>> describe_controllers(["lloyd", "rapf"], ["rapf"])["lloyd"]
-    "Lloyd's algorithm: every robot moves to its cell's centroid, obstacles are ignored"
+    "Lloyd's algorithm: each robot moves to the centroid of its cell and ignores obstacles"
     """
     shown_names = set(shown)
     descriptions: dict[str, str] = {}
