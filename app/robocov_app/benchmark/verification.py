@@ -249,7 +249,7 @@ class Verification:
         if self.read_files:
             lines.append(
                 f"The controller has read files that are not part of its source code, such as "
-                f"{self.read_files[0]}. Their content was not compared with anything."
+                f"{self.read_files[0]}. The verification does not check their content."
             )
         lines.append(f"Random choices: --seed {self.seed} repeats them.")
         return lines

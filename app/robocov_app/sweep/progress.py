@@ -20,6 +20,8 @@ LINE_INTERVAL_S = 10.0
 """Time between two lines of progress if there is no terminal."""
 _MIN_WHOLE_RATE_PER_S = 10.0
 """Rates from this one on are printed as whole numbers."""
+_MIN_DECIMAL_RATE_PER_S = 0.5
+"""Lower rates are printed as the time between two runs."""
 _UNITS = ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s"))
 """Length in seconds and name of each unit, followed by those of the next smaller unit."""
 
@@ -93,8 +95,10 @@ class SweepProgress:
             parts.append(f"{format_count(self.lost_workers, 'worker')} lost")
         if self.rate >= _MIN_WHOLE_RATE_PER_S:
             parts.append(f"{self.rate:.0f} per second")
-        elif self.rate > 0:
+        elif self.rate >= _MIN_DECIMAL_RATE_PER_S:
             parts.append(f"{self.rate:.2g} per second")
+        elif self.rate > 0:
+            parts.append(f"one every {format_duration(1.0 / self.rate)}")
         return ", ".join(parts)
 
     def describe_all(self) -> str:

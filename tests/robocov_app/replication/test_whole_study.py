@@ -420,7 +420,7 @@ class TestWords:
             final = paper.figures[""][f"{case}/rapf"].history.mean_distance[-1]
             assert f"{final:.3f} m" in describe(number)
             assert re.search(r"RAPF's cost is lower \S+% of the time", describe(number + 1))
-        assert "robots are" in describe(8)
+        assert re.search(r"are \S+ m from those of figure 6 with RAPF, and \S+ m with RPF", describe(8))
         assert "“Pentagon”" in describe(1)
 
     def test_the_cost_stays_near_its_end_after_the_arrival_time(self, paper):

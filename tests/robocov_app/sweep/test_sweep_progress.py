@@ -65,7 +65,7 @@ def test_the_reason_of_a_wait_is_printed_once_instead_of_an_estimate(
         progress.lost_workers = 3
     assert capsys.readouterr().err.splitlines() == [
         "sweep: 2 of 10 runs, 2 per second, no workers are connected; waiting",
-        "sweep: 2 of 10 runs, 3 workers lost, 0.02 per second, 6 min 40 s left",
+        "sweep: 2 of 10 runs, 3 workers lost, one every 50 s, 6 min 40 s left",
     ]
 
 

@@ -150,9 +150,9 @@ def _describe_costs(rapf: FigureRun, other: FigureRun) -> str:
     common = slice(1, min(len(rapf_cost), len(other_cost)))
     lower = float((rapf_cost[common] < other_cost[common]).mean())
     return (
-        f"Over the first {FIRST_MINUTE_S:g} s RAPF averages {rapf_mean:.3f} m, "
+        f"Over the first {FIRST_MINUTE_S:g} s, RAPF averages {rapf_mean:.3f} m, "
         f"{_describe_difference(rapf_mean, other_mean)} {label} ({other_mean:.3f} m). RAPF's cost is lower "
-        f"{format_amount(lower, '%')} of the time. RAPF stays within 5% of its last value from "
+        f"{format_amount(lower, '%')} of the time. RAPF stays within 5% of its final value from "
         f"{find_arrival_time(rapf.history):.0f} s on, "
         f"{label} from {find_arrival_time(other.history):.0f} s on."
     )
@@ -176,13 +176,13 @@ def _describe_other_starts(runs: Mapping[str, FigureRun]) -> str:
         second = runs[f"other/{controller}"].record.positions[-1]
         distances.append(format_amount(compute_matched_distance(first, second), "m"))
     return (
-        f"Between the ends of figure 6 and these, robots are {distances[0]} apart with RAPF "
-        f"and {distances[1]} with RPF (matched to minimize the sum of distances)."
+        f"On average, the final positions are {distances[0]} from those of figure 6 with RAPF, "
+        f"and {distances[1]} with RPF (robots are matched to minimize the sum of distances)."
     )
 
 
 def describe_half_step(runs: Mapping[str, FigureRun], half_step_runs: Mapping[str, FigureRun]) -> str:
-    """Return a sentence on how much half the control period changes the ends of figure 4."""
+    """Return a sentence on how much half the control period changes the results of figure 4."""
     texts = []
     for controller in ("rapf", "rpf"):
         full = runs[f"a/{controller}"]
@@ -192,7 +192,8 @@ def describe_half_step(runs: Mapping[str, FigureRun], half_step_runs: Mapping[st
         cost_ratio = float(half.history.mean_distance[-1] / full.history.mean_distance[-1])
         change = _describe_difference(cost_ratio, 1.0)
         texts.append(
-            f"{half.record.label}'s final positions move by at most {distance}, its cost is {change} before"
+            f"{half.record.label}'s final positions change by at most {distance}, "
+            f"and its cost is {change} before"
         )
     return f"With half the control period, {'; '.join(texts)}."
 
