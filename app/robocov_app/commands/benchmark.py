@@ -28,10 +28,10 @@ _EXPLANATIONS = {
     "Gap, %": "Gap: median of J / J_ref - 1; in brackets that of J / J_bound - 1 for a proven lower bound.\n"
     "  The gap of a failed run is infinite.",
     "95%": "95%: confidence interval of the median gap, for at least 12 maps.",
-    "Worst": "Worst: largest gap of a run.",
+    "Worst": "Worst: largest gap of a run, %.",
     "Within 5%, s": "Within 5%: time from which the cost stays within 5% of its final value, median.",
     "Path, m": "Path: mean path length of a robot, median.",
-    "Contacts": "Contacts: runs in which a robot touched a wall or another robot.",
+    "Runs with contacts": "Runs with contacts: those in which a robot touched a wall or another robot.",
     "Settled": "Settled: runs at whose end the team has settled.",
     "B/s": "B/s: bytes that a robot sends per second, median.",
     "µs/s": "µs/s: computing time of the controller per robot and second of simulation time, median.",

@@ -49,6 +49,7 @@ from robocov_app.benchmark.results import (
 from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
 from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
 from robocov_app.cli import main
+from robocov_app.commands.benchmark import _EXPLANATIONS, _print_ratings
 from robocov_app.look.curve_styles import choose_curve_styles
 from robocov_app.terminal.interruption import Interruption
 
@@ -574,6 +575,16 @@ def test_the_result_of_another_controller_or_of_other_gains_is_kept(tmp_path: Pa
         with pytest.raises(InputError, match=expectation.format(controller)):
             run_short_benchmark(tmp_path, controller)
     assert (tmp_path / RESULT_FILE).read_bytes() == content
+
+
+def test_all_columns_of_the_printed_ratings_are_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    (result,) = load_results_of("rapf")
+    _print_ratings(result, Path("benchmark"))
+    printed = capsys.readouterr().out
+    for explanation in _EXPLANATIONS.values():
+        assert explanation in printed
+    (_, *titles), _ = ratings.build_summary_rows(result)
+    assert set(titles) == {"Runs", *_EXPLANATIONS}
 
 
 @pytest.mark.parametrize(
