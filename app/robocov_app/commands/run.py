@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import tyro
 
 from robocov.defaults import DEFAULT_CONTROLLER
+from robocov.errors import format_count
 from robocov_app.commands.options import RunOptions
 from robocov_app.terminal.arguments import parse_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -85,8 +86,9 @@ def _describe_run(run: Run) -> list[str]:
     settled = "not yet"
     if summary["settled_at_s"] is not None:
         settled = f"after {summary['settled_at_s']:.1f} s"
+    robots = format_count(len(record.team), "robot")
     lines = [
-        f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s",
+        f"{record.label} on {record.environment.name}, {robots}, {record.time[-1]:.1f} s",
         f"  mean distance   {summary['mean_distance_m']:.3f} m   "
         f"(at the start {history.mean_distance[0]:.3f} m)",
     ]

@@ -177,7 +177,7 @@ def _sweep(options: Arguments, study: Study, out: Path) -> int:
 
 def _describe_totals(totals: Totals, runs: int) -> list[str]:
     """Return the totals of a sweep as lines of text."""
-    counts = f"{totals.done} runs done"
+    counts = f"{format_count(totals.done, 'run')} done"
     if totals.reused:
         counts += f", {totals.reused} reused"
     lines = [counts]

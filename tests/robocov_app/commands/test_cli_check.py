@@ -75,12 +75,15 @@ def test_json_output_contains_lines_and_columns(map_file: Path, capsys: pytest.C
     assert missing["error"] == f"{map_file.parent / 'none.json'}: no such file"
 
 
-def test_issues_beyond_the_limit_are_counted(map_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    map_file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * 30 + "]"))
+@pytest.mark.parametrize(("count", "summary"), [(30, "and 10 more issues"), (21, "and 1 more issue")])
+def test_issues_beyond_the_limit_are_counted(
+    map_file: Path, capsys: pytest.CaptureFixture[str], count: int, summary: str
+) -> None:
+    map_file.write_text(GOOD.replace("[0, 6]]", "[0, 6]" + ", [1]" * count + "]"))
     assert main(["check", str(map_file)]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 21
-    assert lines[-1] == f"robocov: error: {map_file}: and 10 more issues"
+    assert lines[-1] == f"robocov: error: {map_file}: {summary}"
 
 
 def simulate_saves(*steps: Any) -> Any:

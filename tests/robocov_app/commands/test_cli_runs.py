@@ -50,6 +50,14 @@ def test_run_prints_only_json_on_request(tmp_path: Path, capsys: pytest.CaptureF
     assert summary["interrupted"] is False
 
 
+def test_a_single_robot_is_counted_in_the_singular(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = "--robots 1 --duration 0.2 --lattice 16 --no-figures --out"
+    assert main(["run", "square", *options.split(), str(tmp_path / "run")]) == 0
+    assert "on Square, 1 robot, 0.2 s" in capsys.readouterr().out
+
+
 def test_a_run_without_figures_saves_its_numbers(tmp_path: Path) -> None:
     out = tmp_path / "run"
     options = "--duration 0.2 --lattice 16 --no-figures --out"

@@ -13,6 +13,13 @@ from small_studies import ROOM, list_run_folders, read_tables, write_controller
 from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
+from robocov_app.commands.sweep import _describe_totals
+from robocov_app.sweep.sweeping import Totals
+
+
+def test_a_single_run_is_counted_in_the_singular() -> None:
+    assert _describe_totals(Totals(1, 0, 0, False), 1) == ["1 run done"]
+
 
 STUDY = """
 maps = ["room.json"]

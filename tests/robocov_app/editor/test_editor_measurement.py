@@ -16,6 +16,7 @@ from shapely import MultiPolygon
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.mapfile import list_bundled_maps, load_map
 from robocov.mapfile.check import check_map
+from robocov_app.editor.model import measurement
 from robocov_app.editor.model.measurement import compute_reach, measure
 from robocov_app.editor.model.sketch import Sketch
 
@@ -30,6 +31,13 @@ def build_hall_with_doors(*widths: float) -> Sketch:
         shapes.append(WallObstacle(((x, -1.0), (x, 4.0 - width / 2)), 0.2))
         shapes.append(WallObstacle(((x, 4.0 + width / 2), (x, 9.0)), 0.2))
     return Sketch("Doors", boundary=HALL).with_obstacles(shapes)[0]
+
+
+def test_passages_beyond_the_limit_share_a_warning(monkeypatch):
+    monkeypatch.setattr(measurement, "_MAX_GAPS", 1)
+    for doors, summary in ((2, "1 more passage is "), (3, "2 more passages are ")):
+        problems = measure(build_hall_with_doors(*[0.1] * doors), 0.1).problems
+        assert any(problem.message.startswith(summary) for problem in problems)
 
 
 def rasterize_reach(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.ndarray, np.ndarray]:

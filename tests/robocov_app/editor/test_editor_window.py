@@ -18,8 +18,9 @@ from robocov_app.editor.canvas import layers
 from robocov_app.editor.edits.create import add_circle, add_polygon
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.team import Team
 from robocov_app.editor.ui.fields import format_number
-from robocov_app.editor.ui.map_facts import list_status
+from robocov_app.editor.ui.map_facts import _describe_team, list_status
 from robocov_app.editor.ui.panel import EditorPanel
 from robocov_app.toolkit.commands import help_page
 from robocov_app.toolkit.commands.menu import Menu
@@ -318,6 +319,11 @@ def test_the_rail_has_space_for_all_tools_and_the_camera(tmp_path: Path) -> None
             button = rail.find("button", command)
             assert button is not None
             assert rail.box.contains(button.rect)
+
+
+def test_a_team_is_described_by_its_size_and_start() -> None:
+    assert _describe_team(Team("door", 1, 0.1, ((1.0, 1.0),))) == "1 robot at door"
+    assert _describe_team(Team(None, 2, 0.1, ((1.0, 1.0), (2.0, 1.0)))) == "2 robots at anywhere"
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])

@@ -119,6 +119,9 @@ def test_settings_are_distinguished_by_robots_and_team() -> None:
     texts = [format_setting(result, setting) for setting in list_settings(result)]
     assert texts[0] == "rooms, 4 robots, max speed 0.5 m/s, sensing range no limit"
     assert len(set(texts)) == 4
+    result = build_result([build_run(robots=1), build_run(robots=2)])
+    texts = [format_setting(result, setting) for setting in list_settings(result)]
+    assert texts == ["rooms, 1 robot", "rooms, 2 robots"]
 
 
 def test_varying_gains_are_found_for_each_controller() -> None:

@@ -197,7 +197,7 @@ def _format_outcome(outcome: MapReport | InputError, previous: MapReport | None 
         for issue in issues:
             yield issue.format_message(outcome.source_name)
         if outcome.unlisted:
-            yield f"{outcome.source_name}: and {outcome.unlisted} more issues"
+            yield f"{outcome.source_name}: and {format_count(outcome.unlisted, 'more issue')}"
 
 
 def format_report(report: MapReport, previous: MapReport | None = None) -> Iterator[str]:

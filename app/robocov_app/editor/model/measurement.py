@@ -201,9 +201,12 @@ def _build_gap_warnings(gaps: tuple[Gap, ...], marks: list[Polygon], radius: flo
     if not others:
         return problems
     geometry = shapely.union_all([problem.geometry for problem in others])
+    summary = f"{len(others)} more passages are {reason}"
+    if len(others) == 1:
+        summary = f"1 more passage is {reason}"
     return [
         *problems[:_MAX_GAPS],
-        Problem(f"{len(others)} more passages are {reason}", geometry, is_error=False),
+        Problem(summary, geometry, is_error=False),
     ]
 
 

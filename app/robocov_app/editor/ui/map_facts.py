@@ -136,7 +136,8 @@ def _find_hovered_item(editor: Editor) -> Item | None:
 
 
 def _describe_team(team: Team) -> str:
-    return team.message or f"{len(team.positions)} robots at {team.start or 'anywhere'}"
+    robots = format_count(len(team.positions), "robot")
+    return team.message or f"{robots} at {team.start or 'anywhere'}"
 
 
 def _describe_snapping(editor: Editor) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 from robocov.controllers.gains import Value, format_value
+from robocov.errors import format_count
 from robocov_app.figures.statistics import group_by
 from robocov_app.look.curve_styles import CurveStyle, choose_controller_styles, choose_curve_styles
 from robocov_app.report.results.result import Gains, ReportedResult, ReportedRun, Setting
@@ -151,7 +152,7 @@ def format_setting(result: ReportedResult, setting: Setting) -> str:
     map_name, robots, team = setting
     texts = [map_name]
     if len({size for _, size, _ in list_settings(result)}) > 1:
-        texts.append(f"{robots} robots")
+        texts.append(format_count(robots, "robot"))
     texts += [f"{name.replace('_', ' ')} {format_parameter(name, value)}" for name, value in team]
     return ", ".join(texts)
 

@@ -193,7 +193,7 @@ def _load_sweep(folder: Path) -> ReportedResult:
     study = _read_study(results.study, folder / STUDY_FILE)
     rows = list(results.rows())
     if not rows:
-        raise InputError(f"{folder}: none of the {study.run_count} runs of the sweep is done")
+        raise InputError(f"{folder}: expected finished runs, got none of {study.run_count}")
     runs = [_build_run_of_row(row, study, folder) for row in rows]
     facts = dict(study.facts)
     if study.teams:
