@@ -252,7 +252,10 @@ def test_an_import_replaces_no_file(plan: Path, tmp_path: Path, capsys: pytest.C
         ("lesson", "lesson: expected check, got nothing"),
         ("run /no/such/map.json", "/no/such/map.json"),
         ("compare rooms --controllers", "--controllers: expected at least one, got none"),
-        ("compare rooms --controllers rapf rapf", "duplicate value"),
+        (
+            "compare rooms --controllers rapf rapf",
+            "duplicate value. Compare several gains of a controller in a sweep",
+        ),
         ("compare rooms --set lloyd.k_rep=1", "--set lloyd.k_rep: unknown gain 'k_rep'"),
         ("compare rooms --set rap.k_rep=1", "unknown controller 'rap'"),
         ("check", "at least one map file"),

@@ -73,4 +73,7 @@ def _check_names(names: Sequence[str]) -> None:
     if not names:
         raise ParameterError("--controllers: expected at least one, got none")
     if len(set(names)) < len(names):
-        raise ParameterError(f"--controllers: {' '.join(names)}: duplicate value")
+        raise ParameterError(
+            f"--controllers: {' '.join(names)}: duplicate value. "
+            "Compare several gains of a controller in a sweep, or with rc.compare in Python."
+        )

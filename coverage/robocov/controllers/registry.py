@@ -35,7 +35,10 @@ from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import ControllerSource, explain_fault, load_class
 from robocov.controllers.visibility import Visibility
-from robocov.errors import ParameterError, describe_unknown_name, quote, require_type
+from robocov.errors import ParameterError, describe_unknown_name, find_similar_names, quote, require_type
+
+_MIN_CLASS_NAME_SIMILARITY = 0.75
+"""Minimum similarity of a built-in name that is suggested for a name with capital letters."""
 
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
@@ -215,7 +218,16 @@ def _describe_unknown_controller(name: str) -> str:
     file, _, class_name = name.partition(":")
     if file and class_name:
         return f"unknown controller {quote(name)}: for a class in a file, write {file}.py:{class_name}"
-    return describe_unknown_name("controller", name, list_controller_classes())
+    known_names = list_controller_classes()
+    class_name = name.rpartition(".")[2]
+    # Only names of classes contain capital letters.
+    is_class_name = class_name.isidentifier() and class_name != class_name.lower()
+    if is_class_name and not find_similar_names(name.lower(), known_names, _MIN_CLASS_NAME_SIMILARITY):
+        return (
+            f"unknown controller {quote(name)}: for a class in a file, write FILE.py:{class_name}; "
+            "`robocov controllers` lists the built-in controllers"
+        )
+    return describe_unknown_name("controller", name, known_names)
 
 
 def update_gain_names(controller: str, gains: Mapping[str, Value]) -> dict[str, Value]:

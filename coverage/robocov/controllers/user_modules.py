@@ -113,10 +113,11 @@ def format_location(function: object) -> str:
 
 def _format_fault_location(error: BaseException) -> str:
     """Return file and line of the last call outside robocov, as " (mine.py, line 12)", or an empty string."""
-    calls = _list_calls(error)
+    # Methods that a dataclass generates belong to the user's module, but have no file.
+    calls = [call for call in _list_calls(error) if not call.file.startswith("<")]
     user_calls = [call for call in calls if _is_in_user_file(call)]
     if not user_calls:
-        user_calls = [call for call in calls if not call.file.startswith((_LIBRARY_FOLDER, "<"))]
+        user_calls = [call for call in calls if not call.file.startswith(_LIBRARY_FOLDER)]
     if not user_calls:
         return ""
     return f" ({Path(user_calls[-1].file).name}, line {user_calls[-1].line})"

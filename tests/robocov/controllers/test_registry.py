@@ -24,6 +24,7 @@ from robocov.errors import ParameterError
 from robocov.observation import Observations
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
+from robocov.scenario import Scenario
 
 REGION = Region(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]]))
 
@@ -103,3 +104,30 @@ def test_errors_in_a_file_are_explained(controller_file: Path) -> None:
     controller_file.write_text("1/0\n")
     with pytest.raises(ParameterError, match=r"ZeroDivisionError: division by zero \(mine.py, line 1\)"):
         make_controller(f"{controller_file}:Mine")
+
+
+def test_an_error_in_a_generated_method_is_located_at_the_line_that_calls_it(controller_file: Path) -> None:
+    text = controller_file.read_text()
+    controller_file.write_text(
+        text.replace(
+            "        return self.stiffness", "        self.last = own.position\n        return self.stiffness"
+        )
+    )
+    scenario = Scenario("square", f"{controller_file}:Mine", robots=2, duration=0.1)
+    with pytest.raises(
+        ParameterError,
+        match=r"FrozenInstanceError: cannot assign to field 'last' \(mine.py, line 7\) for robot 1",
+    ):
+        scenario.run()
+
+
+@pytest.mark.parametrize("name", ["Homing", "mine.Homing", "mine.py.Homing"])
+def test_a_class_without_its_file_is_explained(name: str) -> None:
+    with pytest.raises(ParameterError, match=r"for a class in a file, write FILE\.py:Homing;"):
+        make_controller(name)
+
+
+@pytest.mark.parametrize("name", ["RAPF", "Rapff", "AtlasShared"])
+def test_a_built_in_controller_in_capital_letters_is_suggested(name: str) -> None:
+    with pytest.raises(ParameterError, match=r"did you mean '(rapf|atlas-shared)'"):
+        make_controller(name)
