@@ -377,7 +377,7 @@ def build_metrics_page() -> str:
 def build_names_page() -> str:
     """Build the page that documents every public name of the library."""
     text = build_heading("Python: every public name", "=")
-    text += "\nAll are names of ``robocov``: ``import robocov as rc``. "
+    text += "\nAll public names of ``robocov`` in alphabetical order, after ``import robocov as rc``. "
     text += ":doc:`/names-in-use` shows them by topic; :ref:`the index <genindex>` also lists methods and "
     text += "attributes. Classes for learning are on :doc:`learning`, keys of results on :doc:`metrics`.\n"
     names = sorted(rc.__all__, key=str.lower)

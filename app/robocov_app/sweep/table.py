@@ -67,7 +67,9 @@ _OPTIONAL_METRIC_COLUMNS = (
     Column("effort_N2_s", "double", "N² s", "integral of |F|² of these forces, sum over the robots"),
     Column("components", "double", "", "connected components of the communication graph"),
     Column("algebraic_connectivity", "double", "", "second smallest Laplacian eigenvalue of this graph"),
-    Column("robot_clearance_m", "double", "m", "smallest gap between two robots, null for a single robot"),
+    Column(
+        "robot_clearance_m", "double", "m", "smallest distance between two robots, null for a single robot"
+    ),
     Column("sent_bytes_per_s", "double", "B/s", "size of a robot's messages per second, without positions"),
     Column(
         "near_final_s", "double", "s", "time after which the mean distance stays within 5% of its last value"

@@ -40,7 +40,7 @@ METRICS = {
     "uncovered_area_m2": ("double", "m²", "area cut off from every robot"),
     "settled_at_s": ("double", "s", "time at which the team settled, null if it did not"),
     "contacts": ("int64", "", "number of contacts of a robot with a wall or another robot"),
-    "min_clearance_m": ("double", "m", "smallest gap between a robot and a wall"),
+    "min_clearance_m": ("double", "m", "smallest distance from a robot to a wall"),
     "path_length_m": ("double", "m", "path length, mean over the robots"),
     "stuck_robots": ("int64", "", "robots at rest away from their goals at the end, null without goals"),
 }

@@ -80,7 +80,7 @@ class Diffeomorphism(WholeMapController):
     lattice: float = gain(
         64.0, "cells", "number of cells of the mesh along a side", low=4.0, high=512.0, whole=True
     )
-    clearance: float = gain(0.03, "m", "gap between robots and walls along paths", high=10.0)
+    clearance: float = gain(0.03, "m", "margin between robots and walls along paths", high=10.0)
     period: float = gain(0.2, "s", "time between two plans", high=60.0)
     k_prop: float = gain(
         2.0, "1/s", "desired speed per meter of distance to the centroid, in the chart", high=100.0

@@ -66,9 +66,9 @@ class RunMetrics:
     algebraic_connectivity : (K,) array
         Second smallest eigenvalue of the Laplacian of this graph; 0 if the graph has several components.
     wall_clearance : (K,) array, m
-        Minimum gap between a robot and a wall since the previous sample; inf if no robot works.
+        Minimum distance from the rim of a robot to a wall since the previous sample; inf if none works.
     robot_clearance : (K,) array, m
-        Minimum gap between two robots since the previous sample; inf if fewer than two robots work.
+        Minimum distance between the rims of two robots since the previous sample; inf if fewer work.
     free_area : float, m²
         Free area of the map.
 

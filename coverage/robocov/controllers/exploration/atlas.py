@@ -192,7 +192,7 @@ class Atlas(BaseController):
         low=1e-3,
         high=1e6,
     )
-    clearance: float = gain(0.03, "m", "gap between robots and walls along routes", high=10.0)
+    clearance: float = gain(0.03, "m", "margin between robots and walls along paths", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 

@@ -280,7 +280,7 @@ class SharedMapController(BaseController):
     nodes: float = gain(
         1600.0, "nodes", "maximum number of nodes of the planning lattice", low=16.0, high=1e5, whole=True
     )
-    clearance: float = gain(0.03, "m", "gap between robots and walls along routes", high=10.0)
+    clearance: float = gain(0.03, "m", "margin between robots and walls along paths", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 

@@ -202,7 +202,7 @@ class PlacementController(WholeMapController):
     nodes: float = gain(
         1000.0, "1", "number of lattice points in the free space", low=16.0, high=20000.0, whole=True
     )
-    clearance: float = gain(0.03, "m", "gap between robots and walls along paths", high=10.0)
+    clearance: float = gain(0.03, "m", "margin between robots and walls along paths", high=10.0)
     period: float = gain(1.0, "s", "time between two plans", low=0.05, high=60.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
