@@ -17,7 +17,13 @@ from robocov.density.polygon_masses import compute_polygon_masses
 from robocov.drawing import Drawable
 from robocov.environment.closed_gaps import build_bars
 from robocov.environment.obstacles import Obstacle, PolygonObstacle, shift_obstacle
-from robocov.environment.polygons import GRID_M, extract_polygons, unite_shapes
+from robocov.environment.polygons import (
+    GRID_M,
+    build_polygon,
+    extract_polygons,
+    require_valid_polygon,
+    unite_shapes,
+)
 from robocov.environment.starts import Start, StartSpec, UniformStart
 from robocov.errors import StartError, describe_unknown_name, format_count, require_number, require_type
 from robocov.observation.region import Region
@@ -105,15 +111,33 @@ class Environment(Drawable):
 
     @cached_property
     def boundary_polygon(self) -> Polygon:
-        """Boundary as a counter-clockwise polygon."""
-        return shapely.orient_polygons(Polygon(self.boundary))
+        """Boundary as a counter-clockwise polygon.
+
+        Raises
+        ------
+        MapError
+            If it is not a list of at least three finite points, or edges of the boundary meet.
+        """
+        location = f"map {self.name}: boundary"
+        polygon = build_polygon(location, self.boundary)
+        require_valid_polygon(location, polygon)
+        return shapely.orient_polygons(polygon)
 
     @cached_property
     def free(self) -> MultiPolygon:
-        """Components of the free space, inside the boundary and outside every obstacle, the largest first."""
+        """Components of the free space, inside the boundary and outside every obstacle, the largest first.
+
+        Raises
+        ------
+        MapError
+            If edges of the boundary or of an obstacle meet.
+        """
         inside = shapely.set_precision(self.boundary_polygon, GRID_M)
         if self.obstacles:
-            solid = unite_shapes(np.array([obstacle.polygon for obstacle in self.obstacles]))
+            shapes = [obstacle.polygon for obstacle in self.obstacles]
+            for number, shape in enumerate(shapes):
+                require_valid_polygon(f"map {self.name}: obstacles[{number}]", shape)
+            solid = unite_shapes(np.array(shapes))
             inside = shapely.difference(inside, solid, grid_size=GRID_M)
         return extract_polygons(inside)
 

@@ -12,6 +12,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment.obstacle_paths import ObstaclePath
+from robocov.environment.polygons import build_polygon
 from robocov.typing import FloatArray, Point, Ring
 
 MAX_SAGITTA_M = 1e-3
@@ -58,7 +59,7 @@ class PolygonObstacle:
     @cached_property
     def polygon(self) -> Polygon:
         """Shape of the obstacle."""
-        return Polygon(self.vertices, self.holes)
+        return build_polygon("obstacle", self.vertices, self.holes)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.typing import FloatArray
+from robocov.errors import MapError, quote, to_floats
+from robocov.typing import FloatArray, Ring
 
 GRID_M = 1e-6
 """Grid size to which coordinates of derived geometry are rounded. The grid makes unions and differences
@@ -54,6 +55,54 @@ def find_overlaps(
     if excess.area <= _MIN_OVERLAP_M2:
         return overlaps, None
     return overlaps, excess
+
+
+def build_polygon(location: str, outline: Ring, holes: Sequence[Ring] = ()) -> Polygon:
+    """Build a polygon from the vertices of its rings.
+
+    Parameters
+    ----------
+    location : str
+        What the polygon is, for messages.
+    outline : (k, 2) sequence, m
+        Vertices of the outer ring.
+    holes : sequence of (k, 2) sequences, m
+        Vertices of the inner rings.
+
+    Returns
+    -------
+    Polygon
+        Its edges may meet; see `require_valid_polygon`.
+
+    Raises
+    ------
+    MapError
+        If a ring is not a list of at least three finite points.
+    """
+    rings = []
+    for ring in (outline, *holes):
+        points = to_floats(location, ring, "at least 3 points [x, y] in meters", MapError)
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3 or not np.isfinite(points).all():
+            raise MapError(
+                f"{location}: expected at least 3 finite points [x, y], got {quote(points.tolist())}"
+            )
+        rings.append(points)
+    return Polygon(rings[0], rings[1:])
+
+
+def require_valid_polygon(location: str, polygon: Polygon) -> None:
+    """Raise MapError if edges of a polygon cross or touch each other, or a hole is outside of it.
+
+    Parameters
+    ----------
+    location : str
+        What the polygon is, for the message.
+    polygon : Polygon
+    """
+    if not polygon.is_valid:
+        # The reason ends with the coordinates of a point, as in "Self-intersection[5 5]".
+        reason = shapely.is_valid_reason(polygon)
+        raise MapError(f"{location}: expected a polygon whose edges do not meet, got {reason}")
 
 
 def unite_shapes(shapes: NDArray[np.object_]) -> BaseGeometry:

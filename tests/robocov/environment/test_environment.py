@@ -11,7 +11,7 @@ from property_examples import count_examples
 
 from robocov.density import Uniform
 from robocov.environment import CircleObstacle, Environment, PolygonObstacle, WallObstacle
-from robocov.errors import InputError, StartError
+from robocov.errors import InputError, MapError, StartError
 from robocov.observation.region import Region
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
@@ -127,3 +127,33 @@ def test_region_is_the_convex_hull_without_collinear_vertices() -> None:
 def test_the_repr_is_short(cluttered: Environment, empty: Environment) -> None:
     assert repr(cluttered) == "<Environment cluttered, 10 x 10 m, 3 obstacles>"
     assert repr(empty) == "<Environment empty, 10 x 10 m, 0 obstacles>"
+
+
+@pytest.mark.parametrize(
+    "boundary",
+    [
+        ((0.0, 0.0), (1.0, 1.0)),
+        ((0.0, 0.0), (1.0, 0.0), (np.nan, 1.0)),
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0)),
+        "square",
+        None,
+    ],
+)
+def test_a_boundary_that_is_no_list_of_points_raises_an_error(boundary: object) -> None:
+    with pytest.raises(MapError, match=r"map hall: boundary: expected at least 3 .*points"):
+        _ = Environment("hall", boundary).free  # type: ignore[arg-type]
+
+
+def test_edges_that_cross_raise_an_error() -> None:
+    bow_tie = ((1.0, 1.0), (3.0, 3.0), (3.0, 1.0), (1.0, 3.0))
+    with pytest.raises(MapError, match=r"map hall: boundary: .* whose edges do not meet, got .*\[2 2\]"):
+        _ = Environment("hall", bow_tie).free
+    obstacles = (CircleObstacle((5.0, 5.0), 1.0), PolygonObstacle(bow_tie))
+    with pytest.raises(MapError, match=r"map hall: obstacles\[1\]: .* whose edges do not meet"):
+        _ = Environment("hall", SQUARE, obstacles).free
+
+
+def test_an_obstacle_with_two_vertices_raises_an_error() -> None:
+    obstacle = PolygonObstacle(((1.0, 1.0), (3.0, 3.0)))
+    with pytest.raises(MapError, match="obstacle: expected at least 3 finite points"):
+        _ = Environment("hall", SQUARE, (obstacle,)).free
