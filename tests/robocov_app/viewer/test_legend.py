@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pygame
 import pytest
@@ -17,6 +18,7 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.layer_catalog import build_standard_layers
 from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.toolkit.overlay import create_flat_canvas
+from robocov_app.toolkit.widgets import tool_tip
 from robocov_app.viewer.canvas.layer_chips import build_layer_entries, measure_chip
 from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.layer_presets import LAYER_GROUPS, LAYER_PRESETS
@@ -278,3 +280,24 @@ def test_the_tooltip_of_a_chip_says_what_a_click_does(tmp_path: Path, monkeypatc
         window.handle_event(event)
         window.run_frame(1 / 30)
     assert tips[-1] == "Hide: Voronoi cells (1)"
+
+
+def test_the_tooltip_of_the_first_chip_is_not_covered_by_the_tool_rail(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    boxes: list[pygame.Rect] = []
+    draw_box = tool_tip._draw_box
+
+    def record_and_draw(screen: pygame.Surface, box: pygame.Rect, *arguments: Any) -> None:
+        boxes.append(box)
+        draw_box(screen, box, *arguments)
+
+    monkeypatch.setattr(tool_tip, "_draw_box", record_and_draw)
+    monkeypatch.setattr(tool_tip, "TIP_DELAY_S", 0.0)
+    with open_window(tmp_path) as window:
+        window.layer_bar.hover(find_chips(window)["layers"].center)
+        window.draw()
+        (box,) = boxes
+        assert box.left < window.layout.arena.left
+        left_color = window.screen.get_at((box.left + 4, box.centery))
+        assert left_color == window.screen.get_at((box.right - 4, box.centery))

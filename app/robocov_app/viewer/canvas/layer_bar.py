@@ -194,7 +194,6 @@ class LayerBar(BasicFocusGroup):
         if self.is_open:
             self._draw_menu(canvas, layout.arena, layers, scenes)
         self._draw_focus(screen)
-        self._draw_tool_tip(screen)
 
     def _arrange_bar(
         self, canvas: Canvas, arena: Box, layers: Sequence[Layer], scenes: Sequence[Scene]
@@ -356,8 +355,8 @@ class LayerBar(BasicFocusGroup):
                 return
         self.focus = None
 
-    def _draw_tool_tip(self, screen: Surface) -> None:
-        """Draw the tooltip of the chip under the mouse once it is due."""
+    def draw_tool_tip(self, screen: Surface) -> None:
+        """Draw the tooltip of the chip under the mouse once it is due, also over the tool rail next to it."""
         if not self._hovered or not self._tool_tip.is_due or not pygame.display.get_init():
             return
         for chip, box in [*self.chips, *self.rows]:

@@ -384,6 +384,7 @@ class ViewerWindow(CommandWindow):
         if not layout.is_compact:
             self.tool_rail.draw(self.screen)
             self.top_bar.draw(self.screen)
+        self.layer_bar.draw_tool_tip(self.screen)
         self.draw_above_map()
         self.video_recorder.add_frame(self.screen)
 
