@@ -333,6 +333,21 @@ def validate_gains(controller: Any) -> None:
         object.__setattr__(controller, name, value)  # A frozen dataclass does not allow assignment.
 
 
+def check_gains(controller: Any) -> None:
+    """Check all gains of a controller, without converting them.
+
+    The classes of users do not call `validate_gains`.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not allowed. The message begins with the controller's name.
+    """
+    controller_name = getattr(controller, "name", type(controller).__name__)
+    for name, declared in get_gains(controller).items():
+        declared.validate(getattr(controller, name), controller_name)
+
+
 def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:
     """Create a controller of a class.
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from robocov.controllers.base import Controller, Information
+from robocov.controllers.gains import check_gains
 from robocov.controllers.user_modules import format_location
 from robocov.errors import ParameterError, quote
 from robocov.observation import Decision, Message, Observations, ReceivedMessage, to_numbers
@@ -328,7 +329,7 @@ def to_team_controller(controller: Any) -> Any:
 
 
 def require_controller(value: Any) -> Controller:
-    """Return a controller as one of a team; raise ParameterError for any other value.
+    """Return a controller as one of a team, with gains that are allowed.
 
     Parameters
     ----------
@@ -342,7 +343,7 @@ def require_controller(value: Any) -> Controller:
     Raises
     ------
     ParameterError
-        If the value is not a controller.
+        If the value is not a controller, or one of its gains is not allowed.
     """
     team_controller = to_team_controller(value)
     if isinstance(team_controller, type) or not isinstance(team_controller, Controller):
@@ -350,6 +351,7 @@ def require_controller(value: Any) -> Controller:
             "controller: expected a controller, as in Rapf(), with a method decide or force, "
             f"got {quote(team_controller)}"
         )
+    check_gains(unwrap_controller(team_controller))
     return team_controller
 
 

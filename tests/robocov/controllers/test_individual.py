@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from robocov.controllers import Controller, IndividualControllerAdapter, OwnView, Rapf, get_information
-from robocov.controllers.individual import to_team_controller, unwrap_controller
+from robocov.controllers.gains import gain
+from robocov.controllers.individual import require_controller, to_team_controller, unwrap_controller
 from robocov.errors import ParameterError
 from robocov.observation import Observations
 from robocov.observation.neighbors import Neighbors
@@ -140,3 +141,17 @@ def test_only_individual_controllers_are_adapted() -> None:
     assert to_team_controller(rapf) is rapf
     assert unwrap_controller(rapf) is rapf
     assert to_team_controller(Returning) is Returning
+
+
+@pytest.mark.parametrize("shy", [-3.0, "a", np.nan])
+def test_gains_of_a_class_of_the_user_have_to_be_in_their_range(shy: Any) -> None:
+    @dataclass(frozen=True)
+    class Homing:
+        shy: float = gain(0.0, "m", "how far it stays away from walls")
+
+        def force(self, own: OwnView) -> Any:
+            return own.centroid - own.position
+
+    assert require_controller(Homing(shy=1)).controller.shy == 1  # type: ignore[attr-defined]
+    with pytest.raises(ParameterError, match=r"Homing\.shy: expected a number from 0 to 1000000 m, got"):
+        require_controller(Homing(shy=shy))
