@@ -5,10 +5,10 @@
 - ``doors``: whether robots find narrow doors in walls of random direction
 - ``large-maps``: the same in upright walls on larger maps, where nodes of planners are farther apart
 - ``sizes``: whether a larger team is ever worse than a smaller one
-- ``ranges``: gaps, rest and path lengths with limited ranges, beside `rapf`
+- ``ranges``: gaps, rest and path lengths with limited ranges, next to `rapf`
 - ``stakes``: costs and path lengths for different values of the gain `stake`, on maps outside the benchmark
 - ``rest``: whether a team that has rested for ten minutes responds to a failure and to an open door
-- ``pace``: computing time, beside `rapf`
+- ``pace``: computing time, next to `rapf`
 """
 
 from __future__ import annotations
@@ -260,7 +260,7 @@ def run_with_ranges(controller: str, map_name: str, ranges: Mapping[str, float])
 
 
 def measure_ranges(controller: str, count: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """Yield gaps, rest and path lengths on the maps of the short-range track, beside `rapf`."""
+    """Yield gaps, rest and path lengths on the maps of the short-range track, next to `rapf`."""
     maps = suite.TRACKS["short-range"].maps
     for ranges in LIMITED_RANGES:
         runs = list(pool.map(partial(run_with_ranges, controller, ranges=ranges), maps))
