@@ -334,9 +334,9 @@ def validate_gains(controller: Any) -> None:
 
 
 def check_gains(controller: Any) -> None:
-    """Check all gains of a controller, without converting them.
+    """Check the gains that a controller declares by `gain` or `choice`, without converting them.
 
-    The classes of users do not call `validate_gains`.
+    The classes of users do not call `validate_gains`. A plain number as a default declares no range to check.
 
     Raises
     ------
@@ -344,8 +344,12 @@ def check_gains(controller: Any) -> None:
         If a value is not allowed. The message begins with the controller's name.
     """
     controller_name = getattr(controller, "name", type(controller).__name__)
+    plain_names = set()
+    if is_dataclass(controller):
+        plain_names = {item.name for item in fields(controller) if _METADATA_KEY not in item.metadata}
     for name, declared in get_gains(controller).items():
-        declared.validate(getattr(controller, name), controller_name)
+        if name not in plain_names:
+            declared.validate(getattr(controller, name), controller_name)
 
 
 def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any:

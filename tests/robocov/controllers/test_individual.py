@@ -155,3 +155,14 @@ def test_gains_of_a_class_of_the_user_have_to_be_in_their_range(shy: Any) -> Non
     assert require_controller(Homing(shy=1)).controller.shy == 1  # type: ignore[attr-defined]
     with pytest.raises(ParameterError, match=r"Homing\.shy: expected a number from 0 to 1000000 m, got"):
         require_controller(Homing(shy=shy))
+
+
+def test_plain_numbers_of_a_class_of_the_user_have_no_range() -> None:
+    @dataclass(frozen=True)
+    class Homing:
+        limit: float = np.inf
+
+        def force(self, own: OwnView) -> Any:
+            return own.centroid - own.position
+
+    require_controller(Homing())

@@ -24,7 +24,9 @@ def test_a_contact_that_lasts_has_one_point():
 def test_robots_touch_between_their_centers():
     record = record_walk(SQUARE, 2, steps=3)
     positions = np.array([[[2.0, 4.0], [6.0, 4.0]], [[3.0, 4.0], [3.4, 4.0]], [[2.0, 4.0], [6.0, 4.0]]])
-    record = replace(record, positions=positions, team=Team.homogeneous(2, radius=(0.1, 0.3)))
+    record = replace(
+        record, positions=positions, team=replace(Team.homogeneous(2), radius=np.array([0.1, 0.3]))
+    )
     assert find_contact_points(record) == pytest.approx(np.array([[3.1, 4.0]]))
 
 

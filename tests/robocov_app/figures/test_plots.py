@@ -260,7 +260,9 @@ class TestTrajectories:
     def test_discs_have_the_radii_of_the_robots(self):
         record = record_walk(ROOMS, 3)
         radii = (0.3, 0.4, 0.5)
-        axes = plot_trajectories(replace(record, team=Team.homogeneous(3, radius=radii))).axes[0]
+        axes = plot_trajectories(
+            replace(record, team=replace(Team.homogeneous(3), radius=np.array(radii)))
+        ).axes[0]
         px_per_m = axes.get_window_extent().width / 16.0
         assert measure_radii(axes) / px_per_m == pytest.approx(radii, rel=1e-3)
 

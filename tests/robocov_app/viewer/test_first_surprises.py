@@ -173,7 +173,7 @@ def test_controllers_that_are_shown_are_offered_last(driver: Driver) -> None:
 def test_controllers_to_compare_with_are_described(driver: Driver) -> None:
     driver.push_button("pane:add")
     options = {option.text: option for option in driver.window.dialogs.current.options("")}
-    assert options["Lloyd"].description.startswith("Lloyd's algorithm: every robot moves")
+    assert options["Lloyd"].description.startswith("Lloyd's algorithm: each robot moves")
     for name, option in options.items():
         assert option.description or name == "RAPF"
 

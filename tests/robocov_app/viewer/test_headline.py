@@ -62,7 +62,7 @@ def test_the_large_number_ends_within_the_chart(
     assert float(number.removesuffix(" m")) == pytest.approx(value, abs=0.5)
     frame = driver.window.chart._frame
     left = frame.times.right + _HEADLINE_LEFT_PX * frame.scale
-    width = measure_text(number, round(HEADLINE_TEXT_PX * frame.scale), True)
+    width = measure_text(number, round(HEADLINE_TEXT_PX * frame.scale), bold=True)
     assert left + width <= driver.window.layout.chart.width
 
 
