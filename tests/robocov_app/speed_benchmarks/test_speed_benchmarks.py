@@ -155,7 +155,7 @@ def small_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "DURATION_S", 1.0)
     monkeypatch.setattr(processes, "COMMANDS", {"import robocov": ("-c", "import robocov")})
     monkeypatch.setattr(
-        render, "list_cases", lambda quick: [partial(render._measure_frames, "rooms", 6, quick)]
+        render, "list_cases", lambda quick: [partial(render._measure_frames, "rooms", 6, quick=quick)]
     )
     monkeypatch.setattr(window, "list_cases", lambda quick: [partial(window._measure_window, 6, 0.5)])
 
