@@ -270,15 +270,22 @@ class _Callers:
         """
         if action.event == "open" and _is_data_of_benchmark(action.paths[0]):
             return False
+        return self._may_anybody_cause(action, frame) or self._is_caused_by_library(action, frame)
+
+    def _may_anybody_cause(self, action: _Action, frame: FrameType | None) -> bool:
+        """Return whether all code may cause an action: use installed files, or search for modules."""
+        if not action.paths:
+            return False
         is_listing = action.event in _LISTING_EVENTS
-        may_be_seen = is_listing or not action.prohibition
-        if may_be_seen and action.paths and all(map(self._is_library_path, action.paths)):
+        if (is_listing or not action.prohibition) and all(map(self._is_library_path, action.paths)):
             return True
         if not action.prohibition and f"{action.paths[0]}{os.sep}" in self._search_folders:
             # An entry of sys.path may be an archive of modules.
             return True
-        if is_listing and action.paths and self._is_search(action.paths[0], frame):
-            return True
+        return is_listing and self._is_search(action.paths[0], frame)
+
+    def _is_caused_by_library(self, action: _Action, frame: FrameType | None) -> bool:
+        """Return whether a compiler or an import causes an action, without own code in between."""
         while frame is not None:
             code = frame.f_code
             file = _find_file(code)

@@ -189,20 +189,35 @@ def _build_overview(
         rows.append((label, entries.information[label], rank, score, *cells))
     headings = [suite.format_heading(name) for name in tracks]
     head = ("Controller", "Knows", "Rank", "Score, %", "Runs", "Runs with contacts", "Settled", *headings)
+    notes = _list_overview_notes(by_label, scores, tracks, entries)
+    caption = "Scores, and median gaps on each track, %"
+    return PageTable(caption, head, rows, text_columns=frozenset({1}), notes=tuple(notes))
+
+
+def _list_overview_notes(
+    by_label: Mapping[str, Mapping[str, Rating]],
+    ranked: Collection[str],
+    tracks: Iterable[str],
+    entries: _Entries,
+) -> list[str]:
+    """Return the notes on entries that have the smallest gap on a track but no rank, or no runs at all."""
     notes = []
-    competing = [label for label in labels if entries.information[label] != _WHOLE_MAP]
-    leaders = _find_unranked_leaders({label: by_label[label] for label in competing}, scores, tracks)
+    competing = {
+        label: label_ratings
+        for label, label_ratings in by_label.items()
+        if entries.information[label] != _WHOLE_MAP
+    }
+    leaders = _find_unranked_leaders(competing, ranked, tracks)
     if leaders:
         notes.append(
             "The best ranked controller is not the best on every track. Of the controllers that do not know "
             "the whole map, these have the smallest gap on a track, but lack runs on others and have no "
             f"rank: {'; '.join(leaders)}."
         )
-    missing = sorted((label for label in labels if not by_label[label]), key=str.casefold)
+    missing = [label for label, label_ratings in by_label.items() if not label_ratings]
     if missing:
-        notes.append(f"Without runs on these tracks: {'; '.join(missing)}.")
-    caption = "Scores, and median gaps on each track, %"
-    return PageTable(caption, head, rows, text_columns=frozenset({1}), notes=tuple(notes))
+        notes.append(f"Without runs on these tracks: {'; '.join(sorted(missing, key=str.casefold))}.")
+    return notes
 
 
 def _format_mean_score(mean_score: ratings.MeanScore) -> str:

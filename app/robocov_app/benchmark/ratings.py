@@ -185,10 +185,11 @@ class Rating:
         if len(set(maps)) < MIN_INTERVAL_MAPS:
             return Interval(float(np.median(self.gaps)), np.nan, np.nan)
         interval = bootstrap(np.minimum(self.gaps, _MAX_FINITE_GAP), "median", maps)
-        limits = (interval.estimate, interval.low, interval.high)
-        # Percentiles between a finite and an infinite gap are interpolated, and count as infinite, too.
-        estimate, low, high = (np.inf if gap > np.sqrt(_MAX_FINITE_GAP) else gap for gap in limits)
-        return Interval(estimate, low, high)
+        return Interval(
+            _restore_infinity(interval.estimate),
+            _restore_infinity(interval.low),
+            _restore_infinity(interval.high),
+        )
 
     def select_runs(self, keys: Iterable[RunKey]) -> "Rating":
         """Return the rating over the runs with the given keys, including those that failed."""
@@ -272,6 +273,13 @@ class MeanScore(NamedTuple):
     score: float
     margin: float
     """Half the width of the 95% interval over maps; nan for fewer than `MIN_INTERVAL_MAPS`."""
+
+
+def _restore_infinity(gap: float) -> float:
+    """Return infinity for a gap that stands for an infinite one, or is interpolated with one."""
+    if gap > np.sqrt(_MAX_FINITE_GAP):
+        return np.inf
+    return gap
 
 
 def compute_mean_score(track_ratings: Collection[Rating]) -> MeanScore:
