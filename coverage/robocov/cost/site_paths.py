@@ -7,6 +7,10 @@ index owns the site.
 
 All lengths are in grid steps, except for those in `SitePaths`.
 
+Functions that are called for each tile, corner or site are inlined, and the longest loops read each array
+of a named tuple only once. Otherwise, numba would update the reference counts of arrays so often that the
+search would take almost twice as long.
+
 Equation numbers refer to Renzaglia and Martinelli, "Distributed Coverage Control for a Multi-Robot Team in a
 Non-Convex Environment".
 """
@@ -17,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robocov.compiled import kernel
+from robocov.compiled import inlined_kernel, kernel
 from robocov.cost.corner_views import CornerViews
 from robocov.cost.lattice import NO_SITE, SLOTS, TILES_PER_GROUP, Tiles
 from robocov.geodesic.angular_index import (
@@ -190,32 +194,38 @@ def find_site_paths(
     bool
         Whether the wall index of `search` had enough entries. If not, the result is incomplete.
     """
-    tiles = cost_map.tiles
     for team in range(len(teams)):
         if not _find_team_paths(cost_map, search, teams[team], is_covered[team]):
             return False
-        for tile in range(len(tiles.boxes)):
-            _write_tile_paths(tiles, search, tile, team, grid_spacing, paths)
+        _write_team_paths(cost_map.tiles, search, team, grid_spacing, paths)
     return True
 
 
 @kernel
-def _write_tile_paths(
-    tiles: Tiles, search: Search, tile: int, team: int, grid_spacing: float, paths: SitePaths
-) -> None:
-    """Write the paths that a search has found to the sites of a tile to the row of a team in `paths`."""
-    for slot in range(SLOTS):
-        site = tiles.sites[tile, slot]
-        if site == NO_SITE:
-            continue
-        last_corner = search.site_corners[tile, slot]
-        first_corner = NO_CORNER
-        if last_corner != NO_CORNER:
-            first_corner = search.corner_paths.first_corners[last_corner]
-        paths.distances[team, site] = search.site_lengths[tile, slot] * grid_spacing
-        paths.owners[team, site] = search.site_robots[tile, slot]
-        paths.first_corners[team, site] = first_corner
-        paths.last_corners[team, site] = last_corner
+def _write_team_paths(tiles: Tiles, search: Search, team: int, grid_spacing: float, paths: SitePaths) -> None:
+    """Write the paths that a search has found to the row of a team in `paths`."""
+    sites = tiles.sites
+    site_lengths = search.site_lengths
+    site_robots = search.site_robots
+    site_corners = search.site_corners
+    corner_first_corners = search.corner_paths.first_corners
+    distances = paths.distances[team]
+    owners = paths.owners[team]
+    first_corners = paths.first_corners[team]
+    last_corners = paths.last_corners[team]
+    for tile in range(len(sites)):
+        for slot in range(SLOTS):
+            site = sites[tile, slot]
+            if site == NO_SITE:
+                continue
+            last_corner = site_corners[tile, slot]
+            first_corner = NO_CORNER
+            if last_corner != NO_CORNER:
+                first_corner = corner_first_corners[last_corner]
+            distances[site] = site_lengths[tile, slot] * grid_spacing
+            owners[site] = site_robots[tile, slot]
+            first_corners[site] = first_corner
+            last_corners[site] = last_corner
 
 
 @kernel
@@ -242,11 +252,7 @@ def _find_team_paths(cost_map: CostMap, search: Search, robots: FloatArray, is_c
         )
         if entry_count == NO_SPACE:
             return False
-    is_any_hidden = False
-    for tile in range(len(tiles.boxes)):
-        _find_hidden_sites(cost_map, search, tile, is_covered)
-        is_any_hidden = is_any_hidden or search.hidden_slots[tile] != 0
-    if is_any_hidden:
+    if _find_hidden_sites(cost_map, search, is_covered):
         _find_corner_paths(cost_map, search, robots)
         _find_hidden_site_paths(cost_map, search, robots)
     return True
@@ -273,7 +279,7 @@ def _find_nearest_robots(tiles: Tiles, search: Search, robots: FloatArray) -> No
         _find_nearest_robots_in_tile(tiles, search, robots, tile, tile_robot_count)
 
 
-@kernel
+@inlined_kernel
 def _list_nearest_candidates(
     boxes: FloatArray,
     box: int,
@@ -299,7 +305,7 @@ def _list_nearest_candidates(
     return _list_robots_within(boxes, box, robots, max_squared_distance, candidates, candidate_count, result)
 
 
-@kernel
+@inlined_kernel
 def _list_robots_within(
     boxes: FloatArray,
     box: int,
@@ -323,7 +329,7 @@ def _list_robots_within(
     return result_count
 
 
-@kernel
+@inlined_kernel
 def _find_nearest_robots_in_tile(
     tiles: Tiles, search: Search, robots: FloatArray, tile: int, candidate_count: int
 ) -> None:
@@ -359,30 +365,43 @@ def _find_nearest_robots_in_tile(
 
 
 @kernel
-def _find_hidden_sites(cost_map: CostMap, search: Search, tile: int, is_covered: BoolArray) -> None:
-    """Find the hidden sites of a tile: those that a wall hides from their nearest robot.
+def _find_hidden_sites(cost_map: CostMap, search: Search, is_covered: BoolArray) -> bool:
+    """Find the hidden sites: those that a wall hides from their nearest robot. Return whether there are any.
 
-    They are written to a bit mask with one bit for each slot of the tile. `is_covered`, (c,), says which
+    They are written to a bit mask for each tile, with one bit for each slot. `is_covered`, (c,), says which
     components of the free space contain robots. No path leads to the sites in the other components.
     """
-    tiles = cost_map.tiles
-    hidden_slots = 0
-    for slot in range(SLOTS):
-        if not is_covered[tiles.components[tile, slot]]:
-            search.site_lengths[tile, slot] = np.inf
-            search.site_robots[tile, slot] = NO_ROBOT
-        elif tiles.sites[tile, slot] != NO_SITE:
-            x = tiles.x[tile, slot]
-            y = tiles.y[tile, slot]
-            robot = search.nearest_robots[tile, slot]
-            # This test is faster than the next one, but does not recognize every visible site.
-            if is_certainly_visible(search.wall_index, robot, x, y):
-                continue
-            if not is_visible(cost_map.walls, search.wall_index, robot, x, y):
-                # Infinite until a path via a corner, or from another robot, is found.
-                search.site_lengths[tile, slot] = np.inf
-                hidden_slots |= 1 << slot
-    search.hidden_slots[tile] = hidden_slots
+    walls = cost_map.walls
+    wall_index = search.wall_index
+    sites = cost_map.tiles.sites
+    site_x = cost_map.tiles.x
+    site_y = cost_map.tiles.y
+    components = cost_map.tiles.components
+    nearest_robots = search.nearest_robots
+    site_lengths = search.site_lengths
+    site_robots = search.site_robots
+    hidden_slots = search.hidden_slots
+    is_any_hidden = False
+    for tile in range(len(sites)):
+        hidden_slots_of_tile = 0
+        for slot in range(SLOTS):
+            if not is_covered[components[tile, slot]]:
+                site_lengths[tile, slot] = np.inf
+                site_robots[tile, slot] = NO_ROBOT
+            elif sites[tile, slot] != NO_SITE:
+                x = site_x[tile, slot]
+                y = site_y[tile, slot]
+                robot = nearest_robots[tile, slot]
+                # This test is faster than the next one, but does not recognize every visible site.
+                if is_certainly_visible(wall_index, robot, x, y):
+                    continue
+                if not is_visible(walls, wall_index, robot, x, y):
+                    # Infinite until a path via a corner, or from another robot, is found.
+                    site_lengths[tile, slot] = np.inf
+                    hidden_slots_of_tile |= 1 << slot
+                    is_any_hidden = True
+        hidden_slots[tile] = hidden_slots_of_tile
+    return is_any_hidden
 
 
 @kernel
@@ -464,7 +483,7 @@ def _try_closer_robots(walls: Walls, search: Search, robots: FloatArray) -> int:
     return waiting_count
 
 
-@kernel
+@inlined_kernel
 def _find_nearest_candidate(
     robots: FloatArray, candidates: IntArray, candidate_count: int, x: float, y: float
 ) -> int:
@@ -481,7 +500,7 @@ def _find_nearest_candidate(
     return nearest
 
 
-@kernel
+@inlined_kernel
 def _try_straight_path_to_corner(
     walls: Walls, search: Search, corner: int, robot: int, waiting_count: int
 ) -> int:
@@ -571,7 +590,7 @@ def _try_other_robots(
                 _try_straight_paths_to_sites(cost_map, search, tile, search.tile_robots[k])
 
 
-@kernel
+@inlined_kernel
 def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
     """Find the shortest paths via corners to the hidden sites of a tile.
 
@@ -614,19 +633,19 @@ def _try_corner_paths(cost_map: CostMap, search: Search, tile: int) -> None:
                     search.site_corners[tile, slot] = corner
 
 
-@kernel
+@inlined_kernel
 def _contains_slot(slots: int, slot: int) -> bool:
     """Return whether a bit mask of the slots of a tile contains a slot."""
     return (slots >> slot) & 1 != 0
 
 
-@kernel
+@inlined_kernel
 def _is_better(length: float, robot: int, best_length: float, best_robot: int) -> bool:
     """Return whether a path is shorter than the best one, or as long, but from a robot with a lower index."""
     return length < best_length or (length == best_length and robot < best_robot)
 
 
-@kernel
+@inlined_kernel
 def _compute_max_hidden_length(search: Search, tile: int) -> float:
     """Return the length of the longest path to a hidden site of a tile."""
     hidden_slots = search.hidden_slots[tile]
@@ -637,7 +656,7 @@ def _compute_max_hidden_length(search: Search, tile: int) -> float:
     return max_length
 
 
-@kernel
+@inlined_kernel
 def _try_straight_paths_to_sites(cost_map: CostMap, search: Search, tile: int, robot: int) -> None:
     """Use the straight path from a robot to each hidden site of a tile if it is the shortest path so far.
 
