@@ -38,9 +38,9 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
 # The times of examples differ by orders of magnitude, and machines are shared.
 WITHOUT_DEADLINE = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 # Examples are the same every time, so that a new failure is caused by the change under test.
-# `pytest --hypothesis-profile=thorough` runs four times as many, and `=explore` new ones.
+# `pytest --hypothesis-profile=thorough` runs twice as many, and `=explore` new ones.
 settings.register_profile("quick", max_examples=8, derandomize=True, database=None, **WITHOUT_DEADLINE)
-settings.register_profile("thorough", max_examples=32, derandomize=True, database=None, **WITHOUT_DEADLINE)
+settings.register_profile("thorough", max_examples=16, derandomize=True, database=None, **WITHOUT_DEADLINE)
 settings.register_profile("explore", max_examples=500, print_blob=True, **WITHOUT_DEADLINE)
 settings.load_profile("quick")
 
