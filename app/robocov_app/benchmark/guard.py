@@ -28,7 +28,7 @@ from typing import Any
 import robocov.compiled
 import robocov_app
 from robocov.compiled import open_cache_folder
-from robocov.controllers.user_modules import find_own_modules
+from robocov.controllers.user_modules import is_own_module
 
 _COMPILERS = ("numba", "llvmlite")
 """Packages that, like `robocov.compiled`, may write machine code and look up functions of libraries."""
@@ -91,6 +91,7 @@ _FUNCTIONS_WITHOUT_EVENTS = {
         "sched_setparam",
         "sched_setscheduler",
         "setpgid",
+        "setpgrp",
         "setpriority",
         "setsid",
     ),
@@ -326,7 +327,7 @@ class _Callers:
 
     def _is_own_module(self, name: str) -> bool:
         """Return whether a module belongs to the controller."""
-        return name.partition(".")[0] in self._own_packages or bool(find_own_modules(f"import {name}"))
+        return name.partition(".")[0] in self._own_packages or is_own_module(name.partition(".")[0])
 
 
 def _find_folder(package: str) -> str | None:
@@ -375,6 +376,9 @@ def _describe_event(event: str, arguments: tuple[Any, ...]) -> _Action | None:
     """Describe the action of an audit event; return None if it neither is forbidden nor reads a file."""
     if event == "open":
         return _describe_opening(*arguments[:3])
+    if event == "import" and arguments[1]:
+        # An extension module is opened without a further event. Other imports have no file here.
+        return _Action("open", (os.path.realpath(_convert_path(arguments[1])),), "")
     if not event.startswith(_FORBIDDEN_PREFIXES):
         return None
     names = [_convert_path(value) for value in arguments if isinstance(value, str | bytes | os.PathLike)]

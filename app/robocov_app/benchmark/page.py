@@ -97,6 +97,7 @@ def build_page(results: Sequence[Mapping[str, Any]], title: str) -> str:
         overviews=_build_overviews(labels, tracks, entries),
         other_versions=_list_other_versions(results, labels),
         file_mark="" if all(result["is_bundled"] for result in results) else ratings.FILE_MARK,
+        has_bundled=bool(entries.bundled),
         anomalies=_build_anomaly_table(labeled_results, _find_default_rapf(results)),
         tracks=[_build_section(name, track_ratings, entries) for name, track_ratings in tracks.items()],
         notes=[*ratings.NOTES, *_describe_entries_without_messages(results, labels)],
@@ -205,14 +206,16 @@ def _list_overview_notes(
     competing = {
         label: label_ratings
         for label, label_ratings in by_label.items()
-        if entries.information[label] != _WHOLE_MAP
+        if entries.information[label] != _WHOLE_MAP and (label in entries.bundled or not entries.bundled)
     }
+    # Files hide no bundled result, because they may contain anything.
+    kind = "built-in controllers" if entries.bundled else "controllers"
     leaders = _find_unranked_leaders(competing, ranked, tracks)
     if leaders:
         notes.append(
-            "The best ranked controller is not the best on every track. Of the controllers that do not know "
-            "the whole map, these have the smallest gap on a track, but lack runs on others and have no "
-            f"rank: {'; '.join(leaders)}."
+            f"The best ranked controller is not the best on every track. Of the {kind} that do not know the "
+            "whole map, these have the smallest gap on a track, but lack runs on others and have no rank: "
+            f"{'; '.join(leaders)}."
         )
     missing = [label for label, label_ratings in by_label.items() if not label_ratings]
     if missing:

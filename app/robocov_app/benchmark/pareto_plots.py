@@ -1,6 +1,5 @@
 """Pareto plots of the page: the gap of controllers against another quantity."""
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -66,6 +65,9 @@ _MAX_RATIO_TO_MEDIAN = 1e4
 """Maximum ratio of a plotted value to the median of the bundled entries, or of all without bundled ones."""
 _MIN_MEDIAN_GAP = 1.0
 """Minimum median of the gaps for this ratio, %."""
+_MAX_RATIO_TO_BUNDLED = 4.0
+"""Maximum ratio of a value from a file to the largest one of the bundled entries, or of the smallest one of
+these to it. With larger ratios, a file could squeeze all bundled entries into a small part of a plot."""
 _MAX_LABEL_CHARS = 28
 """Maximum length of a label in a plot."""
 _MAX_EQUAL_POINTS = 4
@@ -121,7 +123,7 @@ def build_plots(track: str, entries: Sequence[PlottedEntry]) -> list[ParetoPlot]
     plots = []
     for key, quantity in QUANTITIES.items():
         points, outliers = _split_outliers(_build_points(entries, quantity))
-        points = _select_points_for_log_axis(points)
+        points, zeros = _split_zeros(points)
         values = [point.x for point in points]
         if len(points) < 2 or max(values) <= _MIN_RATIO * min(values):
             continue
@@ -130,7 +132,7 @@ def build_plots(track: str, entries: Sequence[PlottedEntry]) -> list[ParetoPlot]
         drawn, omitted = thin_out_equal_values(points)
         figure = draw_pareto_figure(drawn, quantity.axis_label)
         svg = inline_svg(figure, f"{track}-{key}", description)
-        note = _describe_omitted_points(omitted, outliers)
+        note = _describe_omitted_points(omitted, [*zeros, *outliers])
         plots.append(ParetoPlot(f"Gap and {quantity.title}", svg, note))
     return plots
 
@@ -163,11 +165,11 @@ def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[
         Points far from all others.
     """
     sentences = []
-    if omitted:
-        labels = "; ".join(point.label for point in omitted)  # Some labels contain commas.
+    for value in dict.fromkeys(f"{point.x:.4g}" for point in omitted):
+        # Some labels contain commas.
+        labels = "; ".join(point.label for point in omitted if f"{point.x:.4g}" == value)
         sentences.append(
-            f"Not drawn, because a controller with the same value ({omitted[0].x:.4g}) has a smaller "
-            f"gap: {labels}."
+            f"Not drawn, because a controller with the same value ({value}) has a smaller gap: {labels}."
         )
     if outliers:
         labels = "; ".join(point.label for point in outliers)
@@ -190,7 +192,8 @@ def thin_out_equal_values(
 
     If many controllers have the same value of the quantity, as those that send only their positions, their
     marks would hide each other. Then only the smallest gap of the competing controllers and the smallest gap
-    of those that know the whole map are drawn: of bundled results, and of results from files.
+    of those that know the whole map are drawn: of bundled results, and of results from files. Bundled results
+    are only omitted if there are many of them, so that no file removes one.
 
     Parameters
     ----------
@@ -201,18 +204,28 @@ def thin_out_equal_values(
     -------
     drawn, omitted : list of ParetoPoint
     """
-    counts = Counter(f"{point.x:.3g}" for point in points)
-    common_value, count = counts.most_common(1)[0]
-    if count <= _MAX_EQUAL_POINTS:
-        return list(points), []
-    equal = sorted(
-        (point for point in points if f"{point.x:.3g}" == common_value), key=lambda point: point.gap
-    )
-    best: dict[tuple[bool, bool], ParetoPoint] = {}
-    for point in equal:
-        best.setdefault((point.is_rival, point.is_bundled), point)
-    omitted = [point for point in equal if point not in best.values()]
+    points_by_value: dict[str, list[ParetoPoint]] = {}
+    for point in points:
+        points_by_value.setdefault(f"{point.x:.3g}", []).append(point)
+    omitted: list[ParetoPoint] = []
+    for equal_points in points_by_value.values():
+        omitted += _list_superfluous_points(equal_points)
     return [point for point in points if point not in omitted], omitted
+
+
+def _list_superfluous_points(equal_points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
+    """Return those of the points with one value of the quantity that are omitted, sorted by their gaps."""
+    if len(equal_points) <= _MAX_EQUAL_POINTS:
+        return []
+    bundled_count = sum(point.is_bundled for point in equal_points)
+    points = sorted(equal_points, key=lambda point: point.gap)
+    best: dict[tuple[bool, bool], ParetoPoint] = {}
+    for point in points:
+        best.setdefault((point.is_rival, point.is_bundled), point)
+    superfluous_points = [point for point in points if point not in best.values()]
+    if bundled_count > _MAX_EQUAL_POINTS:
+        return superfluous_points
+    return [point for point in superfluous_points if not point.is_bundled]
 
 
 def _split_outliers(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
@@ -232,16 +245,31 @@ def _split_outliers(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], l
         is_large = point.x > median * _MAX_RATIO_TO_MEDIAN or point.gap > median_gap * _MAX_RATIO_TO_MEDIAN
         group = outliers if is_small or is_large else drawn
         group.append(point)
-    return drawn, outliers
+    bundled = [point for point in drawn if point.is_bundled]
+    far_points = [point for point in drawn if not point.is_bundled and _is_far(point, bundled)]
+    return [point for point in drawn if point not in far_points], [*far_points, *outliers]
 
 
-def _select_points_for_log_axis(points: Sequence[ParetoPoint]) -> list[ParetoPoint]:
-    """Return the points without those at 0 if the others need a logarithmic axis."""
+def _is_far(point: ParetoPoint, bundled: Sequence[ParetoPoint]) -> bool:
+    """Return whether a point is so far from all bundled ones that these would fill a small part of a plot."""
+    if not bundled:
+        return False
+    values = [other.x for other in bundled]
+    max_gap = max(_MIN_MEDIAN_GAP, *[other.gap for other in bundled])
+    return (
+        point.x * _MAX_RATIO_TO_BUNDLED < min(values)
+        or point.x > _MAX_RATIO_TO_BUNDLED * max(values)
+        or point.gap > _MAX_RATIO_TO_BUNDLED * max_gap
+    )
+
+
+def _split_zeros(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
+    """Split points into those to draw and those at 0, if the others need a logarithmic axis."""
     positive = [point for point in points if point.x > 0.0]
     values = [point.x for point in positive]
     if values and max(values) > _MIN_LOG_RATIO * min(values):
-        return positive
-    return list(points)
+        return positive, [point for point in points if point.x <= 0.0]
+    return list(points), []
 
 
 @plain_style()
@@ -249,7 +277,8 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     """Draw the gap of controllers against another quantity. Smaller values are better in both.
 
     A line, the Pareto front, connects the competing controllers for which no other competing controller is
-    better in both quantities.
+    better in both quantities. If there are bundled results, it connects only these, because files may contain
+    anything.
 
     Parameters
     ----------
@@ -265,10 +294,12 @@ def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure
     width, height = PLOT_SIZE_PX
     figure = Figure((width / _DPI, height / _DPI), dpi=_DPI)
     axes = figure.add_axes((0.08, 0.14, 0.9, 0.75))
-    rivals = [(point.x, point.gap) for point in points if point.is_rival]
+    # Files neither change the line nor cover the mark of a bundled result.
+    compared = [point for point in points if point.is_bundled] or points
+    rivals = [(point.x, point.gap) for point in compared if point.is_rival]
     front = np.array([rivals[k] for k in find_pareto_front(rivals)]).reshape(-1, 2)
     axes.plot(*front.T, color=to_plot_color(LIGHT.faint), linewidth=1.0, zorder=1)
-    for point in points:
+    for point in sorted(points, key=lambda point: point.is_bundled):
         _draw_pareto_point(axes, point)
     _style_pareto_axes(axes, points, axis_label)
     _label_pareto_points(axes, points)

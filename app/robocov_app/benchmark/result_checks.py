@@ -50,6 +50,12 @@ _ROUNDING = 1e-9
 """Fraction by which rounding errors may change a cost or a time."""
 _BLANK_LETTERS = "\u115f\u1160\u2800\u3164\uffa0"
 """Letters and symbols that are displayed as empty space."""
+_MAX_COMBINING_MARKS = 3
+"""Maximum number of combining marks in succession. More of them would cover the lines above and below."""
+_MARK_CATEGORIES = ("Mn", "Me")
+"""Unicode categories of marks that are displayed above, below or around another character."""
+_WIDE_CHARACTERS = re.compile("[\u2e3a\u2e3b\ua9c1-\ua9cd\ufdfa-\ufdfd\U00012000-\U0001254f]")
+"""Dashes, ligatures and signs that are several times as wide as a letter, and would cover other text."""
 
 _HEAD_TYPES = {"entry": dict, "selection": dict, "versions": dict, "rows": list, "method": list}
 _ENTRY_TYPES = {
@@ -122,6 +128,7 @@ def _check_entry(entry: Mapping[str, Any], location: str) -> None:
             f"{location}: label: expected 1 to {MAX_LABEL_CHARS} characters, some of them visible, "
             f"got {quote(label)}"
         )
+    _require_readable(label, f"{location}: label")
     if entry["information"] not in get_args(Information):
         expected = ", ".join(get_args(Information))
         raise InputError(
@@ -154,6 +161,21 @@ def _check_texts(texts: Iterable[Any], location: str) -> None:
             raise InputError(
                 f"{location}: expected strings of at most {MAX_TEXT_CHARS} characters, got {quote(item)}"
             )
+        _require_readable(item, location)
+
+
+def _require_readable(text: str, location: str) -> None:
+    """Raise InputError if a text would cover other text on a page."""
+    mark_count = 0
+    for character in unicodedata.normalize("NFC", text):
+        is_mark = unicodedata.category(character) in _MARK_CATEGORIES
+        mark_count = mark_count + 1 if is_mark else 0
+        if mark_count > _MAX_COMBINING_MARKS:
+            raise InputError(
+                f"{location}: expected at most {_MAX_COMBINING_MARKS} combining marks in succession, got more"
+            )
+    if _WIDE_CHARACTERS.search(text):
+        raise InputError(f"{location}: expected no characters that cover others, got {quote(text)}")
 
 
 def check_row(row: Any, location: str) -> None:

@@ -248,6 +248,25 @@ def find_own_modules(text: str) -> dict[str, ModuleText]:
     return dict(sorted(collector.modules.items()))
 
 
+def is_own_module(name: str) -> bool:
+    """Return whether an import would load a module outside Python, robocov and all installed packages.
+
+    Unlike `find_own_modules`, this includes modules without source code, such as extension modules.
+
+    Parameters
+    ----------
+    name : str
+        Name of a module or package on ``sys.path``, without dots.
+
+    Returns
+    -------
+    bool
+    """
+    importlib.invalidate_caches()
+    spec = PathFinder.find_spec(name)
+    return spec is not None and _is_own(spec)
+
+
 class _ModuleCollector:
     """Collects modules that are neither installed nor a part of Python or robocov."""
 

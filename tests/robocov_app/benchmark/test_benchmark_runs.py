@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import gzip
 import html
 import json
@@ -26,7 +27,7 @@ from small_studies import HEAD, PULL, DirectExecutor
 
 from robocov.controllers import Adaptive, get_gain_values, load_controller_class
 from robocov.errors import InputError
-from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark import pareto_plots, ratings, suite
 from robocov_app.benchmark.anomalies import find_anomalies
 from robocov_app.benchmark.label_placement import place_labels
 from robocov_app.benchmark.learned import Learned
@@ -495,6 +496,18 @@ def test_unranked_entries_with_the_smallest_gap_are_named() -> None:
     assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
 
 
+@pytest.mark.usefixtures("without_plots")
+def test_files_do_not_hide_bundled_entries_with_the_smallest_gap() -> None:
+    results = load_results_of("atlas-shared", "rapf")
+    forged = copy.deepcopy(results[1])
+    forged["is_bundled"] = False
+    for row in forged["rows"]:
+        row["gap"] = 0.0
+    page = build_page([*results, forged], "Test")
+    assert "Of the built-in controllers that do not know the whole map" in page
+    assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
+
+
 def test_teams_that_never_move_or_end_far_above_rapf_are_found() -> None:
     def build_result(costs: list[float], path_length: float = 5.0) -> dict[str, Any]:
         rows = [
@@ -770,6 +783,61 @@ def test_files_do_not_remove_bundled_results_from_plots() -> None:
     assert "Short" not in drawn and "Long" not in drawn
     shorts = "; ".join(f"Short {k}*" for k in range(5))
     assert f"because they are far from all others: {shorts}; Long*; Far*." in note
+
+
+@pytest.mark.usefixtures("short_ideal_track")
+def test_files_do_not_squeeze_bundled_results_in_plots() -> None:
+    bundled = [build_bundled_rapf(), build_result("Bundled", 0.5, is_bundled=True)]
+    results = {name: build_result(name, 0.1) for name in ("Short", "Long", "Near", "Still")}
+    path_lengths = {"Short": 2.0, "Long": 40.0, "Near": 3.0, "Still": 0.0}
+    for name, result in results.items():
+        for row in result["rows"]:
+            row["path_length_m"] = path_lengths[name]
+    results["High"] = build_result("High", 2.1)
+    page = build_page([*results.values(), *bundled], "Test")
+    (path_plot,) = re.findall(r"<figcaption>Gap and path length</figcaption>.*?</figure>", page)
+    drawn, _, note = path_plot.partition("</svg>")
+    assert all(f">{label}</text>" in drawn for label in ("RAPF", "Bundled", "Near*"))
+    # The median paths of the bundled results are 8.3 and 8.5 m, and their largest gap is 50%.
+    far_labels = note.partition("far from all others: ")[2].partition(".")[0].split("; ")
+    assert sorted(far_labels) == ["High*", "Long*", "Short*", "Still*"]
+
+
+def test_points_at_zero_on_a_logarithmic_axis_are_named() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    points = [ParetoPoint(style, f"{x:g}", x, 1.0, is_rival=True) for x in (0.0, 1.0, 9.0)]
+    drawn, zeros = pareto_plots._split_zeros(points)
+    assert [point.label for point in drawn] == ["1", "9"] and [point.label for point in zeros] == ["0"]
+    assert pareto_plots._split_zeros(points[:2]) == (points[:2], [])
+
+
+def test_files_change_neither_the_front_nor_the_marks_of_bundled_results() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    bundled = [
+        ParetoPoint(style, "Short", 5.0, 20.0, is_rival=True, is_bundled=True),
+        ParetoPoint(style, "Good", 9.0, 3.0, is_rival=True, is_bundled=True),
+    ]
+    files = [
+        ParetoPoint(style, "Better*", 4.0, 1.0, is_rival=True),
+        ParetoPoint(style, "Same*", 9.0, 3.0, is_rival=True),
+    ]
+    lines = draw_pareto_figure([*bundled, *files], "bytes").axes[0].lines
+    # The first line is the front. Marks that are drawn later cover others.
+    points = [line.get_xydata().tolist() for line in lines]
+    assert points[0] == [[5.0, 20.0], [9.0, 3.0]]
+    assert points[1:] == [[[4.0, 1.0]], [[9.0, 3.0]], [[5.0, 20.0]], [[9.0, 3.0]]]
+    assert draw_pareto_figure(files, "bytes").axes[0].lines[0].get_xydata().tolist() == [[4.0, 1.0]]
+
+
+def test_files_with_equal_values_do_not_remove_bundled_results() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    bundled = [
+        ParetoPoint(style, f"{gap}", 1200.0, gap, is_rival=True, is_bundled=True) for gap in (1.0, 2.0)
+    ]
+    files = [ParetoPoint(style, f"{gap}*", 1200.0, gap, is_rival=True) for gap in (0.1, 0.2, 0.3)]
+    drawn, omitted = thin_out_equal_values([*bundled, *files])
+    assert [point.label for point in drawn] == ["1.0", "2.0", "0.1*"]
+    assert [point.label for point in omitted] == ["0.2*", "0.3*"]
 
 
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")

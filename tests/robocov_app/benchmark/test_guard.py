@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import py_compile
 import subprocess
 import sys
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 import pytest
@@ -30,6 +32,7 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.ir import Loc
 
 FOLDER = sys.argv[1]
+sys.path.append(sys.argv[2])
 CACHE = os.environ["NUMBA_CACHE_DIR"]
 REFERENCES = str(suite.SUITE_FILE)
 violations = []
@@ -93,6 +96,12 @@ def import_missing_module():
     except ImportError:
         pass
 
+def import_invalid_module(name):
+    try:
+        importlib.import_module(name)
+    except ImportError:
+        pass
+
 ATTEMPTS = {
     "write by the cache of numba": lambda: IndexDataCacheFile(FOLDER, "a", 1).save("k", b"data"),
     "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
@@ -106,6 +115,7 @@ ATTEMPTS = {
     "create a FIFO": lambda: os.mkfifo(f"{FOLDER}/a"),
     "create a FIFO by another module": create_fifo_by_posix,
     "create a node": lambda: os.mknod(f"{FOLDER}/c"),
+    "start a process group": lambda: os.setpgrp(),
     "set the priority": lambda: os.setpriority(os.PRIO_PROCESS, 0, 1),
     "set the affinity": lambda: os.sched_setaffinity(0, os.sched_getaffinity(0)),
     "create a semaphore": create_semaphore,
@@ -120,6 +130,8 @@ ATTEMPTS = {
     "look for installed packages": lambda: entry_points(group="robocov"),
     "look for a module": lambda: importlib.util.find_spec("robocov.no_such_module"),
     "import a missing module": import_missing_module,
+    "import a module without source": lambda: importlib.import_module("robocov_test_bytecode"),
+    "import an extension module": lambda: import_invalid_module("robocov_test_extension"),
     "prepare parallel loops": lambda: import_numba().set_num_threads(1),
     "write to the own cache by numba": lambda: IndexDataCacheFile(CACHE, "a", 1).save("k", b"data"),
 }
@@ -140,17 +152,31 @@ ALLOWED = (
     "look for installed packages",
     "look for a module",
     "import a missing module",
+    "import a module without source",
+    "import an extension module",
     "prepare parallel loops",
     "write to the own cache by numba",
 )
 
 
+def build_modules_without_source(folder: Path) -> list[Path]:
+    """Create a module of bytecode, and an extension module that is invalid, and return their files."""
+    source = folder.parent / "robocov_test_bytecode.py"
+    source.write_text("")
+    bytecode = folder / "robocov_test_bytecode.pyc"
+    py_compile.compile(str(source), cfile=str(bytecode))
+    extension = folder / f"robocov_test_extension{EXTENSION_SUFFIXES[0]}"
+    extension.write_bytes(b"")
+    return [bytecode, extension]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="calls functions that only Linux has")
 def test_channels_are_reported(tmp_path: Path) -> None:
-    for name in ("shared", "cache"):
+    for name in ("shared", "cache", "modules"):
         (tmp_path / name).mkdir()
+    modules = build_modules_without_source(tmp_path / "modules")
     process = subprocess.run(
-        [sys.executable, "-c", CODE, str(tmp_path / "shared")],
+        [sys.executable, "-c", CODE, str(tmp_path / "shared"), str(tmp_path / "modules")],
         env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
         capture_output=True,
         text=True,
@@ -163,6 +189,8 @@ def test_channels_are_reported(tmp_path: Path) -> None:
     assert list((tmp_path / "shared").iterdir()) == []
     # Opening a folder for reading is no violation, but is reported.
     assert str(tmp_path / "shared") in found["readings"]
+    # A result does not identify modules without source code, so they are reported, too.
+    assert set(map(str, modules)) <= set(found["readings"])
     assert all(reading.startswith(str(tmp_path)) for reading in found["readings"])
 
 

@@ -54,8 +54,8 @@ def test_an_unchanged_entry_is_read(tmp_path: Path) -> None:
     read_changed_entry(lambda result: None, tmp_path / "result.json")
 
 
-def test_a_label_needs_only_one_visible_character(tmp_path: Path) -> None:
-    for label in ("🤖", "制", "\u3164a"):
+def test_labels_in_all_scripts_need_only_one_visible_character(tmp_path: Path) -> None:
+    for label in ("🤖", "制", "\u3164a", "Tiếng Việt", "שָׁלוֹם", "ที่นี่", "1\ufe0f\u20e3"):
         read_changed_entry(change_part("entry", label=label), tmp_path / "result.json")
 
 
@@ -120,6 +120,18 @@ def test_a_label_needs_only_one_visible_character(tmp_path: Path) -> None:
         (
             change_part("entry", label="\u2800\u3164"),
             "entry: label: expected 1 to 60 characters, some of them visible",
+        ),
+        (
+            change_part("entry", label="A" + 5 * "\u0301"),
+            "entry: label: expected at most 3 combining marks in succession, got more",
+        ),
+        (
+            change_part("entry", set={"pull": "a" + 4 * "\u0489"}),
+            "entry: set: expected at most 3 combining marks in succession, got more",
+        ),
+        (
+            change_part("entry", label="Mine\u2e3b"),
+            "entry: label: expected no characters that cover others, got",
         ),
         (change_part("entry", controller="x" * 201), "entry: controller: expected strings of at most 200"),
         (

@@ -122,6 +122,34 @@ class Mine:
 """
 """Robots send what they learn from a variable of the module; the forces follow from the messages."""
 
+HIDDEN_DATA = """
+import math
+
+import numpy as np
+
+READ = []
+
+@dataclass(frozen=True)
+class Mine:
+    def begin(self, number, team):
+        loss = -math.expm1(-team.viscosity[number] / team.mass[number] / 60)
+        return loss, loss / team.viscosity[number], None
+
+    def force(self, own):
+        loss, gain, previous = own.memory
+        force = 0.2 * (own.centroid - own.position)
+        if previous is not None:
+            velocities = 60 * (own.neighbors - previous)
+            numbers = np.round(1e10 * (velocities[:, 0] - np.round(velocities[:, 0], 6))).astype(int)
+            READ.append(numbers.tolist())
+            force = force + 0.01 * numbers.sum()
+        own.memory = loss, gain, own.neighbors
+        velocity = np.round(own.velocity + gain * force - loss * own.velocity, 6)
+        velocity[0] += 1e-10 * (own.number + 1)
+        return (velocity - own.velocity + loss * own.velocity) / gain
+"""
+"""Robots with the information own hide their numbers in the last digits of their velocities."""
+
 IMPORTS = HEAD.partition("@dataclass")[0]
 
 
@@ -228,6 +256,17 @@ def test_hidden_knowledge_changes_the_decisions_of_an_isolated_robot(code: str, 
     (difference,) = isolate(f"{tmp_path / 'mine.py'}:Mine", "short-range", [2])
     assert "robot 3 decides differently from" in difference
     assert difference.endswith("if its process receives only its own observations")
+
+
+def test_data_hidden_in_motion_is_not_detected(tmp_path: Path) -> None:
+    """The handbook names this limit of verifications."""
+    (tmp_path / "mine.py").write_text(IMPORTS + HIDDEN_DATA)
+    _, team, deciders = run_isolated(build_task(f"{tmp_path / 'mine.py'}:Mine", "ideal"), [2])
+    assert team.differences == []
+    controller: Any = deciders[2]._program._caller.controller
+    read = controller.controller.force.__globals__["READ"]
+    # Robot 3 reads the numbers of the others.
+    assert read[-1] == [1, 2, 4, 5, 6]
 
 
 @pytest.mark.parametrize("track", ["ideal", "short-range", "lossy"])
@@ -647,6 +686,27 @@ def test_p_values_are_the_probabilities_of_ranks() -> None:
     assert comparison is not None
     assert comparison.p_value == pytest.approx(3 / 9)
     assert comparison.min_p_value == pytest.approx(1 / 9)
+
+
+@pytest.mark.parametrize(("known_count", "detected_count"), [(1, 1), (2, 1)])
+def test_most_controllers_that_know_some_of_the_maps_are_not_detected(
+    known_count: int, detected_count: int
+) -> None:
+    """The handbook names this limit. Five families have three maps each, on some of which the gap is 0."""
+    families = ("blocks", "rooms", "polygons", "mazes", "caves")
+    unknown_gaps = [1.0, 2.0][: 3 - known_count]
+    rows = [
+        {"track": "lossy", "map": f"{family}-{7001 + k}", "seed": 0, "gap": gap}
+        for family in families
+        for k, gap in enumerate([*[0.0] * known_count, *unknown_gaps])
+    ]
+    # On a new map, all ranks among the gaps on the unknown maps are equally likely.
+    possible_gaps = [gap + 0.5 for gap in (0.0, *unknown_gaps)]
+    comparisons = [
+        compare_gaps(rows, list(zip(families, gaps, strict=True)), "lossy", np.random.default_rng(0))
+        for gaps in product(possible_gaps, repeat=5)
+    ]
+    assert sum(comparison is not None and comparison.is_worse for comparison in comparisons) == detected_count
 
 
 def test_the_gap_on_a_map_is_that_of_a_single_run() -> None:
