@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from robocov_app.benchmark import ratings, suite
-from robocov_app.benchmark.ratings import Rating, build_ratings
+from robocov_app.benchmark.ratings import Rating, build_ratings, get_run_key
 from robocov_app.benchmark.results import ENTRIES, load_bundled_results, read_result
 from robocov_app.replication.claims.thresholds import MAX_GAP, MAX_MAP_GAP, MIN_AT_REST
 
@@ -162,6 +163,9 @@ def test_the_effect_of_the_factors_of_the_score_agrees_with_the_entries(
         for track in ("lossy", "noisy")
     }
     assert f"in {contacts['lossy']} of 30 runs on Lossy and in {contacts['noisy']} on Noisy" in text
+    core_rows = [row for row in oracle_rows if row["track"] in core]
+    best_count = sum(row["gap"] <= 0.002 for row in core_rows)
+    assert f"in {best_count} of {len(core_rows)} runs (gap of at most 0.2%)" in text
 
 
 FAILURES_PAGE = Path(__file__).parents[3] / "app/handbook/where-controllers-fail.md"
@@ -202,6 +206,31 @@ def test_failures_agree_with_the_entries(track: str, map_name: str) -> None:
     )
     row = f"| {suite.format_heading(track)} | {map_name} | {' | '.join(cells)} |"
     assert f"{row}\n" in FAILURES_PAGE.read_text(encoding="utf-8")
+
+
+def read_ideal_rows(controller: str) -> dict[tuple[str, int], dict[str, Any]]:
+    """Return the rows of a controller on the track Ideal, by map and seed."""
+    rows = read_result(ENTRIES / f"{controller}.json.gz")["rows"]
+    return {get_run_key(row): row for row in rows if row["track"] == "ideal"}
+
+
+def test_unsettled_runs_of_atlas_agree_with_the_entries() -> None:
+    families = ("blocks", "offices", "plants")
+    rows = [row for row in read_ideal_rows("atlas").values() if suite.FAMILY_OF[row["map"]] in families]
+    count = sum(row["settled_at_s"] is None for row in rows)
+    text = " ".join(FAILURES_PAGE.read_text(encoding="utf-8").split())
+    assert f"{count} of {len(rows)} runs in the families blocks, offices and plants have not settled" in text
+
+
+def test_paths_of_greedy_submodular_agree_with_the_entries() -> None:
+    shared = read_ideal_rows("atlas-shared")
+    count = 0
+    for key, row in read_ideal_rows("greedy-submodular").items():
+        is_shorter = row["path_length_m"] < shared[key]["path_length_m"]
+        count += is_shorter and row["mean_distance_m"] <= 1.01 * shared[key]["mean_distance_m"]
+    text = " ".join(FAILURES_PAGE.read_text(encoding="utf-8").split())
+    expected = f"In {count} of {len(shared)} runs on the track Ideal, `greedy-submodular` has a shorter path"
+    assert expected in text
 
 
 def test_path_lengths_of_atlas_agree_with_the_entries() -> None:
