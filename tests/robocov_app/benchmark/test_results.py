@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
+from robocov.controllers import Adaptive, get_gain_values
 from robocov.errors import InputError
 from robocov.files.strictjson import MAX_BYTES
-from robocov_app.benchmark.results import ENTRIES, read_result
+from robocov_app.benchmark.results import ENTRIES, RESULT_FILE, load_bundled_results, read_result
 
 Change = Callable[[dict[str, Any]], object]
 
@@ -133,6 +134,9 @@ def test_labels_in_all_scripts_need_only_one_visible_character(tmp_path: Path) -
             change_part("entry", label="Mine\u2e3b"),
             "entry: label: expected no characters that cover others, got",
         ),
+        (change_part("entry", label=" "), "entry: label: expected 1 to 60 characters, some of them visible"),
+        (change_part("entry", label="W" * 61), "entry: label: expected 1 to 60 characters, some of them"),
+        (change_first_row(work_J=1e30), "rows[0]: work_J: expected at most 1e+15, got 1e+30"),
         (change_part("entry", controller="x" * 201), "entry: controller: expected strings of at most 200"),
         (
             change_part("entry", gains={f"gain {k}": 1.0 for k in range(201)}),
@@ -157,3 +161,21 @@ def test_a_compressed_file_is_read_only_up_to_the_maximum_size(
     monkeypatch.setattr("gzip.decompress", lambda _: pytest.fail("decompressed without a limit"))
     with pytest.raises(InputError, match="expected at most 50 MB, got more"):
         read_result(path)
+
+
+def test_former_names_in_results_are_updated(tmp_path: Path) -> None:
+    content = gzip.decompress((ENTRIES / "adaptive.json.gz").read_bytes()).decode()
+    path = tmp_path / "result.json"
+    path.write_text(content.replace('"min_density"', '"least"').replace("sent_bytes", "told_bytes"))
+    result = read_result(path)
+    assert any(sentence.startswith("sent_bytes: ") for sentence in result["method"])
+    assert result["entry"]["gains"] == get_gain_values(Adaptive())
+    for row in result["rows"]:
+        assert "error" in row or (row["sent_bytes"] > 0.0 and "told_bytes" not in row)
+
+
+def test_no_file_contains_a_bundled_result(tmp_path: Path) -> None:
+    result = json.loads(gzip.decompress((ENTRIES / "rapf.json.gz").read_bytes()))
+    (tmp_path / RESULT_FILE).write_text(json.dumps({**result, "is_bundled": True}))
+    assert read_result(tmp_path)["is_bundled"] is False
+    assert all(result["is_bundled"] for result in load_bundled_results())

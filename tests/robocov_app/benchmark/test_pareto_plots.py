@@ -1,0 +1,114 @@
+"""Pareto plots of the page: the front, the choice of points, and the placement of labels."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from robocov_app.benchmark import pareto_plots
+from robocov_app.benchmark.label_placement import place_labels
+from robocov_app.benchmark.pareto_plots import (
+    ParetoPoint,
+    draw_pareto_figure,
+    find_pareto_front,
+    thin_out_equal_values,
+)
+from robocov_app.look.curve_styles import choose_curve_styles
+
+LABELED_POINTS = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_size=3, max_size=16))
+
+
+@given(st.lists(LABELED_POINTS, min_size=2, max_size=4))
+def test_labels_of_a_few_points_do_not_overlap(given_points: list[tuple[float, float, str]]) -> None:
+    marks = np.array([(x, y) for x, y, _ in given_points])
+    labels = [label for _, _, label in given_points]
+    centers = place_labels(marks, labels, (0.0, 0.0, 600.0, 360.0))
+    half_sizes = np.array([(3.0 * len(label), 6.5) for label in labels])
+    for k, j in combinations(range(len(labels)), 2):
+        gaps = np.abs(centers[k] - centers[j]) - half_sizes[k] - half_sizes[j]
+        assert gaps.max() > -1e-6
+
+
+def test_labels_are_next_to_the_marks_of_a_figure() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    points = [
+        ParetoPoint(style, "Near", x=1200.0, gap=30.0, is_rival=True),
+        ParetoPoint(style, "Far", x=3800.0, gap=0.5, is_rival=True),
+    ]
+    figure = draw_pareto_figure(points, "bytes")
+    (axes,) = figure.axes
+    FigureCanvasAgg(figure).draw()
+    for point, text in zip(points, axes.texts, strict=True):
+        assert text.get_text() == point.label
+        mark = axes.transData.transform((point.x, point.gap))
+        box = text.get_window_extent()
+        distance = np.linalg.norm(np.clip(mark, box.min, box.max) - mark)
+        assert distance < 20.0
+        assert axes.bbox.contains(*box.min) and axes.bbox.contains(*box.max)
+
+
+def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    equal = [
+        ParetoPoint(style, f"{gap}", 1200.0, gap, is_rival=gap > 2.0) for gap in (5.0, 4.0, 3.0, 2.0, 1.0)
+    ]
+    other = ParetoPoint(style, "other", 1210.0, 9.0, is_rival=True)
+    drawn, omitted = thin_out_equal_values([*equal, other])
+    assert [point.label for point in drawn] == ["3.0", "1.0", "other"]
+    assert [point.label for point in omitted] == ["2.0", "4.0", "5.0"]
+    assert thin_out_equal_values([*equal[1:], other]) == ([*equal[1:], other], [])
+    # No result from a file replaces a bundled one.
+    bundled = ParetoPoint(style, "bundled", 1200.0, 6.0, is_rival=True, is_bundled=True)
+    drawn, _ = thin_out_equal_values([*equal, bundled, other])
+    assert [point.label for point in drawn] == ["3.0", "1.0", "bundled", "other"]
+
+
+def test_points_at_zero_on_a_logarithmic_axis_are_named() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    points = [ParetoPoint(style, f"{x:g}", x, 1.0, is_rival=True) for x in (0.0, 1.0, 9.0)]
+    drawn, zeros = pareto_plots._split_zeros(points)
+    assert [point.label for point in drawn] == ["1", "9"] and [point.label for point in zeros] == ["0"]
+    assert pareto_plots._split_zeros(points[:2]) == (points[:2], [])
+
+
+def test_files_change_neither_the_front_nor_the_marks_of_bundled_results() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    bundled = [
+        ParetoPoint(style, "Short", 5.0, 20.0, is_rival=True, is_bundled=True),
+        ParetoPoint(style, "Good", 9.0, 3.0, is_rival=True, is_bundled=True),
+    ]
+    files = [
+        ParetoPoint(style, "Better*", 4.0, 1.0, is_rival=True),
+        ParetoPoint(style, "Same*", 9.0, 3.0, is_rival=True),
+    ]
+    lines = draw_pareto_figure([*bundled, *files], "bytes").axes[0].lines
+    # The first line is the front. Marks that are drawn later cover others.
+    points = [line.get_xydata().tolist() for line in lines]
+    assert points[0] == [[5.0, 20.0], [9.0, 3.0]]
+    assert points[1:] == [[[4.0, 1.0]], [[9.0, 3.0]], [[5.0, 20.0]], [[9.0, 3.0]]]
+    assert draw_pareto_figure(files, "bytes").axes[0].lines[0].get_xydata().tolist() == [[4.0, 1.0]]
+
+
+def test_files_with_equal_values_do_not_remove_bundled_results() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    bundled = [
+        ParetoPoint(style, f"{gap}", 1200.0, gap, is_rival=True, is_bundled=True) for gap in (1.0, 2.0)
+    ]
+    files = [ParetoPoint(style, f"{gap}*", 1200.0, gap, is_rival=True) for gap in (0.1, 0.2, 0.3)]
+    drawn, omitted = thin_out_equal_values([*bundled, *files])
+    assert [point.label for point in drawn] == ["1.0", "2.0", "0.1*"]
+    assert [point.label for point in omitted] == ["0.2*", "0.3*"]
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
+def test_no_point_dominates_the_pareto_front(points: list[tuple[int, int]]) -> None:
+    front = {points[k] for k in find_pareto_front(points)}
+    dominated = set()
+    for x, y in points:
+        if any(u <= x and v <= y and (u, v) != (x, y) for u, v in points):
+            dominated.add((x, y))
+    assert front == set(points) - dominated
