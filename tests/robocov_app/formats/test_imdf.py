@@ -129,7 +129,7 @@ def test_units_are_free_and_joined_through_openings(tmp_path: Path, kind: str) -
     assert free.contains(box(4.05, 11.8, 5.45, 12.2))
     assert foreign.name == "Old mill"
     assert "level 0 ('EG') of 0, 1 (--level)" in foreign.notes
-    assert "stairs, lifts and openings to the floor below treated as solid: 1" in foreign.notes
+    assert "stairs, elevators and openings to the floor below treated as solid: 1" in foreign.notes
 
 
 def test_an_imported_venue_is_a_map(tmp_path: Path) -> None:

@@ -356,7 +356,7 @@ def test_rooms_of_a_level_are_free_and_joined_by_doors(tmp_path: Path) -> None:
     assert corridor.contains(box(4.42, 3.9, 5.58, 4.1))
     assert not free.intersects(box(1, 3.98, 4.38, 4.02)) and not free.intersects(box(5.62, 3.98, 9, 4.02))
     assert "level 0 of 0, 1, 2 (--level)" in foreign.notes
-    assert "stairs and lifts treated as solid: 1" in foreign.notes
+    assert "stairs and elevators treated as solid: 1" in foreign.notes
 
 
 def test_rooms_without_doors_are_open_to_adjacent_spaces(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Plans of large buildings and tunnels, 30 to 60 m long, drawn after real kinds of places.
+"""Plans of large buildings and tunnels, 30 to 60 m long, modeled on real kinds of places.
 
 Each module draws one kind of plan in four layouts, which consecutive seeds select in turn.
 """

@@ -1,4 +1,4 @@
-"""Office floors: a core with lifts and stairs, a corridor around it, cells, meeting rooms and open spaces."""
+"""Office floors: a core with elevators and stairs, a corridor, cells, meeting rooms and open spaces."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _CORE_WALL_M = 0.25
 """Thickness of the walls around the core."""
 _COLUMN_SIDE_M = 0.5
 _LOBBY_WIDTH_M = 3.2
-_LIFT_WIDTH_M = 2.2
-_LIFT_DEPTH_M = 2.4
-_LIFT_DOOR_M = 1.2
-_LIFT_NICHE_M = 0.35
-"""Depth of the niche in front of the door of a lift."""
+_ELEVATOR_WIDTH_M = 2.2
+_ELEVATOR_DEPTH_M = 2.4
+_ELEVATOR_DOOR_M = 1.2
+_ELEVATOR_NICHE_M = 0.35
+"""Depth of the niche in front of the door of an elevator."""
 _DESK_DEPTH_M = 1.6
 """Depth of two desks that face each other."""
 _DESK_WIDTH_M = 1.6
@@ -36,7 +36,7 @@ _SHORT_BENCH_PROBABILITY = 0.25
 _RECESS_MARGIN_M = 0.7
 """Minimum distance of furniture from a recess in the facade."""
 _LONG_SPACE_M = 30.0
-"""Length above which an open space has telephone boxes."""
+"""Length above which an open space has phone boothes."""
 _USES = (
     {"south": "open", "north": "cells", "west": "cells", "east": "meeting"},
     {"south": "open", "north": "cells", "west": "open", "east": "meeting"},
@@ -101,12 +101,12 @@ def _choose_recess(rng: np.random.Generator, floor: _Floor, layout: int) -> shap
 
 
 def _draw_core(rng: np.random.Generator, drawing: Drawing, floor: _Floor) -> None:
-    """Draw the core: a lift lobby between two banks of lifts, and rooms on both sides in two rows."""
+    """Draw the core: a lobby between two banks of elevators, and rooms on both sides in two rows."""
     left, bottom, right, top = floor.core
     middle_x = (left + right) / 2.0
     for side in (-1, 1):
         lobby_x = middle_x + side * _LOBBY_WIDTH_M / 2.0
-        drawing.add_polygon(_outline_lifts(lobby_x, side, bottom, top))
+        drawing.add_polygon(_outline_elevators(lobby_x, side, bottom, top))
     for is_right, end in ((False, left), (True, right)):
         _draw_core_end(rng, drawing, floor, end, is_right=is_right)
 
@@ -114,11 +114,11 @@ def _draw_core(rng: np.random.Generator, drawing: Drawing, floor: _Floor) -> Non
 def _draw_core_end(
     rng: np.random.Generator, drawing: Drawing, floor: _Floor, end: float, *, is_right: bool
 ) -> None:
-    """Draw the rooms between the lifts and one end of the core, whose x is `end`."""
+    """Draw the rooms between the elevators and one end of the core, whose x is `end`."""
     left, bottom, right, top = floor.core
     middle_y = (bottom + top) / 2.0
     side = 1 if is_right else -1
-    inner = (left + right) / 2.0 + side * (_LOBBY_WIDTH_M / 2.0 + _LIFT_DEPTH_M)
+    inner = (left + right) / 2.0 + side * (_LOBBY_WIDTH_M / 2.0 + _ELEVATOR_DEPTH_M)
     drawing.add_wall((end, bottom), (end, top), thickness=_CORE_WALL_M)
     drawing.add_wall((end, middle_y), (inner, middle_y), thickness=_CORE_WALL_M)
     for edge, is_upper in ((bottom, False), (top, True)):
@@ -129,20 +129,20 @@ def _draw_core_end(
         _draw_core_row(rng, part, abs(inner - end), abs(middle_y - edge), has_stairs=has_stairs)
 
 
-def _outline_lifts(lobby_x: float, side: int, bottom: float, top: float) -> list[Point]:
-    """Return the outline of a solid bank of lifts, with a niche in front of the door of each lift.
+def _outline_elevators(lobby_x: float, side: int, bottom: float, top: float) -> list[Point]:
+    """Return the outline of a solid bank of elevators, with a niche in front of the door of each elevator.
 
     The bank is on the left of the lobby if `side` is -1, and on its right if `side` is 1.
     """
-    lifts = int((top - bottom - 1.0) / _LIFT_WIDTH_M)
-    back_x = lobby_x + side * _LIFT_DEPTH_M
+    elevators = int((top - bottom - 1.0) / _ELEVATOR_WIDTH_M)
+    back_x = lobby_x + side * _ELEVATOR_DEPTH_M
     points = [(back_x, bottom), (lobby_x, bottom)]
-    pitch = (top - bottom) / lifts
-    for number in range(lifts):
+    pitch = (top - bottom) / elevators
+    for number in range(elevators):
         middle = bottom + (number + 0.5) * pitch
-        low = middle - _LIFT_DOOR_M / 2.0
-        high = middle + _LIFT_DOOR_M / 2.0
-        niche_x = lobby_x + side * _LIFT_NICHE_M
+        low = middle - _ELEVATOR_DOOR_M / 2.0
+        high = middle + _ELEVATOR_DOOR_M / 2.0
+        niche_x = lobby_x + side * _ELEVATOR_NICHE_M
         points += [(lobby_x, low), (niche_x, low), (niche_x, high), (lobby_x, high)]
     return [*points, (lobby_x, top), (back_x, top)]
 
@@ -150,7 +150,7 @@ def _outline_lifts(lobby_x: float, side: int, bottom: float, top: float) -> list
 def _draw_core_row(
     rng: np.random.Generator, part: Drawing, length: float, depth: float, *, has_stairs: bool
 ) -> None:
-    """Draw a row of rooms from the end of the core to the lifts; the first has stairs or toilets."""
+    """Draw a row of rooms from the end of the core to the elevators; the first has stairs or toilets."""
     first_end = 3.2 if has_stairs else 3.8
     partitions = [0.0, first_end, *divide_evenly(first_end, length, 4.2)[1:].tolist()]
     doors = _find_middles(partitions)
@@ -252,7 +252,7 @@ def _draw_open_space(
 ) -> None:
     """Draw an open space: columns along the corridor, and rows of desks at right angles to it.
 
-    In a long open space, some rows are replaced by a telephone box and a round table. There are no desks near
+    In a long open space, some rows are replaced by a phone booth and a round table. There are no desks near
     the recess in the facade.
     """
     for x in divide_evenly(0.0, length, _COLUMN_DISTANCE_M)[1:-1].tolist():

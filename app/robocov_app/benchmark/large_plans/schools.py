@@ -32,8 +32,8 @@ _FOUR_ROWS_PITCH_M = 1.6
 _THREE_ROWS_PITCH_M = 2.0
 _STAIRS_LENGTH_M = 2.6
 """Length of the stairs at the end of a wing."""
-_STORE_WIDTH_M = 3.2
-"""Width of the store of the gym."""
+_STORAGE_WIDTH_M = 3.2
+"""Width of the storage room of the gym."""
 _DOUBLE_WING_WIDTH_M = 2.0 * _CLASS_DEPTH_M + _CORRIDOR_WIDTH_M
 """Width of a wing with classrooms on both sides of its corridor."""
 _SINGLE_WING_WIDTH_M = _CLASS_DEPTH_M + _CORRIDOR_WIDTH_M
@@ -214,9 +214,9 @@ def _draw_gym_and_assembly_hall(drawing: Drawing, length: float, depth: float) -
 
 
 def _list_hall_doors(gym_end: float, assembly_end: float) -> list[float]:
-    """Return the x of the doors from the hall to the gym, its store, and the assembly hall."""
+    """Return the x of the doors from the hall to the gym, its storage room, and the assembly hall."""
     middle = (gym_end + assembly_end) / 2.0
-    return [gym_end * 0.5, gym_end - _STORE_WIDTH_M / 2.0, middle - 2.5, middle + 2.5]
+    return [gym_end * 0.5, gym_end - _STORAGE_WIDTH_M / 2.0, middle - 2.5, middle + 2.5]
 
 
 def _add_hall_wall(part: Drawing, length: float, doors: list[float]) -> None:
@@ -227,15 +227,19 @@ def _add_hall_wall(part: Drawing, length: float, doors: list[float]) -> None:
 
 
 def _draw_gym(part: Drawing, end: float, depth: float) -> None:
-    """Draw a gym with benches for spectators, and a store with equipment on its right."""
-    store = end - _STORE_WIDTH_M
+    """Draw a gym with benches for spectators, and a storage room for equipment on its right."""
+    storage_left = end - _STORAGE_WIDTH_M
     part.add_wall_with_doors(
-        (store, 0.0), (store, depth), [depth * 0.5], width=_HALL_DOOR_WIDTH_M, thickness=_WALL_THICKNESS_M
+        (storage_left, 0.0),
+        (storage_left, depth),
+        [depth * 0.5],
+        width=_HALL_DOOR_WIDTH_M,
+        thickness=_WALL_THICKNESS_M,
     )
     part.add_partitions([end], depth, thickness=_WALL_THICKNESS_M)
     part.add_block(end - 1.0, depth * 0.25, end, depth * 0.45)
     part.add_block(end - 1.0, depth * 0.6, end, depth * 0.85)
-    part.add_block(1.2, depth - 0.8, store - 1.2, depth)
+    part.add_block(1.2, depth - 0.8, storage_left - 1.2, depth)
     part.add_block(0.0, depth * 0.35, 0.6, depth * 0.65)
 
 

@@ -25,15 +25,15 @@ _BED_PITCH_M = 1.6
 _BED_MARGIN_M = 0.7
 """Distance of the first bed from the facade."""
 _TWO_BEDS_PROBABILITY = 0.6
-_STORE_WALL_THICKNESS_M = 0.2
-_STORE_DOOR_M = 2.6
-"""Distance of the middle of the store's door from the outer wall."""
-_STORE_SHELF_DEPTH_M = 0.7
+_STORAGE_WALL_THICKNESS_M = 0.2
+_STORAGE_DOOR_M = 2.6
+"""Distance of the middle of the door of the storage room from the outer wall."""
+_STORAGE_SHELF_DEPTH_M = 0.7
 _HUB_CORNER_M = 4.0
-"""Width of the lifts, the stairs and the store in the corners of the hub."""
-_LIFT_WIDTH_M = 2.2
-_LIFT_DOOR_M = 1.2
-_LIFT_NICHE_M = 0.4
+"""Width of the elevators, the stairs and the storage room in the corners of the hub."""
+_ELEVATOR_WIDTH_M = 2.2
+_ELEVATOR_DOOR_M = 1.2
+_ELEVATOR_NICHE_M = 0.4
 _STAIRS_WIDTH_M = 1.5
 _COUNTER_OFFSET_M = 2.0
 """Distance of the counter of the nurse station from its middle."""
@@ -88,7 +88,7 @@ class _Wing:
 
 
 def draw_ward(rng: np.random.Generator, layout: int) -> FloorPlan:
-    """Draw a ward: two to four wings around a hub with a nurse station, lifts and stairs."""
+    """Draw a ward: two to four wings around a hub with a nurse station, elevators and stairs."""
     depth = rng.uniform(6.0, 6.5)
     corridor = rng.uniform(2.3, 2.6)
     half_hub = depth + corridor / 2.0
@@ -113,20 +113,20 @@ def draw_ward(rng: np.random.Generator, layout: int) -> FloorPlan:
 
 
 def _draw_hub(drawing: Drawing, half_hub: float) -> None:
-    """Draw the hub: a nurse station in its middle, and lifts, stairs and a store in its corners."""
+    """Draw the hub: a nurse station in the middle; elevators, stairs and a storage room in the corners."""
     _draw_nurse_station(drawing)
     inner = half_hub - _HUB_CORNER_M
-    drawing.add_polygon(_outline_lifts(half_hub, inner))
+    drawing.add_polygon(_outline_elevators(half_hub, inner))
     # Stairs: two flights with a landing between them.
     drawing.add_block(inner, half_hub - _STAIRS_WIDTH_M, half_hub, half_hub)
     drawing.add_block(inner, inner, half_hub - _STAIRS_WIDTH_M, inner + _STAIRS_WIDTH_M)
-    # A store with a shelf.
+    # A storage room with a shelf.
     drawing.add_wall_with_doors(
-        (-half_hub, -inner), (-inner, -inner), [_STORE_DOOR_M], thickness=_STORE_WALL_THICKNESS_M
+        (-half_hub, -inner), (-inner, -inner), [_STORAGE_DOOR_M], thickness=_STORAGE_WALL_THICKNESS_M
     )
-    corner_y = -inner - _STORE_WALL_THICKNESS_M / 2.0
-    drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORE_WALL_THICKNESS_M)
-    drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + _STORE_SHELF_DEPTH_M)
+    corner_y = -inner - _STORAGE_WALL_THICKNESS_M / 2.0
+    drawing.add_wall((-inner, corner_y), (-inner, -half_hub), thickness=_STORAGE_WALL_THICKNESS_M)
+    drawing.add_block(-half_hub, -half_hub, -inner, -half_hub + _STORAGE_SHELF_DEPTH_M)
 
 
 def _draw_nurse_station(drawing: Drawing) -> None:
@@ -144,16 +144,16 @@ def _draw_nurse_station(drawing: Drawing) -> None:
     drawing.add_centered_block(-_DESK_WIDTH_M / 2.0, 0.0, _DESK_WIDTH_M, _DESK_LENGTH_M)
 
 
-def _outline_lifts(half_hub: float, front: float) -> list[tuple[float, float]]:
-    """Return the outline of two lifts in the upper left corner of the hub, with niches before their doors."""
+def _outline_elevators(half_hub: float, front: float) -> list[tuple[float, float]]:
+    """Return the outline of two elevators in the upper left corner of the hub, with niches at their doors."""
     points = [(-half_hub, half_hub), (-half_hub, front)]
     for number in range(2):
-        middle = -half_hub + (number + 0.5) * _LIFT_WIDTH_M
-        left = middle - _LIFT_DOOR_M / 2.0
-        right = middle + _LIFT_DOOR_M / 2.0
-        niche = front + _LIFT_NICHE_M
+        middle = -half_hub + (number + 0.5) * _ELEVATOR_WIDTH_M
+        left = middle - _ELEVATOR_DOOR_M / 2.0
+        right = middle + _ELEVATOR_DOOR_M / 2.0
+        niche = front + _ELEVATOR_NICHE_M
         points += [(left, front), (left, niche), (right, niche), (right, front)]
-    end = -half_hub + 2.0 * _LIFT_WIDTH_M
+    end = -half_hub + 2.0 * _ELEVATOR_WIDTH_M
     return [*points, (end, front), (end, half_hub)]
 
 

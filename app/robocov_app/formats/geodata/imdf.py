@@ -140,7 +140,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     geometry = _straighten(geometry)
                 geometries.append(geometry)
     if undrivable_count:
-        note = "stairs, lifts and openings to the floor below treated as solid"
+        note = "stairs, elevators and openings to the floor below treated as solid"
         shapes.notes.append(f"{note}: {undrivable_count}")
     geometries = convert_to_meters(geometries, shapes, DEGREES)
     elements = [FloorElement(role, geometry) for role, geometry in zip(roles, geometries, strict=True)]

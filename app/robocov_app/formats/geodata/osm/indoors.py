@@ -140,7 +140,7 @@ def list_floor_elements(data: OsmData, floor: float, shapes: Shapes) -> list[Flo
             roles.append(role)
             geometries.append(geometry)
     if stairs_count:
-        shapes.notes.append(f"stairs and lifts treated as solid: {stairs_count}")
+        shapes.notes.append(f"stairs and elevators treated as solid: {stairs_count}")
     door_lines = _find_doors(data, doors, walls)
     lost_doors = len(doors) - len(door_lines)
     if lost_doors:

@@ -6,8 +6,9 @@ option ``thickness``; bollards, blocks and trees are points. The bounds are the 
 elements, roofs, and ways whose nodes are missing from the extract are left out.
 
 Indoors (https://wiki.openstreetmap.org/wiki/Simple_Indoor_Tagging), the rooms, corridors and areas of one
-level are free; rooms have walls, interrupted by doors; ``indoor=wall`` is a wall; stairs and lifts are solid.
-The inside is read if the option ``level`` names a floor, or if spaces cover most of the buildings' area.
+level are free; rooms have walls, interrupted by doors; ``indoor=wall`` is a wall; stairs and elevators are
+solid. The inside is read if the option ``level`` names a floor, or if spaces cover most of the buildings'
+area.
 """
 
 from pathlib import Path
