@@ -210,7 +210,7 @@ def draw_on_transparency() -> Image.Image:
 def test_a_dark_drawing_without_paper_is_free_where_it_is_transparent(tmp_path: Path) -> None:
     area, report, _ = import_picture(tmp_path, draw_on_transparency())
     assert area == pytest.approx(6.4 * 4.4)
-    assert any(note.startswith("only dark paint on a transparent ground") for note in report.notes)
+    assert any(note.startswith("only dark paint on a transparent background") for note in report.notes)
     with pytest.raises(MapError, match=r"no cell is free: .*% of the pixels are transparent"):
         import_picture(tmp_path, draw_on_transparency(), unknown="obstacle")
 

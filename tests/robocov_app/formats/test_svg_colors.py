@@ -80,7 +80,9 @@ def test_rooms_on_a_dark_ground_are_free(tmp_path: Path) -> None:
     door = '<rect x="4" y="2" width="2" height="1" fill="#fff"/>'
     foreign = read_shapes(tmp_path, ground + rooms + door)
     assert foreign.free.area == pytest.approx(26)
-    assert any("#eeeeee (2), #ffffff (1) on a dark ground" in note for note in foreign.notes)
+    assert any(
+        "#eeeeee (2), #ffffff (1), because they are on a dark background" in note for note in foreign.notes
+    )
     # Without pale fills, a dark outline is a boundary like any other.
     assert read_free_space(
         tmp_path, ground + '<rect x="1" y="1" width="3" height="3" fill="#777"/>'

@@ -76,7 +76,7 @@ def find_floors(
         undecided = [outline for outline in others if outline.role is None and outline.color is not None]
         if is_slab:
             pale = [outline for outline in undecided if is_pale(outline.color)]
-            pale_floors = _PaleFloors(pale, "on a dark ground")
+            pale_floors = _PaleFloors(pale, "they are on a dark background")
         else:
             pale_floors = _find_pale_floors(drawing, boundary, others, undecided)
         _report_pale(drawing, undecided, pale_floors, report)
@@ -116,7 +116,7 @@ def find_nested_areas(
     return NestedAreas(Boundary(whole, "the outermost outlines"), PaintLayer(solid, _LOWEST_ORDER))
 
 
-def build_ground(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:
+def build_solid_layer(boundary: Boundary | None, region: MultiPolygon, floors: Floors) -> PaintLayer | None:
     """Return the region as a solid layer if only floors are free; otherwise None."""
     if boundary is None:
         return None
@@ -164,7 +164,7 @@ def _find_pale_floors(
 ) -> _PaleFloors:
     """Return the undecided outlines that are floors by their color.
 
-    They have something darker painted on them, resemble outlines that have, or cannot be seen on the ground.
+    They have something darker painted on them, resemble outlines that do, or are invisible on the background.
     """
     marks = [outline.paint_layer for outline in outlines]
     lines = [*drawing.lines, *(edge for outline in outlines for edge in outline.edges)]
@@ -172,15 +172,17 @@ def _find_pale_floors(
     is_evident = find_evident_floors([outline.paint_layer for outline in undecided], marks)
     chosen = [outline for outline, evident in zip(undecided, is_evident, strict=True) if evident]
     rest = [outline for outline in undecided if outline not in chosen]
-    chosen += [outline for outline in rest if _is_unseen(outline, boundary)]
-    reason = "as darker paint lies on such" if any(is_evident) else "in the color of the ground"
+    chosen += [outline for outline in rest if _is_invisible(outline, boundary)]
+    reason = "they have the color of the background"
+    if any(is_evident):
+        reason = "darker paint lies on them or on similar ones"
     return _PaleFloors(chosen, reason)
 
 
-def _is_unseen(outline: ClosedOutline, boundary: Boundary | None) -> bool:
-    """Return whether an outline is invisible on the ground: it has the same pale color and no stroke."""
-    ground = [background.color for background in get_outlines(boundary)]
-    return is_pale(outline.color) and not outline.edges and outline.color in (ground or [WHITE])
+def _is_invisible(outline: ClosedOutline, boundary: Boundary | None) -> bool:
+    """Return whether an outline is invisible on the background: it has the same pale color and no stroke."""
+    background_colors = [background.color for background in get_outlines(boundary)] or [WHITE]
+    return is_pale(outline.color) and not outline.edges and outline.color in background_colors
 
 
 def _report_pale(
@@ -196,7 +198,7 @@ def _report_pale(
     if floors.outlines:
         counts = describe_color_counts(outline.color for outline in floors.outlines)
         hint = "(--solid-color: as obstacles)"
-        report.notes.append(f"pale fills treated as floor: {counts} {floors.reason} {hint}")
+        report.notes.append(f"pale fills treated as floor: {counts}, because {floors.reason} {hint}")
     if pale:
         counts = describe_color_counts(pale)
         report.notes.append(f"pale paint treated as solid: {counts} (--free-color: as free space)")

@@ -14,7 +14,7 @@ Lines and pillars are obstacles in both cases. The boundary is, in this order,
 If the colors of a drawing are known, a fill covers the shapes that were painted before it, and fills of a
 color that the user declares free are free. Pale fills are free, as floors, in three cases: something darker
 is painted on them, or they have the color of such a fill or the size of a room; they have the color of the
-ground and no stroke; or the boundary is dark, which makes the boundary itself solid. If the option
+background and no stroke; or the boundary is dark, which makes the boundary itself solid. If the option
 ``outlines`` is "nested", outlines are alternately free and solid, from the outside in.
 
 In drawings whose outlines are free by default, rule 2 is different: if some outlines lie in larger ones, the
@@ -51,7 +51,7 @@ from robocov_app.formats.geometry.shapes.drawings import (
 from robocov_app.formats.geometry.shapes.drawn_shapes import ClosedOutline, WallLine
 from robocov_app.formats.geometry.shapes.floors import (
     Floors,
-    build_ground,
+    build_solid_layer,
     find_floors,
     find_nested_areas,
     is_background,
@@ -99,13 +99,13 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
     region = _build_region(drawing, boundary, report, are_solid=are_solid)
     if nested is None:
         obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=are_solid)
-        ground = build_ground(boundary, region, floors)
+        solid_layer = build_solid_layer(boundary, region, floors)
     else:
         obstacles = _find_obstacles(drawing, boundary, region, floors, are_solid=False)
-        ground = nested.solid
+        solid_layer = nested.solid
     layers = [*obstacles.layers]
-    if ground is not None:
-        layers.append(ground)
+    if solid_layer is not None:
+        layers.append(solid_layer)
     free = _subtract(region, uncover(layers, floors.layers))
     _describe(drawing, boundary, obstacles, report, are_solid=are_solid)
     return Interpretation(

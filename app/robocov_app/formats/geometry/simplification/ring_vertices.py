@@ -95,7 +95,7 @@ class RingVertices:
         tolerance : (k,) array, m
             Tolerance at each vertex. Where it changes along a ring, the vertices on both sides are fixed.
         is_fixed : (k,) array of bool
-            Vertices that stay, at least one in each ring.
+            Vertices that are kept, at least one in each ring.
         max_tolerance : (r,) array, m
             Upper limit of the tolerance in each ring.
 

@@ -15,7 +15,7 @@ from robocov_app.formats.options import ReadOptions, get_or_default
 from robocov_app.formats.raster.picture.brightness import OPAQUE_ALPHA, STRIP_ROWS, Brightness
 
 _MAX_LIGHT_RATIO = 0.02
-"""Maximum ratio of light to dark pixels in a drawing on a transparent ground: light ones are soft edges."""
+"""Maximum ratio of light pixels, in soft edges, to dark ones in a drawing on a transparent background."""
 _MAX_LINE_FRACTION = 0.25
 """Maximum fraction of the pixels that the lines of a plan cover."""
 _LINE_WIDTH_FRACTION = 0.05
@@ -151,7 +151,7 @@ def drop_strokes(cells: Cells, options: ReadOptions, cell: float, source_name: s
 
 
 def _is_line_drawing(cells: Cells) -> bool:
-    """Return whether the free cells are thin lines on a dark ground, such as in a blueprint."""
+    """Return whether the free cells are thin lines on a dark background, such as in a blueprint."""
     free = cells == FREE
     if not 0.0 < free.mean() < _MAX_LINE_FRACTION:
         return False

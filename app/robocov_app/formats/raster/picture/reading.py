@@ -62,7 +62,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     unknown = options.unknown or "obstacle"
     if options.unknown is None and has_transparent_background(cells):
         unknown = "free"
-        notes.append("only dark paint on a transparent ground, so transparent pixels are free")
+        notes.append("only dark paint on a transparent background, so transparent pixels are free")
     dropped: tuple[str, ...] = ()
     if options.min_stroke is not None:
         dropped = drop_strokes(cells, options, cell, source_name)

@@ -154,12 +154,12 @@ def _build_page(environment: Environment, writer: _ShapeWriter, low: np.ndarray,
 
 def _build_rules(theme: Theme) -> str:
     """Return the style rules for a theme."""
-    ground = _format_color(theme.panel)
+    outside = _format_color(theme.panel)
     page = _format_color(theme.background)
     edge = _format_color(theme.boundary)
     solid = _format_color(theme.obstacle)
     return (
-        f"svg {{ background: {ground} }}\n#boundary {{ fill: {page}; stroke: {edge} }}\n"
+        f"svg {{ background: {outside} }}\n#boundary {{ fill: {page}; stroke: {edge} }}\n"
         f"#obstacles {{ fill: {solid} }}\n.wall {{ fill: none; stroke: {solid} }}"
     )
 
