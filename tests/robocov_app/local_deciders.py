@@ -35,7 +35,7 @@ class LocalDecider:
         self._robot_count = len(setup.team)
         self._program = ControllerProgram(pickle.loads(pickle.dumps(setup)), DensitySensor(self._measure))
 
-    def finish_beginning(self) -> None:
+    def wait_until_ready(self) -> None:
         pass
 
     def send_observations(self, observations: Observations) -> None:

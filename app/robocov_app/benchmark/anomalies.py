@@ -1,7 +1,7 @@
 """Suspicious runs: teams that never move, and teams whose final cost is far above that of RAPF.
 
 Both are usually caused by a fault of the controller, such as a plan that cannot be followed, or a phase that
-never ends. A high cost is suspicious only for controllers that usually are better than RAPF.
+never ends. A high cost is suspicious only for controllers that are usually better than RAPF.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,15 +9,15 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov_app.benchmark.ratings import get_run_key
+from robocov_app.benchmark.ratings import RunKey, get_run_key
 
 MIN_PATH_LENGTH_M = 0.1
 """Minimum mean path length of a team that did not stay at rest."""
 MAX_RAPF_RATIO = 1.2
 """Maximum ratio of the final cost to that of RAPF in the same run for a run that is not suspicious."""
 
-_RunValues: TypeAlias = dict[tuple[str, tuple[str, int]], float]
-"""A value for each run, by track and run."""
+_RunValues: TypeAlias = dict[tuple[str, RunKey], float]
+"""A value for each run, by track and by map and seed."""
 
 
 class Anomaly(NamedTuple):

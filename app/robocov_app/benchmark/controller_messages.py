@@ -39,7 +39,7 @@ MEASURE = "measure"
 READING = "reading"
 """Kind of a message from a process: a file that the controller has read."""
 VIOLATION = "violation"
-"""Kind of a message from a process: an action that a controller must not do."""
+"""Kind of a message from a process: a forbidden action of its controller."""
 KEPT: Any = None
 """Value in place of the region or the density in a `Step` if the process already has it."""
 _PAYLOAD_PROTOCOL = 4

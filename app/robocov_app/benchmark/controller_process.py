@@ -54,7 +54,7 @@ class ControllerProcess:
     Parameters
     ----------
     folder : Path
-        Folder for the machine code that processes compile. Each has a folder of its own in it.
+        Folder for the machine code that processes compile. Each process has its own subfolder.
 
     Attributes
     ----------
@@ -87,11 +87,11 @@ class ControllerProcess:
         return read_description(self._receive_answer())
 
     def begin(self, setup: Setup) -> None:
-        """Send what the process knows before the first step; `finish_beginning` waits for it."""
+        """Send what the process knows before the first step, without waiting for the controller."""
         self._robot_count = len(setup.team)
         self._send(setup)
 
-    def finish_beginning(self) -> None:
+    def wait_until_ready(self) -> None:
         """Wait until the controller is ready for the first step.
 
         Raises
@@ -121,7 +121,7 @@ class ControllerProcess:
         Raises
         ------
         ControllerFaultError
-            If the controller fails, or the answer is no decision.
+            If the controller fails, or the answer is not a decision.
         """
         values = self._receive_answer(measure)
         try:
@@ -167,7 +167,10 @@ class ControllerProcess:
             raise ControllerFaultError("its process ended") from None
         except DamagedMessageError as error:
             raise ControllerFaultError(str(error)) from None
-        return message if isinstance(message, tuple) and message else ("",)
+        if not isinstance(message, tuple) or not message:
+            # No message has this kind, so the caller rejects it.
+            return ("",)
+        return message
 
     def _answer_measurement(self, measure: Measure, robots: Any, points: Any) -> FloatArray | str:
         """Return the density at points, or the reason why it cannot be measured."""
@@ -249,7 +252,7 @@ def read_description(values: Any) -> Description:
     Raises
     ------
     ControllerFaultError
-        If the values are no description.
+        If the values are not a description.
     """
     try:
         label: Any = values["label"]
@@ -257,7 +260,8 @@ def read_description(values: Any) -> Description:
         gains: Any = values["gains"]
         scanning = None if values["scanning"] is None else Scanning(*values["scanning"])
         if information not in get_args(Information):
-            raise ParameterError(f"information: {quote(information)}")
+            expected = ", ".join(get_args(Information))
+            raise ParameterError(f"information: expected one of {expected}, got {quote(information)}")
         return Description(label, information, gains, scanning)
     except (KeyError, TypeError, RobocovError) as error:
         raise ControllerFaultError(f"its process sent an invalid description: {error}") from None

@@ -4,7 +4,7 @@ The guard is for a process that does nothing but call a controller. It uses the 
 replaces functions that cause none. It forbids the actions in `_FORBIDDEN_PREFIXES` and
 `_FUNCTIONS_WITHOUT_EVENTS`, writing files, listing folders, reading the data of the benchmark, and looking at
 other processes. Packages may do so while they are imported. A compiler may write machine code, but
-only to the cache folder of this process, of which no other process knows.
+only to the cache folder of this process, whose name no other process knows.
 
 Python code can change its own process, and compiled code can call the system without any event, so this is a
 tripwire and not a sandbox: only verify controllers that you would also run.
@@ -152,7 +152,7 @@ def install_guard(
     """
     # Importing the user's modules must not write bytecode files.
     sys.dont_write_bytecode = True
-    callers = _Callers(own_packages, own_files)
+    policy = _Policy(own_packages, own_files)
     is_checking = False
 
     def check(action: _Action | None) -> None:
@@ -162,7 +162,7 @@ def install_guard(
             return
         is_checking = True
         try:
-            if callers.may_cause(action, sys._getframe(2)):
+            if policy.allows(action, sys._getframe(2)):
                 return
         finally:
             is_checking = False
@@ -231,8 +231,8 @@ def _replace_function(module: Any, name: str, replacement: Callable[..., Any]) -
             setattr(owner, name, replacement)
 
 
-class _Callers:
-    """Decides whether an action is allowed, because of a compiler or of the import of an installed package.
+class _Policy:
+    """Decides whether an action is allowed, depending on the code that causes it.
 
     A frame is recognized by its code, which must be in the file of the package. The name of a module or of a
     file would not be enough, because a controller can execute its own code under any name.
@@ -262,19 +262,19 @@ class _Callers:
         self._search_folders = tuple(os.path.realpath(folder) + os.sep for folder in search_folders)
         self._cache_folder = _find_cache_folder()
 
-    def may_cause(self, action: _Action, frame: FrameType | None) -> bool:
+    def allows(self, action: _Action, frame: FrameType | None) -> bool:
         """Return whether an action in a frame is allowed.
 
-        Everybody may read and list the files of Python and of installed packages, and Python looks for
-        modules in the folders on ``sys.path``. Further actions are allowed to compilers and imports without
-        own code between them and the action. Nothing needs the data of the benchmark.
+        Any code may read and list the files of Python and of installed packages, and Python looks for
+        modules in the folders on ``sys.path``. Compilers and imports may do more, unless code of the
+        controller is between them and the action. No code may read the data of the benchmark.
         """
-        if action.event == "open" and _is_data_of_benchmark(action.paths[0]):
+        if action.event == "open" and _is_benchmark_data(action.paths[0]):
             return False
-        return self._may_anybody_cause(action, frame) or self._is_caused_by_library(action, frame)
+        return self._is_allowed_to_all(action, frame) or self._is_caused_by_library(action, frame)
 
-    def _may_anybody_cause(self, action: _Action, frame: FrameType | None) -> bool:
-        """Return whether all code may cause an action: use installed files, or search for modules."""
+    def _is_allowed_to_all(self, action: _Action, frame: FrameType | None) -> bool:
+        """Return whether any code may cause an action: use installed files, or search for modules."""
         if not action.paths:
             return False
         is_listing = action.event in _LISTING_EVENTS
@@ -286,7 +286,7 @@ class _Callers:
         return is_listing and self._is_search(action.paths[0], frame)
 
     def _is_caused_by_library(self, action: _Action, frame: FrameType | None) -> bool:
-        """Return whether a compiler or an import causes an action, without own code in between."""
+        """Return whether a compiler or an import causes an action, with no code of the controller between."""
         while frame is not None:
             code = frame.f_code
             file = _find_file(code)
@@ -339,18 +339,21 @@ def _find_folder(package: str) -> str | None:
 
 
 def _find_cache_folder() -> str | None:
-    """Return the folder for machine code of this process, with a separator at its end; None without one."""
+    """Return this process's folder for machine code, with a separator at its end; None if it has none."""
     configured = os.environ.get("NUMBA_CACHE_DIR")
     folder = Path(configured) if configured else open_cache_folder()
     return None if folder is None else os.path.realpath(folder) + os.sep
 
 
 def _find_file(code: CodeType) -> str:
-    """Return the file that code names; for a module in the Python executable, its file in the library."""
-    frozen_name = _FROZEN_PATTERN.fullmatch(code.co_filename)
-    if frozen_name is None:
+    """Return the file of a code object.
+
+    For a module that is part of the Python executable, this is its source file in the standard library.
+    """
+    match = _FROZEN_PATTERN.fullmatch(code.co_filename)
+    if match is None:
         return os.path.realpath(code.co_filename)
-    path = Path(sysconfig.get_path("stdlib"), *frozen_name[1].split("."))
+    path = Path(sysconfig.get_path("stdlib"), *match[1].split("."))
     return os.path.realpath(f"{path}.py")
 
 
@@ -373,7 +376,7 @@ def _list_codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _describe_event(event: str, arguments: tuple[Any, ...]) -> _Action | None:
-    """Describe the action of an audit event; return None if it neither is forbidden nor reads a file."""
+    """Describe the action of an audit event; return None if it is not forbidden and reads no file."""
     if event == "open":
         return _describe_opening(*arguments[:3])
     if event == "import" and arguments[1]:
@@ -400,7 +403,7 @@ def _describe_lookup(name: str, path: Any, folder: int | None) -> _Action | None
     return None
 
 
-def _is_data_of_benchmark(path: str) -> bool:
+def _is_benchmark_data(path: str) -> bool:
     return path.startswith(_DATA_FOLDER) and not path.endswith((".py", ".pyc"))
 
 
@@ -418,19 +421,19 @@ def _convert_path(path: Any) -> str:
 
 
 def _describe_opening(path: Any, mode: Any, flags: Any) -> _Action | None:
-    """Describe the opening of a file; return None if it has already been opened, and is only a number."""
+    """Describe the opening of a file; return None for the number of a file that is already open."""
     if isinstance(path, int):
         return None
     name = os.path.realpath(_convert_path(path))
-    writes = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
+    is_writing = isinstance(flags, int) and bool(flags & _WRITE_FLAGS)
     if isinstance(mode, str):
-        writes = writes or any(character in mode for character in "wax+")
+        is_writing = is_writing or any(character in mode for character in "wax+")
     prohibition = ""
     if not isinstance(path, str | bytes):
-        # Such an object could return a different path than to the function that opens the file.
-        prohibition = f"opening {name} by an object"
-    elif writes:
+        # The object could give the function that opens the file a different path.
+        prohibition = f"opening {name} through a path object"
+    elif is_writing:
         prohibition = f"writing {name}"
-    elif _refers_to_other_process(name) or _is_data_of_benchmark(name):
+    elif _refers_to_other_process(name) or _is_benchmark_data(name):
         prohibition = f"reading {name}"
     return _Action("open", (name,), prohibition)

@@ -164,7 +164,7 @@ class Decider(Protocol):
     def begin(self, setup: Setup) -> None:
         """Receive what is known before the first step."""
 
-    def finish_beginning(self) -> None:
+    def wait_until_ready(self) -> None:
         """Wait until the controller is ready; raise RobocovError if it fails."""
 
     def send_observations(self, observations: Observations) -> None:
@@ -239,10 +239,10 @@ class IsolatedTeam:
         deciders: list[tuple[int | None, Decider]] = [(None, self._team), *self._robots.items()]
         for robot, decider in deciders:
             decider.begin(Setup(self._code, robot, self._environment, region, team))
-        self._team.finish_beginning()
+        self._team.wait_until_ready()
         for robot, decider in list(self._robots.items()):
             try:
-                decider.finish_beginning()
+                decider.wait_until_ready()
             except RobocovError as error:
                 self._stop_checking(robot, f"in a separate process: {error}")
 
@@ -273,7 +273,9 @@ class IsolatedTeam:
         if self._may_send_messages or self._has_reported_messages:
             return
         self._has_reported_messages = True
-        self.differences.append(f"robots send messages from {time:.2f} s on, but declare the information own")
+        self.differences.append(
+            f'robots send messages from {time:.2f} s on, but declare the information "own"'
+        )
 
     def _measure_messages(self, decision: Decision) -> None:
         """Add up the declared sizes of the messages, and those of their compressed payloads."""

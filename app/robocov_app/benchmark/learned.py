@@ -118,7 +118,7 @@ def to_offsets(outputs: FloatArray) -> FloatArray:
     """
     preferences = outputs[:, :DIRECTIONS]
     likelihoods = np.exp(preferences - preferences.max(axis=1, keepdims=True))
-    # Exponential functions differ in the last bits between processors, and rounding removes these.
+    # The last bits of exponentials depend on the processor. Rounding makes results the same everywhere.
     likelihoods = likelihoods.round(9)
     directions, products = _compute_directions()
     probabilities = likelihoods / likelihoods.sum(axis=1, keepdims=True)

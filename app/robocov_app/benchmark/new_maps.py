@@ -26,8 +26,8 @@ from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
 
 MAX_NEW_MAPS = len(suite.FAMILIES) - 1
 """Maximum number of new maps: one of each family that has a generator."""
-MIN_P_VALUE = 0.001
-"""Minimum p-value of ranks on new maps at which a controller does not count as fitted to the suite."""
+SIGNIFICANCE_LEVEL = 0.001
+"""A controller counts as fitted to the suite if the p-value of its ranks on new maps is below this level."""
 _MAX_MAP_SEED = 2**31
 """Upper limit of the seeds of new maps and starts."""
 _MAX_ATTEMPTS = 100
@@ -67,8 +67,7 @@ class NewMapComparison:
     p_value : float
         Probability of ranks at least as extreme if the controller is not fitted to the suite.
     min_p_value : float
-        Minimum possible p-value with these runs. With few runs, it is too large to show a
-        difference.
+        Minimum possible p-value with these runs. With few runs, it is too large to show a difference.
     """
 
     new_gap: float
@@ -79,12 +78,12 @@ class NewMapComparison:
     @property
     def is_worse(self) -> bool:
         """Whether the controller is clearly worse on new maps."""
-        return self.p_value < MIN_P_VALUE
+        return self.p_value < SIGNIFICANCE_LEVEL
 
     @property
     def is_conclusive(self) -> bool:
         """Whether there are enough runs to show a difference."""
-        return self.min_p_value < MIN_P_VALUE
+        return self.min_p_value < SIGNIFICANCE_LEVEL
 
 
 def choose_track(
@@ -112,10 +111,12 @@ def choose_track(
     for track in tracks:
         # The families are drawn, and may be those with the fewest maps.
         smallest_sizes = sorted(sizes_by_track[track].values())[:count]
-        if _compute_min_p_value(smallest_sizes) < MIN_P_VALUE:
+        if _compute_min_p_value(smallest_sizes) < SIGNIFICANCE_LEVEL:
             conclusive_tracks.append(track)
     candidates = conclusive_tracks or tracks
-    return candidates[int(rng.integers(len(candidates)))] if candidates else None
+    if not candidates:
+        return None
+    return candidates[int(rng.integers(len(candidates)))]
 
 
 def _count_maps_by_family(maps: Iterable[str]) -> Counter[str]:

@@ -26,8 +26,8 @@ from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.typing import FloatArray, IntArray
 
-_LATTICE = 8
-"""Cells along a side of the planner's lattice, which is coarse because no costs are computed on it."""
+_PLANNER_LATTICE = 8
+"""Number of sites along a side of the planner's lattice, on which no costs are computed."""
 _TIME_TOLERANCE_S = 1e-9
 """Difference between two times that is attributed to rounding."""
 _UNREACHABLE_M = 1e6
@@ -41,8 +41,8 @@ class OracleMemory:
     team: Team
     routes: tuple[FloatArray, ...]
     """Waypoints of each robot, (w, 2) m."""
-    legs: IntArray
-    """Index of the next waypoint of each robot, (n,)."""
+    waypoint_indices: IntArray
+    """Index, in its route, of the waypoint that each robot heads for, (n,)."""
     returns: FloatArray | None = None
     """Points that the last scan of each robot hit, (n, rays, 2) m."""
     stage: int = -1
@@ -63,12 +63,12 @@ class Oracle(BaseController):
 
     name = "oracle"
     label = "Oracle"
-    summary = "knows the map and the best placement, and walks there; decides for all robots at once"
+    summary = "knows the map and the best placement, and moves there; decides for all robots at once"
     information = "whole map"
     scanning = Scanning(rays=240, period=0.5)
 
-    period: float = gain(1.0, "s", "between two plans of the paths", low=0.05, high=60.0)
-    clearance: float = gain(0.03, "m", "that paths keep between rim and walls", high=10.0)
+    period: float = gain(1.0, "s", "time between two plans of the paths", low=0.05, high=60.0)
+    clearance: float = gain(0.03, "m", "margin between robots and walls along paths", high=10.0)
     k_prop: float = gain(2.0, "1/s", "desired speed per meter of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
     environment: Environment | None = field(default=None, repr=False, compare=False)
@@ -85,7 +85,7 @@ class Oracle(BaseController):
                 "benchmark have"
             )
         unknown = (np.full((1, 2), np.nan),) * len(team)
-        return OracleMemory(team, routes=unknown, legs=np.zeros(len(team), dtype=np.intp))
+        return OracleMemory(team, routes=unknown, waypoint_indices=np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: OracleMemory) -> Decision:
         """Compute the forces along the paths, which are planned once in each period."""
@@ -98,17 +98,22 @@ class Oracle(BaseController):
             planner = _get_planner(self.environment, clearance)
             _, robots, positions = stages[stage]
             routes = plan_routes(planner, seen.positions, robots, np.array(positions, dtype=float))
-            legs = np.zeros(len(routes), dtype=np.intp)
-            memory = replace(memory, stage=stage, routes=routes, legs=legs, plan_time=seen.time)
+            memory = replace(
+                memory,
+                stage=stage,
+                routes=routes,
+                waypoint_indices=np.zeros(len(routes), dtype=np.intp),
+                plan_time=seen.time,
+            )
         returns = update_returns(seen, memory.returns)
-        forces, goals, legs = follow_routes(
+        forces, goals, waypoint_indices = follow_routes(
             seen,
             memory.team,
-            RouteProgress(memory.routes, memory.legs),
+            RouteProgress(memory.routes, memory.waypoint_indices),
             returns,
             RouteGains(self.k_prop, self.response_time),
         )
-        memory = replace(memory, legs=legs, returns=returns)
+        memory = replace(memory, waypoint_indices=waypoint_indices, returns=returns)
         return Decision(forces, goals, {"attraction": forces}, memory=memory)
 
 
@@ -180,4 +185,4 @@ def find_waypoints(planner: GeodesicPlanner, position: FloatArray, goal: FloatAr
 @lru_cache(maxsize=4)
 def _get_planner(environment: Environment, clearance: float) -> GeodesicPlanner:
     """Return the planner for a map; the latest planners are kept in memory."""
-    return GeodesicPlanner(environment, clearance, _LATTICE, radius=0.0)
+    return GeodesicPlanner(environment, clearance, _PLANNER_LATTICE, radius=0.0)

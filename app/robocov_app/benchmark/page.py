@@ -1,6 +1,6 @@
 """The page that compares results of the benchmark: tables and plots for each track."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -147,7 +147,7 @@ def _build_overviews(
 ) -> list[tuple[str, str, PageTable]]:
     """Build the identifier, heading and table of each ranking for which there are runs.
 
-    If all tracks are in no ranking, the only table compares the results on these tracks.
+    If none of the tracks belongs to a ranking, a single table compares the results on these tracks.
     """
     overviews = []
     for ranking, heading in suite.RANKINGS.items():
@@ -368,17 +368,18 @@ def _select_entries_to_plot(track_ratings: Sequence[Rating], entries: _Entries) 
 
 def _describe_entries_without_messages(
     results: Sequence[Mapping[str, Any]], labels: Sequence[str]
-) -> Iterator[str]:
-    """Yield a note on the entries that were made before robots shared maps by messages, if there are any."""
+) -> list[str]:
+    """Return a note on the entries that were made before robots shared maps by messages, if there are any."""
     pairs = zip(results, labels, strict=True)
     old_entries = [label for result, label in pairs if not shares_maps_by_messages(result)]
-    if old_entries:
-        yield (
-            f"{', '.join(old_entries)}: made with an earlier version, in which robots read the current maps "
-            "of all robots in communication range, without messages. Loss, latency, message rate and "
-            "bandwidth had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each "
-            "changed cell of a map, 28 for each reported position of another robot (number, position, time)."
-        )
+    if not old_entries:
+        return []
+    return [
+        f"{', '.join(old_entries)}: made with an earlier version, in which robots read the current maps "
+        "of all robots in communication range, without messages. Loss, latency, message rate and "
+        "bandwidth had no effect on shared maps. B/s is an estimate: 20 bytes for a position, 5 for each "
+        "changed cell of a map, 28 for each reported position of another robot (number, position, time)."
+    ]
 
 
 def _build_entries_table(labeled_results: Iterable[tuple[str, Mapping[str, Any]]]) -> PageTable:

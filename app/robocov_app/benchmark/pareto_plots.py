@@ -64,7 +64,7 @@ _MIN_LOG_RATIO = 8.0
 _MAX_RATIO_TO_MEDIAN = 1e4
 """Maximum ratio of a plotted value to the median of the bundled entries, or of all without bundled ones."""
 _MIN_MEDIAN_GAP = 1.0
-"""Minimum median of the gaps for this ratio, %."""
+"""Smaller medians of the gaps count as this value, %, because a ratio to a median near 0 says little."""
 _MAX_RATIO_TO_BUNDLED = 4.0
 """Maximum ratio of a value from a file to the largest one of the bundled entries, or of the smallest one of
 these to it. With larger ratios, a file could squeeze all bundled entries into a small part of a plot."""
@@ -190,10 +190,10 @@ def thin_out_equal_values(
 ) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
     """Split points into those to draw and those to omit.
 
-    If many controllers have the same value of the quantity, as those that send only their positions, their
-    marks would hide each other. Then only the smallest gap of the competing controllers and the smallest gap
-    of those that know the whole map are drawn: of bundled results, and of results from files. Bundled results
-    are only omitted if there are many of them, so that no file removes one.
+    If many controllers have the same value of the quantity, such as those that send only their positions,
+    their marks would hide each other. Of these controllers, only the one with the smallest gap in each of
+    four groups is drawn: competing or not, bundled or from a file. Bundled results are only omitted if there
+    are many of them, so that no file removes one.
 
     Parameters
     ----------
@@ -276,8 +276,8 @@ def _split_zeros(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list
 def draw_pareto_figure(points: Sequence[ParetoPoint], axis_label: str) -> Figure:
     """Draw the gap of controllers against another quantity. Smaller values are better in both.
 
-    A line, the Pareto front, connects the competing controllers for which no other competing controller is
-    better in both quantities. If there are bundled results, it connects only these, because files may contain
+    A line, the Pareto front, connects the competing controllers that no other competing controller dominates;
+    see `find_pareto_front`. If there are bundled results, it connects only these, because files may contain
     anything.
 
     Parameters
@@ -378,7 +378,9 @@ def _draw_label_line(axes: Axes, point: ParetoPoint, offset: FloatArray) -> None
 
 
 def find_pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Find the points for which no other point is better in both values.
+    """Find the points that no other point dominates. Of equal points, only the first is found.
+
+    A point dominates another one if neither of its values is larger, and at least one is smaller.
 
     Parameters
     ----------

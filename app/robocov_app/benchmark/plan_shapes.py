@@ -24,7 +24,7 @@ class FloorPlan(NamedTuple):
     boundary : (k, 2) sequence, m
         Outer ring.
     obstacles : list of Obstacle
-        Walls, furniture, and whatever else is solid.
+        Walls, furniture and other solid objects.
     entrance : (2,) sequence, m, or None
         Point near which the robots start; None for the lower left corner of the bounding box.
     """
@@ -58,7 +58,7 @@ def build_rotated_block(center: FloatArray, width: float, height: float, angle: 
 
 
 def build_wall_with_door(
-    offset: float, start: float, end: float, *, door: float, width: float, is_vertical: bool
+    offset: float, start: float, end: float, *, door: float, door_width: float, is_vertical: bool
 ) -> list[Obstacle]:
     """Build the pieces of a wall on either side of its door; very short pieces are left out.
 
@@ -68,13 +68,15 @@ def build_wall_with_door(
         x of a vertical wall, or y of a horizontal wall.
     start, end : float, m
         Ends of the wall along its direction.
-    door, width : float, m
-        Middle of the door, in the same coordinate as the ends of the wall, and its width.
+    door : float, m
+        Middle of the door, in the same coordinate as the ends of the wall.
+    door_width : float, m
+        Width of the door.
     is_vertical : bool
         Whether the wall is parallel to the y axis, instead of the x axis.
     """
     walls: list[Obstacle] = []
-    for low, high in ((start, door - width / 2.0), (door + width / 2.0, end)):
+    for low, high in ((start, door - door_width / 2.0), (door + door_width / 2.0, end)):
         if high - low <= _MIN_WALL_PIECE_M:
             continue
         ends = [(low, offset), (high, offset)]

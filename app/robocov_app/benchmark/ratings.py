@@ -144,6 +144,10 @@ class Rating:
         values = self.get_values(metric)
         if not len(values):
             return float("nan")
+        return self.compute_median_over_runs(values)
+
+    def compute_median_over_runs(self, values: Sequence[float] | FloatArray) -> float:
+        """Return the median of the values over all runs; runs without a value count as infinite."""
         missing_count = self.run_count - len(values)
         return float(np.median([*values, *[np.inf] * missing_count]))
 
@@ -293,8 +297,11 @@ def compute_mean_score(track_ratings: Collection[Rating]) -> MeanScore:
     Returns
     -------
     MeanScore
-        The runs on a map are correlated, also on different tracks. The interval therefore follows from the
-        variance of the contributions of maps (Liang and Zeger, 1986), not of runs.
+
+    Notes
+    -----
+    The runs on a map are correlated, even on different tracks. The interval therefore follows from the
+    variance of the contributions of maps (Liang and Zeger, 1986), not of runs.
     """
     contributions: dict[str, float] = {}
     for rating in track_ratings:
@@ -448,12 +455,12 @@ def _format_runs(rating: Rating) -> str:
 
 
 def _format_bound(rating: Rating) -> str:
-    """Return the median gap to bound in brackets; empty unless all bounds are known."""
+    """Return the median gap to the bound in brackets; empty unless all bounds are known."""
     gaps_to_bound = [row["gap_to_bound"] for row in rating.rows if row["gap"] is not None]
     if not gaps_to_bound or None in gaps_to_bound:
         return ""
-    missing_count = rating.run_count - len(gaps_to_bound)
-    return f" (≤ {format_gap(float(np.median([*gaps_to_bound, *[np.inf] * missing_count])))})"
+    median = rating.compute_median_over_runs(gaps_to_bound)
+    return f" (≤ {format_gap(median)})"
 
 
 def _compute_cost_integral(rating: Rating) -> float | None:
@@ -465,9 +472,7 @@ def _compute_cost_integral(rating: Rating) -> float | None:
             ratios.append(row["mean_distance_over_run_m"] / reference_cost)
     if not ratios:
         return None
-    missing_count = rating.run_count - len(ratios)
-    median = float(np.median([*ratios, *[np.inf] * missing_count]))
-    return median * suite.TRACKS[rating.track].duration
+    return rating.compute_median_over_runs(ratios) * suite.TRACKS[rating.track].duration
 
 
 def build_family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -74,7 +74,7 @@ _HALF_CROSS_AISLE_M = 0.8
 """Half the width of the gap in a row of shelves in a hall with vehicles."""
 _SHELF_ROWS_Y_M = (3.0, 7.2)
 _AISLES_Y_M = (5.7, 9.6, 1.5)
-"""Aisles of the vehicles; two vehicles are in the first two."""
+"""Aisles of the vehicles, one for each vehicle; there is not always a third vehicle."""
 
 
 def build_floor_plan(kind: str, seed: int) -> Environment:
@@ -177,7 +177,7 @@ class _Home:
         door = rng.uniform(start + _HOME_DOOR_MARGIN_M, end - _HOME_DOOR_MARGIN_M)
         door_width = rng.uniform(0.8, 1.1)
         self.walls += build_wall_with_door(
-            split, start, end, door=door, width=door_width, is_vertical=is_vertical
+            split, start, end, door=door, door_width=door_width, is_vertical=is_vertical
         )
         return split
 
@@ -216,7 +216,7 @@ def _build_offices(rng: np.random.Generator, width: float, low: float, high: flo
     for left, right in itertools.pairwise(partitions.tolist()):
         door = rng.uniform(left + _OFFICE_DOOR_MARGIN_M, right - _OFFICE_DOOR_MARGIN_M)
         obstacles += build_wall_with_door(
-            low, left, right, door=door, width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
+            low, left, right, door=door, door_width=_OFFICE_DOOR_WIDTH_M, is_vertical=False
         )
         if right < width:
             obstacles.append(WallObstacle(round_points([(right, low), (right, high)]), INNER_WALL_M))
@@ -234,7 +234,7 @@ def _build_open_space_wall(rng: np.random.Generator, width: float, y: float) -> 
     walls: list[Obstacle] = []
     for start, end, door in ((0.0, middle, left_door), (middle, width, right_door)):
         walls += build_wall_with_door(
-            y, start, end, door=door, width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
+            y, start, end, door=door, door_width=_OPEN_SPACE_DOOR_WIDTH_M, is_vertical=False
         )
     return walls
 
@@ -320,7 +320,7 @@ def _build_factory(rng: np.random.Generator) -> FloorPlan:
     split = width * rng.uniform(0.48, 0.58)
     gate = rng.uniform(_GATE_MARGIN_M, height - _GATE_MARGIN_M)
     gate_width = rng.uniform(1.4, 2.2)
-    obstacles = build_wall_with_door(split, 0.0, height, door=gate, width=gate_width, is_vertical=True)
+    obstacles = build_wall_with_door(split, 0.0, height, door=gate, door_width=gate_width, is_vertical=True)
     for y in np.arange(_FIRST_RACK_Y_M, height - _MACHINE_MARGIN_M, rng.uniform(1.9, 2.4)):
         left = rng.uniform(1.2, 2.2)
         right = split - rng.uniform(1.2, 1.8)

@@ -1,4 +1,4 @@
-"""Repeated runs: the referee simulates a run and computes its metrics, and its controller decides elsewhere.
+"""Repeated runs: a referee simulates a run and computes its metrics; the controller decides elsewhere.
 
 A referee is the process of one run. It never imports the code of a user: its simulation gets the forces,
 goals and messages of the robots from other processes; see `robocov_app.benchmark.isolation`. Forces must be
@@ -158,7 +158,7 @@ class Referees:
         with tempfile.TemporaryFile() as errors:
             with self._lock:
                 if self._is_stopped:
-                    return RunCheck(None, 0, [])
+                    return RunCheck(outcome=None, robots=0, differences=[])
                 process = start_process(f"{__name__}:RefereeService", stderr=errors)
                 self._processes.add(process)
             try:
@@ -171,7 +171,7 @@ class Referees:
                 with self._lock:
                     self._processes.discard(process)
         if reply is None:
-            return RunCheck(None, 0, ["its process ended"])
+            return RunCheck(outcome=None, robots=0, differences=["its process ended"])
         if reply.answer is None:
             raise OutputError(f"the run cannot be repeated: {reply.problem}")
         check: RunCheck = reply.answer

@@ -174,7 +174,7 @@ def shares_maps_by_messages(result: Mapping[str, Any]) -> bool:
 
 
 def get_results_version(versions: Mapping[str, str]) -> int | None:
-    """Return the number that changes whenever the same runs have other results.
+    """Return the version of the results: a number that changes whenever the same runs give different results.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ from robocov_app.terminal.interruption import Interruption
 
 MAX_SEED = 2**63 - 1
 """Maximum seed, which fits in a signed integer of 64 bits."""
-RunKey: TypeAlias = tuple[str, str, int]
+TrackRunKey: TypeAlias = tuple[str, str, int]
 """Track (or `NEW_MAP`), map and seed of a run."""
 NEW_MAP = "new map"
 """Name in place of the track in the keys of runs on new maps."""
@@ -223,7 +223,7 @@ class Verification:
         """Return sentences that describe the checks."""
         repeated = f"{self.runs} of {format_count(self.rows, 'run')} repeated."
         if self.runs < self.rows:
-            repeated += f" {self._describe_missing()}"
+            repeated += f" {self._describe_miss_probabilities()}"
         lines = [repeated]
         if self.failed_rows:
             lines.append(
@@ -254,7 +254,7 @@ class Verification:
         lines.append(f"Random choices: --seed {self.seed} repeats them.")
         return lines
 
-    def _describe_missing(self) -> str:
+    def _describe_miss_probabilities(self) -> str:
         """Return a sentence with the probabilities of missing changed rows."""
         changed_count = max(1, round(CHANGED_FRACTION * self.rows))
         one_missed = self.compute_miss_probability(1)
@@ -358,7 +358,7 @@ def verify_result(
     new_runs = _plan_new_runs(rated, studies, options.new_maps, map_rng)
     verification.new_map_track = new_runs.track
     chosen_tasks = {key: tasks[key] for key in sampled} | dict(new_runs.tasks)
-    outcomes: dict[RunKey, Outcome | None] = {}
+    outcomes: dict[TrackRunKey, Outcome | None] = {}
     # A process that is killed may still write to the folder.
     with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX, ignore_cleanup_errors=True) as cache_folder:
         checker = _RunChecker(
@@ -371,12 +371,12 @@ def verify_result(
         )
         for key, check in _check_runs(checker, chosen_tasks, options.workers, quiet=quiet, stop=stop):
             verification.count(check, is_new=key in new_runs.tasks, is_joint=checker.is_joint)
-            verification.differences += _describe_check(key, check, rows.get(key), chosen_tasks[key])
+            verification.differences += _list_run_differences(key, check, rows.get(key), chosen_tasks[key])
             outcomes[key] = check.outcome
     if outcomes.keys() & new_runs.tasks.keys() and not stop.requested:
         gaps = _compute_gaps_on_new_maps(new_runs, outcomes, options.workers, stop)
         verification.comparison = compare_gaps(result["rows"], gaps, new_runs.track, map_rng)
-        verification.differences += _describe_comparison(verification.comparison)
+        verification.differences += _list_new_map_differences(verification.comparison)
     verification.differences = list(dict.fromkeys(verification.differences))
     return verification
 
@@ -397,7 +397,7 @@ def _find_controller(result: Mapping[str, Any], path: Path, controller: str | No
 
 def _get_selection(result: Mapping[str, Any]) -> Selection:
     selected = result["selection"]
-    return Selection(selected["quick"], tuple(selected["tracks"]), tuple(selected["maps"]))
+    return Selection(quick=selected["quick"], tracks=tuple(selected["tracks"]), maps=tuple(selected["maps"]))
 
 
 def _check_source(
@@ -430,7 +430,7 @@ def _compare_descriptions(entry: Mapping[str, Any], description: Mapping[str, An
     ]
 
 
-def _index_tasks(studies: Mapping[str, Study]) -> dict[RunKey, Task]:
+def _index_tasks(studies: Mapping[str, Study]) -> dict[TrackRunKey, Task]:
     """Return the tasks of all sweeps by track, map and seed."""
     tasks = {}
     for track, study in studies.items():
@@ -445,7 +445,7 @@ class _NewRuns:
 
     track: str = ""
     maps: Sequence[NewMap] = ()
-    tasks: Mapping[RunKey, Task] = field(default_factory=dict)
+    tasks: Mapping[TrackRunKey, Task] = field(default_factory=dict)
 
 
 def _plan_new_runs(
@@ -510,7 +510,7 @@ class _RunChecker:
         self._seed = seed
         self._cache_folder = cache_folder
 
-    def check(self, key: RunKey, task: Task) -> tuple[RunKey, RunCheck]:
+    def check(self, key: TrackRunKey, task: Task) -> tuple[TrackRunKey, RunCheck]:
         """Repeat a run and isolate some robots; return the key and the check. Called in several threads."""
         seed = [self._seed, _ROBOT_STREAM, int(task.input_hash[:12], 16)]
         robots = np.random.default_rng(seed).permutation(task.robots)[: self._robots].tolist()
@@ -521,8 +521,8 @@ class _RunChecker:
 
 
 def _check_runs(
-    checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, *, quiet: bool, stop: Interruption
-) -> Iterator[tuple[RunKey, RunCheck]]:
+    checker: _RunChecker, tasks: Mapping[TrackRunKey, Task], workers: int, *, quiet: bool, stop: Interruption
+) -> Iterator[tuple[TrackRunKey, RunCheck]]:
     """Check runs in parallel, and report the progress; yield each check as soon as it is finished."""
     if tasks:
         # The processes of controllers start with a copy of this machine code, and share nothing later.
@@ -536,8 +536,8 @@ def _check_runs(
 
 
 def _check_in_threads(
-    checker: _RunChecker, tasks: Mapping[RunKey, Task], workers: int, stop: Interruption
-) -> Iterator[tuple[RunKey, RunCheck]]:
+    checker: _RunChecker, tasks: Mapping[TrackRunKey, Task], workers: int, stop: Interruption
+) -> Iterator[tuple[TrackRunKey, RunCheck]]:
     """Check runs in several threads until the user interrupts; yield each check as soon as it is finished."""
     if not tasks:
         return
@@ -554,18 +554,18 @@ def _check_in_threads(
         pool.shutdown()
 
 
-def _describe_check(key: RunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
+def _list_run_differences(key: TrackRunKey, check: RunCheck, row: Row | None, task: Task) -> list[str]:
     """List the differences found in a run: in its metrics, and in the decisions of its robots."""
     differences = [f"{_format_key(key)}: {difference}" for difference in check.differences]
     if row is not None and check.outcome is not None:
         effort = check.outcome.files.get(EFFORT_FILE, b"{}")
-        differences += _list_differences(key, row, build_row(key[0], task, check.outcome, effort))
+        differences += _compare_metrics(key, row, build_row(key[0], task, check.outcome, effort))
     return differences
 
 
 def _compute_gaps_on_new_maps(
     new_runs: _NewRuns,
-    outcomes: Mapping[RunKey, Outcome | None],
+    outcomes: Mapping[TrackRunKey, Outcome | None],
     workers: int,
     stop: Interruption,
 ) -> list[tuple[str, float]]:
@@ -604,8 +604,8 @@ def _compute_gaps_on_new_maps(
     return gaps
 
 
-def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
-    """Return a message if the controller is clearly worse on new maps, otherwise an empty list."""
+def _list_new_map_differences(comparison: NewMapComparison | None) -> list[str]:
+    """List the difference that the controller is clearly worse on new maps, or nothing."""
     if comparison is None or not comparison.is_worse:
         return []
     return [
@@ -615,7 +615,7 @@ def _describe_comparison(comparison: NewMapComparison | None) -> list[str]:
 
 
 def _compare_without_running(
-    result: Mapping[str, Any], rows: Mapping[RunKey, Row], tasks: Mapping[RunKey, Task]
+    result: Mapping[str, Any], rows: Mapping[TrackRunKey, Row], tasks: Mapping[TrackRunKey, Task]
 ) -> Iterator[str]:
     """Yield the differences that can be found without any run: in versions, selected runs and gaps."""
     versions = describe_version_differences(result["versions"])
@@ -629,22 +629,22 @@ def _compare_without_running(
             yield f"{_format_key(key)}: a row of a run that was not selected"
     for key, row in rows.items():
         if "error" not in row:
-            yield from _list_differences(key, row, compute_gaps(row["track"], row["map"], row))
+            yield from _compare_metrics(key, row, compute_gaps(row["track"], row["map"], row))
 
 
-def _sample_runs(keys: Iterable[RunKey], sample: int, rng: np.random.Generator) -> list[RunKey]:
+def _sample_runs(keys: Iterable[TrackRunKey], sample: int, rng: np.random.Generator) -> list[TrackRunKey]:
     """Return a random sample of runs, in sorted order."""
     ordered = sorted(keys)
     chosen = rng.permutation(len(ordered))[:sample].tolist()
     return [ordered[k] for k in sorted(chosen)]
 
 
-def _format_key(key: RunKey) -> str:
+def _format_key(key: TrackRunKey) -> str:
     track, map_name, seed = key
     return f"{track}, {map_name}, seed {seed}"
 
 
-def _list_differences(key: RunKey, row: Row, recomputed: Mapping[str, Any]) -> list[str]:
+def _compare_metrics(key: TrackRunKey, row: Row, recomputed: Mapping[str, Any]) -> list[str]:
     """List the metrics of a row that differ from recomputed ones."""
     return [
         f"{_format_key(key)}: {name}: expected {value}, got {row.get(name)}"

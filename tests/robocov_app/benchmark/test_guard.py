@@ -72,7 +72,7 @@ def look_up_a_function():
     import ctypes
     ctypes.pythonapi.mkfifo
 
-def open_by_an_object():
+def open_through_a_path_object():
     import io
     io.FileIO(TwoPaths())
 
@@ -106,7 +106,7 @@ ATTEMPTS = {
     "write by the cache of numba": lambda: IndexDataCacheFile(FOLDER, "a", 1).save("k", b"data"),
     "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
     "read references by a special string": lambda: open(Text(REFERENCES)),
-    "read references by an object": open_by_an_object,
+    "read references through a path object": open_through_a_path_object,
     "read references by Python's import": read_references_by_import,
     "read references in an open folder": read_references_in_a_folder,
     "look up an open file of another process": lambda: os.stat(f"/proc/{os.getppid()}/fd/0"),

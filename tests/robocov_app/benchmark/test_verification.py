@@ -22,7 +22,7 @@ from robocov.observation import Snapshot
 from robocov_app.benchmark import suite, verification
 from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
 from robocov_app.benchmark.new_maps import (
-    MIN_P_VALUE,
+    SIGNIFICANCE_LEVEL,
     NewMapComparison,
     choose_track,
     compare_gaps,
@@ -291,9 +291,8 @@ def test_messages_that_are_larger_than_declared_are_shown(tmp_path: Path) -> Non
     assert team.declared_bytes == 6 * 91
     assert team.compressed_bytes > 6 * 91 * 9000
     verification = Verification(seed=0, rows=1)
-    verification.count(
-        RunCheck(None, 0, [], declared_bytes=540, compressed_bytes=4_900_000), is_new=False, is_joint=False
-    )
+    check = RunCheck(outcome=None, robots=0, differences=[], declared_bytes=540, compressed_bytes=4_900_000)
+    verification.count(check, is_new=False, is_joint=False)
     expected = "Messages: 1 kB as the controller declares their sizes, 4,900 kB as compressed content."
     assert expected in verification.describe()
 
@@ -301,7 +300,7 @@ def test_messages_that_are_larger_than_declared_are_shown(tmp_path: Path) -> Non
 def test_messages_that_are_not_declared_are_reported(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(IMPORTS + UNDECLARED_MESSAGES)
     assert isolate(f"{tmp_path / 'mine.py'}:Mine", "ideal", [2]) == [
-        "robots send messages from 0.00 s on, but declare the information own"
+        'robots send messages from 0.00 s on, but declare the information "own"'
     ]
     with pytest.raises(InputError, match="A controller whose robots send messages must declare"):
         rate(tmp_path, UNDECLARED_MESSAGES, "ideal")
@@ -466,7 +465,7 @@ worker._select_metrics = lambda summary: {**select_metrics(summary), "contacts":
 """,
         """
 from robocov_app.benchmark import verification
-verification._list_differences = lambda *_: []
+verification._compare_metrics = lambda *_: []
 """,
         """
 import robocov_app.benchmark.controller_program as program
@@ -494,9 +493,9 @@ def test_code_of_a_controller_changes_nothing_outside_its_process(attack: str, t
     rated = RatedController(name, {})
     result["entry"]["source_sha256"] = rated.identify(rated.read_code().source)["source_sha256"]
     (folder / RESULT_FILE).write_text(json.dumps(result))
-    honest_functions = worker._select_metrics, verification._list_differences
+    honest_functions = worker._select_metrics, verification._compare_metrics
     differences = verify(folder, name, ONLY_METRICS).differences
-    assert (worker._select_metrics, verification._list_differences) == honest_functions
+    assert (worker._select_metrics, verification._compare_metrics) == honest_functions
     expected = "mean_distance_m: expected"
     if "Command" in attack:
         expected = "its process sent an invalid message: builtins.exec: expected plain values"
@@ -661,7 +660,7 @@ def test_equal_gaps_on_new_maps_are_accepted() -> None:
         comparison = compare(build_rows(0.0, 1.0), [(family, float(rng.random())) for family in GENERATORS])
         assert comparison is not None
         p_values.append(comparison.p_value)
-    assert min(p_values) > MIN_P_VALUE
+    assert min(p_values) > SIGNIFICANCE_LEVEL
     assert 0.2 < np.median(p_values) < 0.8
 
 
