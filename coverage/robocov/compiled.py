@@ -276,7 +276,7 @@ def import_numba() -> ModuleType:
 
 @functools.cache
 def _import_numba() -> ModuleType:
-    """Import numba, teach it the type of kernels, and report its compilations to listeners; only once."""
+    """Import numba once, register the type of kernels, and report compilations to the listeners."""
     is_source_root = False
     if "numba" not in sys.modules and "coverage" not in sys.modules:
         spec = importlib.util.find_spec("coverage")

@@ -68,7 +68,8 @@ class RunMetrics:
     wall_clearance : (K,) array, m
         Minimum distance from the rim of a robot to a wall since the previous sample; inf if none works.
     robot_clearance : (K,) array, m
-        Minimum distance between the rims of two robots since the previous sample; inf if fewer work.
+        Minimum distance between the rims of two robots since the previous sample; inf if fewer than two
+        robots work.
     free_area : float, m²
         Free area of the map.
 

@@ -129,8 +129,8 @@ class BeyondPlan:
 
     def get_seeds(self, controller: str) -> tuple[int, ...]:
         """Return the seeds of the starts of a controller."""
-        seeds_of_ours = dict(zip(OURS, (self.own_seeds, self.shared_seeds), strict=True))
-        return seeds_of_ours.get(controller, self.seeds)
+        own_controller_seeds = dict(zip(OURS, (self.own_seeds, self.shared_seeds), strict=True))
+        return own_controller_seeds.get(controller, self.seeds)
 
 
 @dataclass(frozen=True)

@@ -53,9 +53,9 @@ class ExceptionLog:
             One sentence with the exception and where the log is.
         """
         self.count += 1
-        location = _find_location(error)
-        self._counts[location] += 1
-        count = self._counts[location]
+        error_key = _build_key(error)
+        self._counts[error_key] += 1
+        count = self._counts[error_key]
         # True for the powers of ten: 1, 10, 100, ...
         if str(count).strip("0") == "1":
             self._write(error, action, count)
@@ -113,8 +113,8 @@ def describe_os_error(error: OSError) -> str:
     return remove_controls(reason, single_line=True)
 
 
-def _find_location(error: BaseException) -> tuple[str, str, int]:
-    """Return the type of an exception, and the file and line number at which it was raised."""
+def _build_key(error: BaseException) -> tuple[str, str, int]:
+    """Return the type of an exception, and the file and line at which it was raised, to count equal ones."""
     frames = traceback.extract_tb(error.__traceback__, limit=-1)
     if not frames:
         return type(error).__name__, "", 0

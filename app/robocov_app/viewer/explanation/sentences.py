@@ -203,7 +203,7 @@ def _list_rest_reasons(situation: RobotSituation, motion: Motion) -> list[str]:
         return [f"{prefix}{name} presses it against {situation.holding_names}"]
     balancing = _find_balancing_forces(forces)
     # While a robot still creeps, viscosity is one of the forces that cancel, and the others do not balance.
-    if not situation.is_balanced or len(balancing) < 2 or not _cancel(list(forces.values())):
+    if not situation.is_balanced or len(balancing) < 2 or not _are_balanced(list(forces.values())):
         return []
     names = " and ".join(_name_force_with_size(situation, kind) for kind in balancing)
     return [f"{prefix}{names} balance"]
@@ -216,13 +216,13 @@ def _compute_component(force: complex, direction: complex) -> float:
 def _find_balancing_forces(forces: dict[str, complex]) -> list[str]:
     """Return the kinds of the two strongest forces if they cancel, or else of the three strongest."""
     strongest = sorted(forces, key=lambda kind: -abs(forces[kind]))
-    is_pair = _cancel([forces[kind] for kind in strongest[:2]])
+    is_pair = _are_balanced([forces[kind] for kind in strongest[:2]])
     named = strongest[: 2 if is_pair else MAX_NAMED_FORCES]
     return [kind for kind in forces if kind in named]
 
 
-def _cancel(forces: list[complex]) -> bool:
-    """Return whether the sum of forces is much smaller than the largest of them."""
+def _are_balanced(forces: list[complex]) -> bool:
+    """Return whether the sum of forces is much smaller than the largest one."""
     return abs(sum(forces)) < _BALANCE_FRACTION * max(map(abs, forces))
 
 

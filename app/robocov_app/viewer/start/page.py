@@ -234,7 +234,7 @@ class StartPage(BaseWindow):
         command = self._commands.take_command(event)
         if command is not None:
             self._commands.run(command.name)
-        # The letter of the key follows as a separate text event, which a newly opened dialog must ignore.
+        # The character of the key follows as a separate text event, which a newly opened dialog must ignore.
         self.dialogs.ignore_character(event.unicode)
 
     def _click(self, pixel: tuple[int, int]) -> None:
