@@ -327,7 +327,8 @@ class _Policy:
 
     def _is_own_module(self, name: str) -> bool:
         """Return whether a module belongs to the controller."""
-        return name.partition(".")[0] in self._own_packages or is_own_module(name.partition(".")[0])
+        top_name = name.partition(".")[0]
+        return top_name in self._own_packages or is_own_module(top_name)
 
 
 def _find_folder(package: str) -> str | None:
