@@ -15,6 +15,7 @@ import pytest
 from local_deciders import run_isolated
 from small_studies import HEAD, PULL, DirectExecutor
 
+from robocov.conditions.random_streams import POSITION_STREAM, create_generator
 from robocov.controllers import CONTROLLERS
 from robocov.errors import InputError
 from robocov.generator import GENERATORS
@@ -267,6 +268,18 @@ def test_data_hidden_in_motion_is_not_detected(tmp_path: Path) -> None:
     read = controller.controller.force.__globals__["READ"]
     # Robot 3 reads the numbers of the others.
     assert read[-1] == [1, 2, 4, 5, 6]
+
+
+def test_the_noise_of_frozen_runs_can_be_computed() -> None:
+    """The handbook names this limit of verifications."""
+    snapshots: list[Snapshot] = []
+    task = build_task("lloyd", "noisy")
+    run_isolated(task, [], snapshots)
+    noise = create_generator(task.seed, POSITION_STREAM, 0).normal(scale=0.1, size=(6, 2))
+    quiet_snapshots: list[Snapshot] = []
+    run_isolated(build_task("lloyd", "ideal"), [], quiet_snapshots)
+    computed = snapshots[0].seen.positions - noise
+    assert computed == pytest.approx(quiet_snapshots[0].seen.positions, abs=1e-12)
 
 
 @pytest.mark.parametrize("track", ["ideal", "short-range", "lossy"])
