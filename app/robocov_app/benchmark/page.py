@@ -28,7 +28,7 @@ _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
 MAX_INCOMPLETE_TABLES = 10
 """Maximum number of incomplete entries on each track that are compared with the yardsticks."""
-MAX_PLOTTED_ENTRIES = 40
+MAX_PLOTTED_ENTRIES = 10
 """Maximum number of entries in a plot, apart from the bundled ones; those with the highest scores."""
 
 
