@@ -1,0 +1,85 @@
+"""The numbers and verdicts on the page about the paper are those of the full study."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from typing import Any
+
+import pytest
+from markdown_pages import read_handbook_page
+
+from robocov_app.commands.handbook import find_page_sources
+from robocov_app.replication.claims.registration import load_registration
+
+PAGE = read_handbook_page("paper")
+CLAIMS: dict[str, dict[str, Any]] = {
+    claim["key"]: claim
+    for claim in json.loads((find_page_sources() / "static/paper-claims.json").read_text(encoding="utf-8"))
+}
+"""The file ``claims.json`` of the full study, by the keys of the claims."""
+GAINS = ("shared", "best", "default")
+ROWS = {
+    "convex-final": "convex: RAPF ends at Lloyd's cost",
+    "convex-spreading": "convex: RAPF spreads faster",
+    "nonconvex-final": "non-convex: RAPF ends below RPF",
+    "nonconvex-motion": "non-convex: RAPF is below RPF while it moves",
+    "starts-cost": "RAPF's final cost barely depends on the starts, RPF's does",
+    "starts-placement": "RAPF's final placement barely depends on the starts",
+    "nonconvex-lloyd": "non-convex: RAPF outperforms Lloyd",
+    "gap-rapf": "RAPF is nearly optimal",
+    "gap-rpf": "RPF is far from the optimum",
+    "limited-nonconvex-final": "limited ranges: RAPF ends below RPF",
+    "limited-nonconvex-motion": "limited ranges: RAPF is below RPF while it moves",
+    "limited-nonconvex-lloyd": "limited ranges: RAPF outperforms Lloyd",
+    "limited-gap-rapf": "limited ranges: RAPF is nearly optimal",
+}
+"""Beginnings of the rows of the table of verdicts, by the keys of their claims without the gains."""
+SHORT_VERDICTS = {"holds partly": "partly"}
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+
+
+def find_row(beginning: str) -> list[str]:
+    """Return the cells of the row of a table that starts with a text and a semicolon."""
+    [line] = [line for line in PAGE.splitlines() if line.startswith(f"| {beginning};")]
+    return [cell.strip() for cell in line.strip("| ").split(" | ")]
+
+
+def assert_is_rounded(text: str, criterion: dict[str, Any]) -> None:
+    """Check that a text contains the estimate of a criterion and its interval, in this order."""
+    numbers = NUMBER.findall(text)
+    factor = 100.0 if "%" in text else 1.0
+    for number, value in zip(numbers, (criterion["estimate"], *criterion["interval"]), strict=True):
+        decimals = len(number.partition(".")[2])
+        assert number == f"{factor * value:.{decimals}f}"
+
+
+def test_the_study_is_the_registered_one() -> None:
+    assert tuple(CLAIMS) == load_registration().claims
+    assert min(claim["maps"] for claim in CLAIMS.values()) == 12  # of the grid of gains
+    assert CLAIMS["nonconvex-final-shared"]["maps"] == 100
+
+
+@pytest.mark.parametrize("key", ROWS)
+def test_rows_of_the_table_are_measured_values(key: str) -> None:
+    _, _, *cells, verdicts = find_row(ROWS[key])
+    claims = [CLAIMS[f"{key}-{gains}"] for gains in GAINS]
+    for cell, claim in zip(cells, claims, strict=True):
+        assert_is_rounded(cell, claim["criteria"][0])
+    expected = [SHORT_VERDICTS.get(claim["verdict"], claim["verdict"]) for claim in claims]
+    is_same = len(set(expected)) == 1
+    assert verdicts == (f"{expected[0]} (all three)" if is_same else ", ".join(expected))
+
+
+def test_the_summary_counts_the_verdicts() -> None:
+    counts = Counter(claim["verdict"] for claim in CLAIMS.values())
+    [sentence] = re.findall(r"Of 44 claims, [^.]*\.", PAGE)
+    numbers = {
+        "holds": int(re.search(r"(\d+) holds?\b(?! partly)", sentence)[1]),  # type: ignore[index]
+        "holds partly": int(re.search(r"(\d+) holds? partly", sentence)[1]),  # type: ignore[index]
+        "undecided": int(re.search(r"(\d+) (?:is|are) undecided", sentence)[1]),  # type: ignore[index]
+        "does not hold": int(re.search(r"(\d+) do(?:es)? not hold", sentence)[1]),  # type: ignore[index]
+    }
+    assert numbers == {verdict: counts[verdict] for verdict in numbers}
+    assert sum(numbers.values()) == len(CLAIMS) == 44
