@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import copy
 import html
-import os
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -255,16 +253,6 @@ def test_the_page_shows_entries_with_any_content() -> None:
     assert sum("incomplete" in caption for caption in tables) == MAX_INCOMPLETE_TABLES
     assert "Incomplete entries without a table: 40." in page
     assert "Entries with lower scores that are not drawn: 47." in page
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    os.environ["SE_OFFLINE"] = "true"
-    shared = Browser(tmp_path_factory.mktemp("profile"))
-    try:
-        yield shared
-    finally:
-        shared.driver.quit()
 
 
 @pytest.mark.slow

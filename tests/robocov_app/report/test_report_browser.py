@@ -1,9 +1,7 @@
 """The report in a browser: replay, keyboard, enlarged images, dark theme, print and narrow screens."""
 
 import base64
-import os
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -72,17 +70,6 @@ while (walker.nextNode()) {
 }
 return [checked, failures];
 """
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    # Without this, Selenium would look for drivers in the network.
-    os.environ["SE_OFFLINE"] = "true"
-    shared = Browser(tmp_path_factory.mktemp("profile"))
-    try:
-        yield shared
-    finally:
-        shared.driver.quit()
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pygame
 import pytest
-from driven_browser import CHROMIUM, DRIVER, Browser
+from driven_browser import CHROMIUM, DRIVER
 from served_window import serve_window
 from sub_path_proxy import PREFIX, SubPathProxy
 
@@ -42,13 +42,6 @@ pytestmark = [
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and its driver"),
     pytest.mark.xdist_group("web"),
 ]
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    browser = Browser(tmp_path_factory.mktemp("browser"))
-    yield browser
-    browser.driver.quit()
 
 
 @pytest.fixture(autouse=True)

@@ -40,13 +40,6 @@ def set_page(browser: Browser, width: int, height: int, *, is_touched: bool) -> 
     browser.resize(width, height)
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    browser = Browser(tmp_path_factory.mktemp("browser"))
-    yield browser
-    browser.driver.quit()
-
-
 def test_a_request_for_control_is_shown_over_the_map_and_covers_no_list(browser, tmp_path):
     set_page(browser, 1280, 720, is_touched=False)
     with serve_window("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
