@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from robocov.controllers.base import BaseController
+from robocov.controllers.base import TIME_TOLERANCE_S, BaseController, is_plan_due
 from robocov.controllers.driving import update_returns
 from robocov.controllers.exploration.route_following import RouteGains, RouteProgress, follow_routes
 from robocov.controllers.gains import gain, response_time_gain
@@ -28,8 +28,6 @@ from robocov.typing import FloatArray, IntArray
 
 _PLANNER_LATTICE = 8
 """Number of sites along a side of the planner's lattice, on which no costs are computed."""
-_TIME_TOLERANCE_S = 1e-9
-"""Difference between two times that is attributed to rounding."""
 _UNREACHABLE_M = 1e6
 """Length that stands for a missing path when goals are assigned."""
 
@@ -88,14 +86,13 @@ class Oracle(BaseController):
         return OracleMemory(team, routes=unknown, waypoint_indices=np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: OracleMemory) -> Decision:
-        """Compute the forces along the paths, which are planned once in each period."""
+        """Compute the forces along the paths, which are planned in each period and at each new stage."""
         assert self.environment is not None
         stages = self.environment.extra["oracle"]
         stage = _find_stage(stages, seen.time)
-        is_due = seen.time >= memory.plan_time + self.period - _TIME_TOLERANCE_S
-        if stage != memory.stage or is_due:
-            clearance = float(memory.team.radius.max()) + self.clearance
-            planner = _get_planner(self.environment, clearance)
+        if stage != memory.stage or is_plan_due(memory.plan_time, self.period, seen.time):
+            wall_distance = float(memory.team.radius.max()) + self.clearance
+            planner = _get_planner(self.environment, wall_distance)
             _, robots, positions = stages[stage]
             routes = plan_routes(planner, seen.positions, robots, np.array(positions, dtype=float))
             memory = replace(
@@ -119,7 +116,7 @@ class Oracle(BaseController):
 
 def _find_stage(stages: list[Any], time: float) -> int:
     """Return the index of the placement to use at a time, s: the last placement that has started."""
-    started_stages = [k for k, (start, _, _) in enumerate(stages) if start <= time + _TIME_TOLERANCE_S]
+    started_stages = [k for k, (start, _, _) in enumerate(stages) if start <= time + TIME_TOLERANCE_S]
     return max(started_stages)
 
 

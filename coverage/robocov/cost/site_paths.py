@@ -203,7 +203,7 @@ def find_site_paths(
 
 @kernel
 def _write_team_paths(tiles: Tiles, search: Search, team: int, grid_spacing: float, paths: SitePaths) -> None:
-    """Write the paths that a search has found to the row of a team in `paths`."""
+    """Copy the paths that a search has found into the row of a team in `paths`."""
     sites = tiles.sites
     site_lengths = search.site_lengths
     site_robots = search.site_robots
@@ -368,8 +368,9 @@ def _find_nearest_robots_in_tile(
 def _find_hidden_sites(cost_map: CostMap, search: Search, is_covered: BoolArray) -> bool:
     """Find the hidden sites: those that a wall hides from their nearest robot. Return whether there are any.
 
-    They are written to a bit mask for each tile, with one bit for each slot. `is_covered`, (c,), says which
-    components of the free space contain robots. No path leads to the sites in the other components.
+    The hidden sites of each tile are written to a bit mask, with one bit for each slot. `is_covered`, (c,),
+    tells which components of the free space contain robots. Sites in the other components get an infinite
+    length and no robot.
     """
     walls = cost_map.walls
     wall_index = search.wall_index

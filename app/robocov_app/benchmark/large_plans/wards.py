@@ -30,7 +30,8 @@ _STORAGE_DOOR_M = 2.6
 """Distance of the middle of the door of the storage room from the outer wall."""
 _STORAGE_SHELF_DEPTH_M = 0.7
 _HUB_CORNER_M = 4.0
-"""Width of the elevators, the stairs and the storage room in the corners of the hub."""
+"""Side of the square corners of the hub. The elevators in one of them are this deep, but wider."""
+_ELEVATORS = 2
 _ELEVATOR_WIDTH_M = 2.2
 _ELEVATOR_DOOR_M = 1.2
 _ELEVATOR_NICHE_M = 0.4
@@ -145,16 +146,16 @@ def _draw_nurse_station(drawing: Drawing) -> None:
 
 
 def _outline_elevators(half_hub: float, front: float) -> list[tuple[float, float]]:
-    """Return the outline of two elevators in the upper left corner of the hub, with niches at their doors."""
+    """Return the outline of two elevators in the upper left corner of the hub, with recessed doors."""
     points = [(-half_hub, half_hub), (-half_hub, front)]
-    for number in range(2):
+    door_y = front + _ELEVATOR_NICHE_M
+    for number in range(_ELEVATORS):
         middle = -half_hub + (number + 0.5) * _ELEVATOR_WIDTH_M
         left = middle - _ELEVATOR_DOOR_M / 2.0
         right = middle + _ELEVATOR_DOOR_M / 2.0
-        niche = front + _ELEVATOR_NICHE_M
-        points += [(left, front), (left, niche), (right, niche), (right, front)]
-    end = -half_hub + 2.0 * _ELEVATOR_WIDTH_M
-    return [*points, (end, front), (end, half_hub)]
+        points += [(left, front), (left, door_y), (right, door_y), (right, front)]
+    right_end = -half_hub + _ELEVATORS * _ELEVATOR_WIDTH_M
+    return [*points, (right_end, front), (right_end, half_hub)]
 
 
 def _draw_wing(rng: np.random.Generator, part: Drawing, wing: _Wing) -> None:
