@@ -39,7 +39,7 @@ from robocov_app.benchmark.learned import (
     build_inputs,
     to_offsets,
 )
-from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.learning.policy_network import Network, evaluate_network
 
 SEED = 1

@@ -11,15 +11,15 @@ import numpy as np
 from robocov.controllers import get_information, make_controller
 from robocov.observation import Decision, DensitySensor, Observations, Scanning, Snapshot
 from robocov.typing import FloatArray, IntArray
-from robocov_app.benchmark.controller_messages import (
-    ControllerCode,
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.verification.controller_messages import (
     Setup,
     StepEncoder,
     decode_decision,
     encode_decision,
 )
-from robocov_app.benchmark.controller_program import ControllerProgram
-from robocov_app.benchmark.isolation import IsolatedTeam
+from robocov_app.benchmark.verification.controller_program import ControllerProgram
+from robocov_app.benchmark.verification.isolation import IsolatedTeam
 from robocov_app.sweep.tasks import Task
 from robocov_app.sweep.worker import Outcome, perform
 

@@ -14,7 +14,7 @@ from robocov.controllers.user_modules import ControllerSource
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.controller_messages import ControllerCode
+from robocov_app.benchmark.controller_code import ControllerCode
 from robocov_app.benchmark.results import find_reference
 from robocov_app.sweep.study.controller_files import read_controller_source
 from robocov_app.sweep.study.study import Study, StudyMap

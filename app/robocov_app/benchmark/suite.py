@@ -17,8 +17,8 @@ from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, describe_unknown_name, find_similar_names, quote
 from robocov.generator import GENERATORS, generate_map
 from robocov.mapfile import load_map, to_json
-from robocov_app.benchmark.large_plans import LARGE_PLANS, build_large_plan
-from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.maps.large_plans import LARGE_PLANS, build_large_plan
+from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
 from robocov_app.evaluation.hot_spots import add_hot_spots
 from robocov_app.sweep.study.study import Study, StudyMap
 

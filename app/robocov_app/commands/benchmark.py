@@ -223,7 +223,7 @@ def _print_suite(options: Arguments) -> int:
 
 def _verify(options: Arguments) -> int:
     """Verify a result, print the differences, and return the exit status."""
-    from robocov_app.benchmark.verification import VerificationOptions, verify_result
+    from robocov_app.benchmark.verification.verification import VerificationOptions, verify_result
     from robocov_app.sweep.local_pool import count_processors
 
     path = options.paths[0]
@@ -266,7 +266,7 @@ def _verify(options: Arguments) -> int:
 def _write_page(options: Arguments) -> int:
     """Write the page that compares results."""
     from robocov.files.writing import replace_file
-    from robocov_app.benchmark.page import build_page
+    from robocov_app.benchmark.page.page import build_page
     from robocov_app.benchmark.results import check_gaps, load_bundled_results, read_result
     from robocov_app.commands.report import check_target
 

@@ -11,7 +11,7 @@ from robocov_app.benchmark import suite
 @pytest.fixture
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the plots of the page, which take most of the time to build it."""
-    monkeypatch.setattr("robocov_app.benchmark.page.build_plots", lambda *args: [])
+    monkeypatch.setattr("robocov_app.benchmark.page.page.build_plots", lambda *args: [])
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from robocov_app.benchmark.anomalies import find_anomalies
+from robocov_app.benchmark.page.anomalies import find_anomalies
 
 
 def test_teams_that_never_move_or_end_far_above_rapf_are_found() -> None:

@@ -15,7 +15,7 @@ from benchmark_results import MAPS, build_bundled_rapf, build_result, select_bun
 from driven_browser import CHROMIUM, DRIVER, Browser
 
 from robocov_app.benchmark import ratings, suite
-from robocov_app.benchmark.page import MAX_INCOMPLETE_TABLES, build_page
+from robocov_app.benchmark.page.page import MAX_INCOMPLETE_TABLES, build_page
 
 
 class PageTables(NamedTuple):

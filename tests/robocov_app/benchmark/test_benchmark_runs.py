@@ -32,7 +32,7 @@ from robocov_app.benchmark.results import (
     read_result,
 )
 from robocov_app.benchmark.running import TRACKS_FOLDER, run_benchmark
-from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
+from robocov_app.benchmark.verification.verification import Verification, VerificationOptions, verify_result
 from robocov_app.cli import main
 from robocov_app.terminal.interruption import Interruption
 
@@ -180,7 +180,7 @@ def test_a_verification_without_runs_has_the_exit_status_of_a_failure(
     runs: int, status: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "robocov_app.benchmark.verification.verify_result",
+        "robocov_app.benchmark.verification.verification.verify_result",
         lambda *_, **__: Verification(seed=0, rows=1, runs=runs),
     )
     assert main(["benchmark", "verify", "entry"]) == status

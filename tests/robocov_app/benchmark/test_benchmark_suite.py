@@ -15,7 +15,7 @@ from robocov.errors import InputError, ParameterError
 from robocov.simulation import Simulation
 from robocov.team import Team
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.large_plans import LARGE_PLANS
+from robocov_app.benchmark.maps.large_plans import LARGE_PLANS
 from robocov_app.benchmark.oracle import Oracle, assign_goals
 from robocov_app.benchmark.references import list_references
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from robocov_app.benchmark import controller_process
+from robocov_app.benchmark.verification import controller_process
 
 CODE = """
 import importlib.util
@@ -25,7 +25,7 @@ from pathlib import Path
 
 from robocov.compiled import import_numba
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.guard import install_guard
+from robocov_app.benchmark.verification.guard import install_guard
 
 import_numba()
 from numba.core.caching import IndexDataCacheFile

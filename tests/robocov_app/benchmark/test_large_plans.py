@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from robocov.mapfile.check import check_map
-from robocov_app.benchmark.large_plans import LARGE_PLANS, build_large_plan
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
-from robocov_app.benchmark.large_plans.tunnels import draw_tunnels
+from robocov_app.benchmark.maps.large_plans import LARGE_PLANS, build_large_plan
+from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline
+from robocov_app.benchmark.maps.large_plans.tunnels import draw_tunnels
 
 SEEDS = range(7001, 7005)
 """One seed for each layout."""

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from robocov_app.benchmark import pareto_plots
-from robocov_app.benchmark.label_placement import place_labels
-from robocov_app.benchmark.pareto_plots import (
+from robocov_app.benchmark.page import pareto_plots
+from robocov_app.benchmark.page.label_placement import place_labels
+from robocov_app.benchmark.page.pareto_plots import (
     ParetoPoint,
     draw_pareto_figure,
     find_pareto_front,

@@ -15,7 +15,7 @@ from robocov.typing import FloatArray
 from robocov_app.benchmark import suite
 from robocov_app.benchmark.rated_controller import RatedController, Selection
 from robocov_app.benchmark.running import run_benchmark
-from robocov_app.benchmark.verification import Verification, VerificationOptions, verify_result
+from robocov_app.benchmark.verification.verification import Verification, VerificationOptions, verify_result
 from robocov_app.sweep.tasks import Task, generate_tasks
 from robocov_app.sweep.worker import perform
 from robocov_app.terminal.interruption import Interruption

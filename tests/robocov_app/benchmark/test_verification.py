@@ -20,20 +20,21 @@ from robocov.controllers import CONTROLLERS
 from robocov.errors import InputError
 from robocov.generator import GENERATORS
 from robocov.observation import Snapshot
-from robocov_app.benchmark import suite, verification
-from robocov_app.benchmark.controller_messages import decode_payload, encode_payload
-from robocov_app.benchmark.new_maps import (
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
+from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
+from robocov_app.benchmark.running import run_benchmark
+from robocov_app.benchmark.verification import verification
+from robocov_app.benchmark.verification.controller_messages import decode_payload, encode_payload
+from robocov_app.benchmark.verification.new_maps import (
     SIGNIFICANCE_LEVEL,
     NewMapComparison,
     choose_track,
     compare_gaps,
     sample_new_maps,
 )
-from robocov_app.benchmark.rated_controller import LEARNED, ORACLE, RatedController, Selection
-from robocov_app.benchmark.referee import RunCheck
-from robocov_app.benchmark.results import RESULT_FILE, compute_gaps, find_reference, read_result
-from robocov_app.benchmark.running import run_benchmark
-from robocov_app.benchmark.verification import (
+from robocov_app.benchmark.verification.referee import RunCheck
+from robocov_app.benchmark.verification.verification import (
     Verification,
     VerificationOptions,
     verify_result,
@@ -477,11 +478,11 @@ select_metrics = worker._select_metrics
 worker._select_metrics = lambda summary: {**select_metrics(summary), "contacts": 0, "mean_distance_m": COST}
 """,
         """
-from robocov_app.benchmark import verification
+from robocov_app.benchmark.verification import verification
 verification._compare_metrics = lambda *_: []
 """,
         """
-import robocov_app.benchmark.controller_program as program
+import robocov_app.benchmark.verification.controller_program as program
 COMMAND = "import robocov_app.sweep.worker as worker; worker._select_metrics = lambda _: {}"
 
 class Command:

@@ -19,8 +19,8 @@ from robocov.observation import Message, Observations
 from robocov.planning.scan_log import NumberedScan
 from robocov.simulation import Simulation
 from robocov.team import Team
-from robocov_app.benchmark.controller_messages import encode_payload
-from robocov_app.benchmark.isolation import hide_others, sample_substitutes
+from robocov_app.benchmark.verification.controller_messages import encode_payload
+from robocov_app.benchmark.verification.isolation import hide_others, sample_substitutes
 
 ROOMS = Environment(
     "two rooms",

@@ -1,8 +1,8 @@
 """Repeated runs: a referee simulates a run and computes its metrics; the controller decides elsewhere.
 
 A referee is the process of one run. It never imports the code of a user: its simulation gets the forces,
-goals and messages of the robots from other processes; see `robocov_app.benchmark.isolation`. Forces must be
-finite numbers of the right shape, and are limited like those of any controller.
+goals and messages of the robots from other processes; see `robocov_app.benchmark.verification.isolation`.
+Forces must be finite numbers of the right shape, and are limited like those of any controller.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from robocov.errors import OutputError
-from robocov_app.benchmark.controller_messages import ControllerCode, Description
-from robocov_app.benchmark.controller_process import ControllerProcess
-from robocov_app.benchmark.isolation import IsolatedTeam
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.verification.controller_messages import Description
+from robocov_app.benchmark.verification.controller_process import ControllerProcess
+from robocov_app.benchmark.verification.isolation import IsolatedTeam
 from robocov_app.jobs.messages import READY, Channel, receive
 from robocov_app.jobs.processes import ask_process, end_process, start_process
 from robocov_app.sweep.tasks import Task
@@ -42,7 +43,7 @@ class RepeatedRun:
     robots : sequence of int
         Rows of the robots whose decisions are repeated in processes of their own.
     seed : sequence of int
-        Seed of the placeholders for other robots; see `robocov_app.benchmark.isolation`.
+        Seed of the placeholders for other robots; see `robocov_app.benchmark.verification.isolation`.
     cache_folder : Path
         Folder for the machine code that the processes of controllers compile.
     """

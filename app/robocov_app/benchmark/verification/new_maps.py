@@ -22,7 +22,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.generator import GENERATORS, generate_map
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.realistic_maps import FLOOR_PLANS, build_floor_plan
+from robocov_app.benchmark.maps.realistic_maps import FLOOR_PLANS, build_floor_plan
 
 MAX_NEW_MAPS = len(suite.FAMILIES) - 1
 """Maximum number of new maps: one of each family that has a generator."""

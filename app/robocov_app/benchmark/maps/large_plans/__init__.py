@@ -8,14 +8,14 @@ from collections.abc import Callable
 import numpy as np
 
 from robocov.environment import Environment
-from robocov_app.benchmark.large_plans.depots import draw_depot
-from robocov_app.benchmark.large_plans.museums import draw_museum
-from robocov_app.benchmark.large_plans.office_floors import draw_office_floor
-from robocov_app.benchmark.large_plans.schools import draw_school
-from robocov_app.benchmark.large_plans.tunnels import draw_tunnels
-from robocov_app.benchmark.large_plans.wards import draw_ward
-from robocov_app.benchmark.plan_search import find_valid_map
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.maps.large_plans.depots import draw_depot
+from robocov_app.benchmark.maps.large_plans.museums import draw_museum
+from robocov_app.benchmark.maps.large_plans.office_floors import draw_office_floor
+from robocov_app.benchmark.maps.large_plans.schools import draw_school
+from robocov_app.benchmark.maps.large_plans.tunnels import draw_tunnels
+from robocov_app.benchmark.maps.large_plans.wards import draw_ward
+from robocov_app.benchmark.maps.plan_search import find_valid_map
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
 _FIRST_KIND_NUMBER = 100
 """Number of the first kind, chosen so that no kind shares its random numbers with the smaller maps."""

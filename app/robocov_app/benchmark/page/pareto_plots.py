@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from robocov.typing import FloatArray
-from robocov_app.benchmark.label_placement import (
+from robocov_app.benchmark.page.label_placement import (
     MARK_HALF_SIZE_PX,
     compute_half_sizes,
     compute_nearest_points,

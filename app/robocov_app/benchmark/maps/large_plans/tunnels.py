@@ -10,8 +10,8 @@ import shapely
 
 from robocov.environment import Obstacle, Point, PolygonObstacle
 from robocov.typing import FloatArray
-from robocov_app.benchmark.large_plans.drawing import build_octagon
-from robocov_app.benchmark.plan_shapes import FloorPlan, build_box, round_points
+from robocov_app.benchmark.maps.large_plans.drawing import build_octagon
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan, build_box, round_points
 
 _MIN_PILLAR_AREA_M2 = 2.0
 """Minimum area of the rock between tunnels; smaller pieces are cut away."""

@@ -9,7 +9,7 @@ import shapely
 
 from robocov.environment import Obstacle, Point, PolygonObstacle, Ring, WallObstacle
 from robocov.typing import FloatArray
-from robocov_app.benchmark.plan_shapes import INNER_WALL_M, build_box, round_points
+from robocov_app.benchmark.maps.plan_shapes import INNER_WALL_M, build_box, round_points
 
 DOOR_WIDTH_M = 0.9
 """Width of most doors."""

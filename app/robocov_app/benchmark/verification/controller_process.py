@@ -18,13 +18,13 @@ from robocov.controllers.base import Information
 from robocov.errors import ParameterError, RobocovError, quote
 from robocov.observation import Decision, Observations, Scanning
 from robocov.typing import FloatArray, IntArray
-from robocov_app.benchmark.controller_messages import (
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.verification.controller_messages import (
     ANSWER,
     FAULT,
     MEASURE,
     READING,
     VIOLATION,
-    ControllerCode,
     DamagedMessageError,
     Description,
     Setup,
@@ -35,7 +35,10 @@ from robocov_app.benchmark.controller_messages import (
 from robocov_app.jobs.messages import send
 from robocov_app.jobs.processes import end_process, start_python
 
-_PROGRAM = "from robocov_app.benchmark.controller_program import run_controller_program as run; run()"
+_PROGRAM = """
+from robocov_app.benchmark.verification.controller_program import run_controller_program
+run_controller_program()
+"""
 CACHE_PREFIX = "robocov-verify-"
 """Beginning of the names of temporary folders for machine code."""
 _MAX_LISTED = 20
@@ -243,7 +246,7 @@ def read_description(values: Any) -> Description:
     Parameters
     ----------
     values : object
-        As `robocov_app.benchmark.controller_messages.describe` returns them, or anything else.
+        As `robocov_app.benchmark.verification.controller_messages.describe` returns them, or anything else.
 
     Returns
     -------

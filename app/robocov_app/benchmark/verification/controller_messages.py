@@ -22,13 +22,13 @@ from robocov.controllers import get_information, make_controller
 from robocov.controllers.base import Information
 from robocov.controllers.gains import Value, get_gain_values
 from robocov.controllers.individual import unwrap_controller
-from robocov.controllers.user_modules import ControllerSource
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.typing import FloatArray
+from robocov_app.benchmark.controller_code import ControllerCode
 
 ANSWER = "answer"
 """Kind of a message from a process: the answer to a request."""
@@ -48,25 +48,6 @@ _PAYLOAD_PROTOCOL = 4
 
 class DamagedMessageError(RobocovError):
     """A process has sent something other than the expected plain values."""
-
-
-@dataclass(frozen=True)
-class ControllerCode:
-    """A controller, as a process builds it.
-
-    Attributes
-    ----------
-    name : str
-        Name of the controller, or ``file.py:Class``.
-    gains : mapping of str to float, str or None
-        Gains that differ from the defaults.
-    source : ControllerSource or None
-        Source text, if the controller is in a file.
-    """
-
-    name: str
-    gains: Mapping[str, Value]
-    source: ControllerSource | None
 
 
 @dataclass(frozen=True)

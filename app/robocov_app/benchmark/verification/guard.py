@@ -36,7 +36,7 @@ _IMPORT_FILE = "<frozen importlib._bootstrap>"
 """Name in place of a file for the code of Python that imports modules."""
 _IMPORT_FUNCTION = "_find_and_load"
 """Function in `_IMPORT_FILE` that imports the module in its variable ``name``."""
-_DATA_FOLDER = str(Path(__file__).parent)
+_DATA_FOLDER = str(Path(__file__).parents[1])
 """Folder of the suite's references and of the bundled results, which a controller must not read."""
 _PROCESS_PATTERN = re.compile(r"/proc/(\d+)(?=/|$)")
 """Part of the paths of files that give access to a process, also below ``/proc/self/root``."""

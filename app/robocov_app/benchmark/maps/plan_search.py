@@ -13,7 +13,7 @@ import shapely
 from robocov.environment import DiscStart, Environment, Point
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
 _MAX_ATTEMPTS = 400
 """Maximum number of plans that are sampled for a map."""

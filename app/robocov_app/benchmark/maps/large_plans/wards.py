@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
-from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
+from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan, build_box
 
 _DOOR_WIDTH_M = 1.2
 """Width of the doors of rooms, through which beds fit."""

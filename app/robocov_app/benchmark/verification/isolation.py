@@ -56,7 +56,8 @@ from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray, IntArray
-from robocov_app.benchmark.controller_messages import ControllerCode, Setup
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.verification.controller_messages import Setup
 
 _MAX_ATTEMPTS = 1000
 """Maximum number of attempts to sample random points in a region, which may be very thin."""

@@ -18,8 +18,8 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.typing import FloatArray
-from robocov_app.benchmark.plan_search import find_valid_map
-from robocov_app.benchmark.plan_shapes import (
+from robocov_app.benchmark.maps.plan_search import find_valid_map
+from robocov_app.benchmark.maps.plan_shapes import (
     INNER_WALL_M,
     FloorPlan,
     build_block,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline, divide_evenly
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline, divide_evenly
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
 _RACK_DEPTH_M = 2.4
 """Depth of two racks back to back."""

@@ -10,13 +10,13 @@ import numpy as np
 import shapely
 
 from robocov.typing import FloatArray
-from robocov_app.benchmark.large_plans.drawing import (
+from robocov_app.benchmark.maps.large_plans.drawing import (
     Drawing,
     build_octagon,
     build_outline,
     divide_evenly,
 )
-from robocov_app.benchmark.plan_shapes import FloorPlan
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan
 
 _WALL_THICKNESS_M = 0.4
 _DOOR_WIDTH_M = 1.2

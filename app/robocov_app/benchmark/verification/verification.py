@@ -33,25 +33,26 @@ from robocov.errors import InputError, format_count
 from robocov.kernel_compilation import ALL_EXAMPLES, compile_kernels
 from robocov.mapfile import to_json
 from robocov_app.benchmark import suite
-from robocov_app.benchmark.controller_messages import ControllerCode, Description, describe
-from robocov_app.benchmark.controller_process import (
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
+from robocov_app.benchmark.references import RESTARTS
+from robocov_app.benchmark.result_checks import Row
+from robocov_app.benchmark.results import build_row, compute_gaps, read_result
+from robocov_app.benchmark.verification.controller_messages import Description, describe
+from robocov_app.benchmark.verification.controller_process import (
     CACHE_PREFIX,
     ControllerFaultError,
     describe_controller,
     read_description,
 )
-from robocov_app.benchmark.new_maps import (
+from robocov_app.benchmark.verification.new_maps import (
     NewMap,
     NewMapComparison,
     choose_track,
     compare_gaps,
     sample_new_maps,
 )
-from robocov_app.benchmark.rated_controller import ORACLE, RatedController, Selection
-from robocov_app.benchmark.referee import Referees, RepeatedRun, RunCheck
-from robocov_app.benchmark.references import RESTARTS
-from robocov_app.benchmark.result_checks import Row
-from robocov_app.benchmark.results import build_row, compute_gaps, read_result
+from robocov_app.benchmark.verification.referee import Referees, RepeatedRun, RunCheck
 from robocov_app.evaluation.reference_search import ReferenceQuery, answer_queries
 from robocov_app.sweep.ledger import describe_version_differences
 from robocov_app.sweep.progress import SweepProgress, report_progress
@@ -299,11 +300,11 @@ def verify_result(
 
     1. The gaps of all rows are recomputed, and missing rows are found.
     2. A sample of the runs is repeated, and must give the same metrics, bit for bit
-       (`robocov_app.benchmark.referee`).
+       (`robocov_app.benchmark.verification.referee`).
     3. In these runs, the decisions of some robots are repeated in separate processes that each receive only
-       the observations of one robot (`robocov_app.benchmark.isolation`).
+       the observations of one robot (`robocov_app.benchmark.verification.isolation`).
     4. The controller runs on new maps, under the conditions of one of its tracks, and must not be clearly
-       worse than on the maps of the suite (`robocov_app.benchmark.new_maps`).
+       worse than on the maps of the suite (`robocov_app.benchmark.verification.new_maps`).
 
     No code to which a result refers is executed: a controller in a file must be given by the caller, and the
     hash of its source code must be that in the result.

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from robocov.environment import Point
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline, divide_evenly
-from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
+from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline, divide_evenly
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan, build_box
 
 _CORE_WALL_M = 0.25
 """Thickness of the walls around the core."""

@@ -10,8 +10,8 @@ from robocov import __version__
 from robocov.errors import ParameterError, format_count
 from robocov.text import escape_controls
 from robocov_app.benchmark import ratings, suite
-from robocov_app.benchmark.anomalies import find_anomalies
-from robocov_app.benchmark.pareto_plots import PlottedEntry, build_plots
+from robocov_app.benchmark.page.anomalies import find_anomalies
+from robocov_app.benchmark.page.pareto_plots import PlottedEntry, build_plots
 from robocov_app.benchmark.rated_controller import RatedController
 from robocov_app.benchmark.ratings import Rating
 from robocov_app.benchmark.results import describe_method, get_results_version, shares_maps_by_messages

@@ -29,20 +29,20 @@ from robocov.errors import ParameterError, RobocovError
 from robocov.observation import Decision, DensitySensor, Observations, ReceivedMessage
 from robocov.simulation.controller_caller import ControllerCaller
 from robocov.typing import FloatArray, IntArray
-from robocov_app.benchmark.controller_messages import (
+from robocov_app.benchmark.controller_code import ControllerCode
+from robocov_app.benchmark.verification.controller_messages import (
     ANSWER,
     FAULT,
     MEASURE,
     READING,
     VIOLATION,
-    ControllerCode,
     Setup,
     Step,
     decode_payload,
     describe,
     encode_decision,
 )
-from robocov_app.benchmark.guard import install_guard
+from robocov_app.benchmark.verification.guard import install_guard
 from robocov_app.jobs.messages import receive, send
 from robocov_app.jobs.serving import prepare_process, take_standard_streams
 

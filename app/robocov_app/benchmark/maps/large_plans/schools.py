@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from robocov.environment import Point
-from robocov_app.benchmark.large_plans.drawing import Drawing, build_outline
-from robocov_app.benchmark.plan_shapes import FloorPlan, build_box
+from robocov_app.benchmark.maps.large_plans.drawing import Drawing, build_outline
+from robocov_app.benchmark.maps.plan_shapes import FloorPlan, build_box
 
 _WALL_THICKNESS_M = 0.2
 _CORRIDOR_WIDTH_M = 2.6

@@ -1,0 +1,1 @@
+"""Random maps of the suite, each drawn from a seed."""
