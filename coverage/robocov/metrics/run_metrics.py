@@ -273,8 +273,9 @@ def compute_final_metrics(record: Record, history: CostHistory) -> Mapping[str, 
 def _integrate(record: Record) -> _Integrals:
     """Integrate work, effort and mean path length from the start of a run to each time step.
 
-    Forces are constant during a time step, while velocities change. The power is therefore integrated by the
-    trapezoidal rule.
+    The effort is exact, because forces are constant during a time step. The power is that of the force that
+    the controller chose at a time step, with the velocity at that time; it is integrated by the trapezoidal
+    rule.
     """
     forces = np.where(record.is_working[:, :, None], record.forces, 0.0)
     power = np.abs((forces * record.velocities).sum(axis=-1)).sum(axis=1)

@@ -78,7 +78,7 @@ class Simulation:
     joined : tuple of JoinedRobot
         Robots that have joined since the simulation was built.
     decision_time : float
-        Processor time that the controller has used so far, s.
+        Processor time for decisions so far, s.
     sent_bytes : int
         Total size of the controller messages that the robots have sent so far, received or not. Messages
         with positions are not included.
@@ -548,6 +548,7 @@ class Simulation:
         state = TeamState(positions=positions, velocities=velocities, steering=steering, steps=self._steps)
         changed = Simulation(environment, controller, state, new_team, self.dt, conditions=conditions)
         changed.joined = self.joined
+        changed.decision_time = self.decision_time
         changed.sent_bytes = self.sent_bytes
         if has_same_size:
             _copy_knowledge(

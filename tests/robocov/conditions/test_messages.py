@@ -190,6 +190,13 @@ def test_another_controller_does_not_get_the_messages() -> None:
     assert kept.inbox is simulation.inbox
 
 
+def test_changed_copies_continue_the_totals_of_the_run() -> None:
+    simulation = simulate()
+    simulation.decision_time = 7.0
+    changed = simulation.with_changes(controller=Chatter(9))
+    assert (changed.sent_bytes, changed.decision_time) == (simulation.sent_bytes, 7.0)
+
+
 def test_runs_of_a_batch_exchange_messages_like_single_runs() -> None:
     team = Team.homogeneous(3, communication_range=5.0)
     batch = SimulationBatch(HALL, Chatter(), [STARTS, STARTS + [0.0, 2.0]], team, DT)

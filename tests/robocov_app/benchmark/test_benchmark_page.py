@@ -24,8 +24,8 @@ class PageTables(NamedTuple):
     incomplete: list[tuple[str, ...]]
 
 
-def build_tables(results: list[dict[str, Any]]) -> PageTables:
-    """Return rows of the tables on the page of some results."""
+def read_tables(results: list[dict[str, Any]]) -> PageTables:
+    """Return the rows of the tables on the page of some results."""
     tables: dict[str, list[tuple[str, ...]]] = {}
     for part in re.findall(r"<table>.*?</table>", build_page(results, "Test"), re.DOTALL):
         caption = html.unescape(re.search(r"<caption><span>(.*?)</span>", part)[1])  # type: ignore[index]
@@ -60,7 +60,7 @@ def test_an_incomplete_entry_is_listed_separately() -> None:
     ratings_with_few = ratings.build_ratings([*results, few_result])
     for track, track_ratings in ratings_alone.items():
         assert track_ratings == ratings_with_few[track][: len(track_ratings)]
-    tables = [build_tables(results), build_tables([*results, few_result])]
+    tables = [read_tables(results), read_tables([*results, few_result])]
     assert tables[0].overview == tables[1].overview[:-1]
     assert tables[1].overview[-1][:5] == ("Few", "own", "–", "–", "3 of 345")
     assert [row[0] for row in tables[1].ideal] == [row[0] for row in tables[0].ideal]
@@ -98,7 +98,7 @@ def test_runs_on_other_tracks_do_not_change_the_overview(track: str) -> None:
     atlas, explorer = results
     row = {**explorer["rows"][0], "track": track, "map": suite.TRACKS[track].maps[0], "seed": 0}
     extended = {**explorer, "rows": [*explorer["rows"], row]}
-    assert build_tables([atlas, extended]).overview == build_tables(results).overview
+    assert read_tables([atlas, extended]).overview == read_tables(results).overview
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -149,7 +149,7 @@ def test_other_entries_do_not_replace_a_bundled_one() -> None:
     by_name = build_result("RAPF", 0.2, controller="rapf", source_sha256=None)
     incomplete = build_result("Few", 0.4)
     incomplete["rows"].pop()
-    tables = build_tables([by_label, by_name, incomplete, build_bundled_rapf()])
+    tables = read_tables([by_label, by_name, incomplete, build_bundled_rapf()])
     gaps = {row[0]: row[4] for row in tables.ideal}
     assert gaps == {"RAPF": "30.0", "RAPF*": "10.0", "RAPF #2*": "20.0"}
     # Only the bundled entry is a yardstick.
@@ -173,11 +173,11 @@ def test_results_from_files_are_marked_everywhere() -> None:
 @pytest.mark.usefixtures("short_ideal_track", "without_plots")
 def test_equal_scores_have_the_same_rank() -> None:
     results = [build_result(label, gap) for label, gap in (("a", 0.2), ("b", 0.2), ("c", 0.1), ("d", 0.4))]
-    overview = build_tables([*results, build_bundled_rapf()]).overview
+    overview = read_tables([*results, build_bundled_rapf()]).overview
     ranks = {row[0]: row[2] for row in overview}
     # The files change no rank of RAPF.
     assert ranks == {"c*": "1", "a*": "1", "b*": "1", "RAPF": "1", "d*": "2"}
-    ranks = {row[0]: row[2] for row in build_tables(results).overview}
+    ranks = {row[0]: row[2] for row in read_tables(results).overview}
     assert ranks == {"c*": "1", "a*": "2", "b*": "2", "d*": "4"}
 
 
@@ -258,7 +258,7 @@ def test_the_page_shows_entries_with_any_content() -> None:
 @pytest.mark.slow
 @pytest.mark.xdist_group("browser")
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver")
-def test_the_page_fits_narrow_and_wide_windows(
+def test_the_page_works_in_narrow_and_wide_windows(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     maps = ("rooms", "polygons-7001")

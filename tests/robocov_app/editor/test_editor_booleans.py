@@ -26,12 +26,6 @@ def build_box(x, y, width, height):
     return PolygonObstacle(((x, y), (x + width, y), (x + width, y + height), (x, y + height)))
 
 
-WANTED = {
-    "unite": lambda counts: counts >= 1,
-    "intersect": lambda counts: counts.min(axis=0) == counts.max(axis=0),
-}
-
-
 @settings(max_examples=count_examples(150))
 @given(
     st.lists(valid_shapes(), min_size=2, max_size=4),

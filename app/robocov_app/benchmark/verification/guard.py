@@ -162,6 +162,7 @@ def install_guard(
             return
         is_checking = True
         try:
+            # Frame 0 is this function, and frame 1 the audit hook or the replaced function. Frame 2 acts.
             if policy.allows(action, sys._getframe(2)):
                 return
         finally:
