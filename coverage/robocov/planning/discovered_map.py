@@ -202,14 +202,16 @@ class DiscoveredMap:
         return DiscoveredMap(self.raster, state)
 
 
-def dilate(is_blocked: BoolArray, radius: float) -> BoolArray:
-    """Find the cells close to blocked ones. Everything outside the array counts as blocked.
+def dilate(is_marked: BoolArray, radius: float, *, is_outside_marked: bool = True) -> BoolArray:
+    """Find the cells close to marked ones.
 
     Parameters
     ----------
-    is_blocked : (rows, columns) bool array
+    is_marked : (rows, columns) bool array
     radius : float
-        Maximum distance between the center of a cell and that of a blocked cell, in cells.
+        Maximum distance between the center of a cell and that of a marked cell, in cells.
+    is_outside_marked : bool
+        Whether everything outside the array counts as marked.
 
     Returns
     -------
@@ -224,12 +226,12 @@ def dilate(is_blocked: BoolArray, radius: float) -> BoolArray:
            [1, 1, 1],
            [0, 1, 0]])
     """
-    rows, columns = is_blocked.shape
+    rows, columns = is_marked.shape
     # A view of the padded array that starts at (margin + up, margin + right) contains, for each cell, the one
     # that is `up` rows above it and `right` columns to the right.
     margin = int(radius)
-    padded = np.pad(is_blocked, margin, constant_values=True)
-    is_close = np.zeros_like(is_blocked)
+    padded = np.pad(is_marked, margin, constant_values=is_outside_marked)
+    is_close = np.zeros_like(is_marked)
     for up in range(-margin, margin + 1):
         for right in range(-margin, margin + 1):
             if up**2 + right**2 <= radius * radius:

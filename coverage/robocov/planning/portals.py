@@ -9,7 +9,6 @@ been seen only in part seems to have narrow holes.
 
 from __future__ import annotations
 
-import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -110,44 +109,59 @@ def _find_shortest_paths(
 ) -> _ShortestPaths:
     """Find the shortest path to each cell from the nearest source node, by Dijkstra's algorithm.
 
-    The search starts from all source nodes at once. Costs are integers, so that equal ones are exactly equal.
+    The search starts from all source nodes at once. Costs are integers, so that equal ones are exactly equal,
+    and the front is a bucket of cells for each cost (Dial's algorithm). The costs in the front differ by at
+    most that of a step, so that few buckets are needed, and each of them serves for many costs in turn.
     """
     height, width = is_passable.shape
     nodes = np.full((height, width), _NONE)
     costs = np.full((height, width), np.iinfo(np.int64).max)
     previous_cells = np.full((height, width), _NONE)
     # Numba infers the type of the elements from the first one.
-    front = [(0, 0, 0)]
-    front.clear()
+    buckets = [[0] for _ in range(_CORNER_COST + 1)]
+    for bucket in buckets:
+        bucket.clear()
     for node in source_nodes:
         row = node_cells[node, 0]
         column = node_cells[node, 1]
         nodes[row, column] = node
         costs[row, column] = 0
-        heapq.heappush(front, (0, row, column))
-    while len(front) > 0:
-        cost, row, column = heapq.heappop(front)
-        if cost > costs[row, column]:
-            # A shorter path to this cell has been found in the meantime.
-            continue
-        for k in range(len(_NEIGHBOR_STEPS)):
-            next_row = row + _NEIGHBOR_STEPS[k, 0]
-            next_column = column + _NEIGHBOR_STEPS[k, 1]
-            if not (0 <= next_row < height and 0 <= next_column < width):
+        buckets[0].append(row * width + column)
+    front_size = len(source_nodes)
+    cost = 0
+    while front_size > 0:
+        bucket = buckets[cost % len(buckets)]
+        front_size -= len(bucket)
+        # The order of the cells decides between paths of the same cost.
+        bucket.sort()
+        for cell in bucket:
+            row = cell // width
+            column = cell % width
+            if cost > costs[row, column]:
+                # A shorter path to this cell has been found in the meantime.
                 continue
-            if not is_passable[next_row, next_column]:
-                continue
-            step_cost = _SIDE_COST
-            if k >= _SIDE_COUNT:
-                # A step across a corner must not cut the corner of a wall.
-                if not (is_passable[row, next_column] and is_passable[next_row, column]):
+            for k in range(len(_NEIGHBOR_STEPS)):
+                next_row = row + _NEIGHBOR_STEPS[k, 0]
+                next_column = column + _NEIGHBOR_STEPS[k, 1]
+                if not (0 <= next_row < height and 0 <= next_column < width):
                     continue
-                step_cost = _CORNER_COST
-            if cost + step_cost < costs[next_row, next_column]:
-                nodes[next_row, next_column] = nodes[row, column]
-                costs[next_row, next_column] = cost + step_cost
-                previous_cells[next_row, next_column] = row * width + column
-                heapq.heappush(front, (cost + step_cost, next_row, next_column))
+                if not is_passable[next_row, next_column]:
+                    continue
+                step_cost = _SIDE_COST
+                if k >= _SIDE_COUNT:
+                    # A step across a corner must not cut the corner of a wall.
+                    if not (is_passable[row, next_column] and is_passable[next_row, column]):
+                        continue
+                    step_cost = _CORNER_COST
+                next_cost = cost + step_cost
+                if next_cost < costs[next_row, next_column]:
+                    nodes[next_row, next_column] = nodes[row, column]
+                    costs[next_row, next_column] = next_cost
+                    previous_cells[next_row, next_column] = cell
+                    buckets[next_cost % len(buckets)].append(next_row * width + next_column)
+                    front_size += 1
+        bucket.clear()
+        cost += 1
     return _ShortestPaths(nodes, costs, previous_cells)
 
 
@@ -162,16 +176,14 @@ def _find_meeting_cells(shortest: _ShortestPaths, pieces: IntArray) -> tuple[Int
     """
     height, width = shortest.nodes.shape
     nodes = shortest.nodes.ravel()
-    # All pairs of cells that share a side, if both cells belong to a node.
+    # The piece of each cell. The index `_NONE` selects the appended element.
+    cell_pieces = np.append(pieces, _NONE)[shortest.nodes]
+    # All pairs of cells that share a side, if the cells belong to nodes of different pieces.
     flat_indices = np.arange(height * width).reshape(height, width)
-    cells = np.concatenate([flat_indices[:, :-1].ravel(), flat_indices[:-1].ravel()])
-    neighbors = np.concatenate([flat_indices[:, 1:].ravel(), flat_indices[1:].ravel()])
-    have_nodes = (nodes[cells] != _NONE) & (nodes[neighbors] != _NONE)
-    cells = cells[have_nodes]
-    neighbors = neighbors[have_nodes]
-    are_in_different_pieces = pieces[nodes[cells]] != pieces[nodes[neighbors]]
-    cells = cells[are_in_different_pieces]
-    neighbors = neighbors[are_in_different_pieces]
+    left_cells = flat_indices[:, :-1][_are_different(cell_pieces[:, :-1], cell_pieces[:, 1:])]
+    lower_cells = flat_indices[:-1][_are_different(cell_pieces[:-1], cell_pieces[1:])]
+    cells = np.concatenate([left_cells, lower_cells])
+    neighbors = np.concatenate([left_cells + 1, lower_cells + width])
     is_lower_first = nodes[cells] < nodes[neighbors]
     first = np.where(is_lower_first, cells, neighbors)
     last = np.where(is_lower_first, neighbors, cells)
@@ -181,6 +193,12 @@ def _find_meeting_cells(shortest: _ShortestPaths, pieces: IntArray) -> tuple[Int
     order = np.lexsort((last, first, costs, nodes[last], nodes[first]))
     _, unique = np.unique(np.column_stack([nodes[first], nodes[last]])[order], axis=0, return_index=True)
     return first[order][unique], last[order][unique]
+
+
+def _are_different(first_pieces: IntArray, last_pieces: IntArray) -> BoolArray:
+    """Return whether two cells belong to different pieces, for arrays of cells; False without a piece."""
+    are_known = (first_pieces != _NONE) & (last_pieces != _NONE)
+    return np.asarray(are_known & (first_pieces != last_pieces))
 
 
 def _trace_path(shortest: _ShortestPaths, first_cell: int, last_cell: int) -> IntArray:

@@ -138,13 +138,15 @@ def test_a_wall_is_removed_when_rays_have_passed_it_in_several_scans(empty: Envi
 
 
 @settings(max_examples=count_examples(20))
-@given(seed=st.integers(0, 1000), reach=st.floats(0.0, 4.0))
-def test_dilated_cells_are_those_close_to_blocked_ones(seed: int, reach: float) -> None:
-    is_blocked = np.random.default_rng(seed).random((14, 11)) < 0.05
+@given(seed=st.integers(0, 1000), reach=st.floats(0.0, 4.0), is_outside_marked=st.booleans())
+def test_dilated_cells_are_those_close_to_marked_ones(
+    seed: int, reach: float, is_outside_marked: bool
+) -> None:
+    is_marked = np.random.default_rng(seed).random((14, 11)) < 0.05
     row, column = np.mgrid[:14, :11]
-    expected = np.zeros_like(is_blocked)
-    margin = 5  # cells; more than any reach, because everything outside counts as blocked
-    padded = np.pad(is_blocked, margin, constant_values=True)
+    expected = np.zeros_like(is_marked)
+    margin = 5  # cells; more than any reach
+    padded = np.pad(is_marked, margin, constant_values=is_outside_marked)
     for r, c in np.argwhere(padded) - margin:
         expected |= (row - r) ** 2 + (column - c) ** 2 <= reach * reach
-    assert np.array_equal(dilate(is_blocked, reach), expected)
+    assert np.array_equal(dilate(is_marked, reach, is_outside_marked=is_outside_marked), expected)

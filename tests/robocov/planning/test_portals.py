@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from robocov.planning.discovered_map import UNKNOWN, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 from robocov.planning.lattice_graph import build_matrix
 from robocov.planning.window import Window
+from robocov.typing import FloatArray
 
 COARSE = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, 30)
 LEFT = np.array([1.0, 2.0])
@@ -30,6 +31,23 @@ UPPER_HALF = (slice(27, 40), slice(39, 41))
 def build_coarse_planner(known_map: DiscoveredMap) -> GridPlanner:
     """Build a planner whose moves all miss the door."""
     return GridPlanner(known_map, COARSE, 0.15)
+
+
+def build_planner_among_walls(seed: int, wall_count: int, max_nodes: int) -> GridPlanner:
+    """Build a planner on a map with random upright walls."""
+    rng = np.random.default_rng(seed)
+    rows, columns = RASTER.shape
+    walls = []
+    for _ in range(wall_count):
+        row = rng.integers(rows)
+        column = rng.integers(columns)
+        length = rng.integers(5, 30)
+        if rng.random() < 0.5:
+            walls.append((slice(row, row + 1), slice(column, column + length)))
+        else:
+            walls.append((slice(row, row + length), slice(column, column + 1)))
+    window = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, max_nodes)
+    return GridPlanner(build_map(*walls), window, 0.15)
 
 
 @pytest.fixture
@@ -77,19 +95,7 @@ def test_there_are_no_portals_where_moves_connect_all_nodes():
 @settings(max_examples=count_examples(60))
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([60, 120, 250]))
 def test_portals_connect_all_nodes_that_cells_connect(seed, wall_count, max_nodes):
-    rng = np.random.default_rng(seed)
-    rows, columns = RASTER.shape
-    walls = []
-    for _ in range(wall_count):
-        row = rng.integers(rows)
-        column = rng.integers(columns)
-        length = rng.integers(5, 30)
-        if rng.random() < 0.5:
-            walls.append((slice(row, row + 1), slice(column, column + length)))
-        else:
-            walls.append((slice(row, row + length), slice(column, column + 1)))
-    window = Window.build_around(RASTER, np.array([4.0, 2.0]), math.inf, max_nodes)
-    planner = GridPlanner(build_map(*walls), window, 0.15)
+    planner = build_planner_among_walls(seed, wall_count, max_nodes)
     is_passable = planner.map_window.is_free & ~planner.map_window.is_near_wall
     cells = np.column_stack(RASTER.find_cells(planner.map_window.nodes))
     check_portals(planner, cells, is_passable)
@@ -114,3 +120,34 @@ def check_portals(planner: GridPlanner, cells, is_passable) -> None:
         expected = np.where(steps.sum(axis=1) == 2, 1.4, 1.0).sum()
         assert length == pytest.approx(expected)
         assert length >= math.dist(cells[first], cells[last]) * 0.98
+
+
+def compute_cell_distances(is_passable, sources) -> FloatArray:
+    """Compute the distance from the nearest source to each cell, in sides of a cell, by relaxation."""
+    distances = np.full(is_passable.shape, np.inf)
+    distances[tuple(sources.T)] = 0.0
+    previous = None
+    while not np.array_equal(distances, previous):
+        previous = distances.copy()
+        padded = np.pad(distances, 1, constant_values=np.inf)
+        is_free = np.pad(is_passable, 1)
+        for up, right in product((-1, 0, 1), repeat=2):
+            beside = (slice(1 + up, 1 + up + len(distances)), slice(1, -1))
+            above = (slice(1, -1), slice(1 + right, 1 + right + distances.shape[1]))
+            neighbors = padded[beside[0], above[1]] + (1.4 if up and right else 1.0)
+            can_step = is_passable & is_free[beside] & is_free[above]
+            np.minimum(distances, np.where(can_step, neighbors, np.inf), out=distances)
+    return distances
+
+
+@settings(max_examples=count_examples(60))
+@given(st.integers(0, 2**32), st.integers(1, 30))
+def test_portals_are_the_shortest_paths_from_the_nearest_nodes(seed, wall_count):
+    planner = build_planner_among_walls(seed, wall_count, 60)
+    is_passable = planner.map_window.is_free & ~planner.map_window.is_near_wall
+    cells = np.column_stack(RASTER.find_cells(planner.map_window.nodes))
+    distances = compute_cell_distances(is_passable, cells[is_passable[tuple(cells.T)]])
+    for path in planner.graph.portals.paths:
+        from_first = np.concatenate([[0.0], np.cumsum(np.where(np.diff(path, axis=0).all(axis=1), 1.4, 1.0))])
+        from_nearest = np.minimum(from_first, from_first[-1] - from_first)
+        np.testing.assert_allclose(from_nearest, distances[tuple(path.T)], atol=1e-9)

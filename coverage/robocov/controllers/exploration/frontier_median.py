@@ -16,7 +16,7 @@ from robocov.controllers.exploration.shared_map import (
 )
 from robocov.controllers.gains import gain
 from robocov.k_median import choose_greedily, improve_sources
-from robocov.planning.discovered_map import FREE, UNKNOWN
+from robocov.planning.discovered_map import FREE, UNKNOWN, dilate
 from robocov.typing import FloatArray, IntArray
 
 _INSPECTED_RADIUS_M = 0.5
@@ -27,6 +27,8 @@ _MIN_PROGRESS_M = 0.05
 """A robot with a goal that moves less than this between two plans is stuck."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 """A cell and its eight neighbors."""
+_DIAGONAL = 1.5
+"""Distance to all eight neighbors of a cell, rounded up, in cells."""
 
 
 @dataclass(frozen=True)
@@ -117,9 +119,11 @@ class FrontierMedian(SharedMapController):
         map_window = situation.planner.map_window
         state = map_window.window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~map_window.is_outside
-        # Gaps between neighboring rays are not worth a visit.
-        is_unknown_area = ndimage.binary_opening(is_unknown, _BLOCK) & ~map_window.is_near_wall
-        is_frontier = (state == FREE) & ~map_window.is_near_wall & ndimage.binary_dilation(is_unknown_area)
+        # Gaps between neighboring rays are not worth a visit: only blocks of 3 x 3 unknown cells count.
+        is_block_center = ~dilate(~is_unknown, _DIAGONAL)
+        is_in_block = dilate(is_block_center, _DIAGONAL, is_outside_marked=False)
+        is_beside_area = dilate(is_in_block & ~map_window.is_near_wall, 1.0, is_outside_marked=False)
+        is_frontier = (state == FREE) & ~map_window.is_near_wall & is_beside_area
         labels, _ = ndimage.label(is_frontier, _BLOCK)
         cell_size = situation.known_map.raster.cell_size
         is_long = np.bincount(labels.ravel()) * cell_size >= self.shortest
