@@ -50,10 +50,11 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert command in readme.splitlines()
 
 
-def test_ci_then_runs_all_slow_and_thorough_tests() -> None:
+def test_ci_then_runs_all_slow_tests_and_more_examples_of_the_domain() -> None:
     script = (ROOT / ".ci/run").read_text(encoding="utf-8")
-    selection = '-m "slow or hypothesis" --hypothesis-profile=thorough'
-    assert f"\n.venv-test/bin/python -m pytest {selection} -n $(($(nproc) + 1))\n" in script
+    examples = '-m "hypothesis and not slow" --hypothesis-profile=thorough tests/robocov'
+    for selection in ("-m slow -n $(($(nproc) + 1))", examples):
+        assert f"\n.venv-test/bin/python -m pytest {selection}\n" in script
 
 
 def test_paths_in_the_ci_script_exist() -> None:
