@@ -219,8 +219,8 @@ def list_compiled_kernels() -> dict[str, list[str]]:
     Returns
     -------
     dict of str to list of str
-        For each name of a kernel, the types of arguments for which there is machine code, as texts of
-        `describe_argument_types` in alphabetical order.
+        For each name of a kernel, the types of arguments for which there is machine code, formatted as by
+        `describe_argument_types` and sorted.
     """
     compiled: dict[str, list[str]] = {}
     for item in _kernels:

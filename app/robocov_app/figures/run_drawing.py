@@ -165,7 +165,7 @@ def draw_run(
         Points at which contacts began; see `find_contact_points`. By default, none are drawn.
     """
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
-    cells = record.cells()
+    cells = record.compute_cells()
     run_colors = _choose_colors(record, theme, colors, cells.adjacency)
     _draw_cells(axes, cells.outlines, run_colors.cells, theme)
     _draw_trajectories(axes, record, run_colors.trails)
@@ -513,7 +513,7 @@ def build_run_handles(
     if (record.is_present[-1] & ~record.is_working[-1]).any():
         handles.append(build_robot_handle(legend.FAILED_ROBOT, theme.failed_robot, theme))
     if has_goals(record):
-        is_centroid = are_centroids(record.goals[-1][record.is_working[-1]], record.cells().centroids)
+        is_centroid = are_centroids(record.goals[-1][record.is_working[-1]], record.compute_cells().centroids)
         handles.append(Line2D([], [], **_build_goal_style(theme, _GOAL_PT, is_centroid=is_centroid)))
     if contacts is not None and len(contacts):
         handles.append(Line2D([], [], **_build_contact_style(theme)))

@@ -183,7 +183,7 @@ def _draw_cells(record: Record, frame: PictureFrame) -> str:
     robots = len(record.team)
     if robots > MAX_ROBOTS:
         return ""
-    cells = record.cells()
+    cells = record.compute_cells()
     working = np.flatnonzero(record.is_working[-1])
     adjacency = None
     if robots > MAX_OWN_HUES:

@@ -107,7 +107,7 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
                 update(step)
             return interruption.requested
 
-        return scenario.run(simulation, every=settings.record_every, should_stop=report_step)
+        return scenario.run(simulation, every=settings.record_every, on_step=report_step)
 
 
 def evaluate_record(record: Record, cost: CoverageCost, interruption: Interruption, *, quiet: bool) -> Run:

@@ -215,17 +215,18 @@ def _simulate_and_measure(
         simulation = scenario.build_simulation(controller)
         meter = CommunicationMeter(simulation)
 
-        def measure_step(step: int) -> bool:
+        def observe_step(step: int) -> bool:
             # Automatic garbage collection is off during a run (see `perform`).
             if step and step % _COLLECTION_STEPS == 0:
                 gc.collect(0)
+            # Before the first step, nothing has been sent.
             if step and task.metrics:
                 meter.count_positions()
             if watch is not None:
                 watch(simulation.observe_and_decide())
-            return False
+            return False  # The run continues.
 
-        record = scenario.run(simulation, should_stop=measure_step)
+        record = scenario.run(simulation, on_step=observe_step)
     return record, {"deciding_s": simulation.decision_time, "sent_bytes": meter.bytes}
 
 

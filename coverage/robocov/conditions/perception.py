@@ -78,7 +78,7 @@ class Perception:
         """
         step = round(ideal.time / self._dt)
         positions = self._add_position_noise(step, ideal.positions)
-        obstacle_points = self._add_sensing_noise(step, ideal, positions)
+        obstacle_points = self._measure_obstacle_points(step, ideal, positions)
         if not is_working.all():
             obstacle_points = np.where(is_working[:, None], obstacle_points, np.nan)
             obstacle_points.setflags(write=False)
@@ -125,14 +125,16 @@ class Perception:
         noisy.setflags(write=False)
         return np.asarray(noisy)
 
-    def _add_sensing_noise(self, step: int, ideal: Observations, positions: FloatArray) -> FloatArray:
-        """Return the measured obstacle points, (n, 2) m.
+    def _measure_obstacle_points(
+        self, step: int, ideal: Observations, known_positions: FloatArray
+    ) -> FloatArray:
+        """Return the obstacle points as the robots know them, (n, 2) m.
 
-        A robot measures the distance and direction of the point, and adds them to the estimate of its own
-        position in `positions`.
+        A robot measures the distance and direction of its obstacle point, with noise in the distance. It
+        locates the point relative to its own estimated position.
         """
         sigma = self._conditions.sensing_noise
-        if not sigma and positions is ideal.positions:
+        if not sigma and not self._conditions.position_noise:
             return ideal.obstacle_points
         offset = ideal.obstacle_points - ideal.positions
         if sigma:
@@ -144,7 +146,7 @@ class Perception:
             has_direction = distance > 0.0
             divisor = np.where(has_direction, distance, 1.0)
             offset *= np.where(has_direction, measured / divisor, 1.0)[:, None]
-        measured_points = np.asarray(positions + offset)
+        measured_points = np.asarray(known_positions + offset)
         measured_points.setflags(write=False)
         return measured_points
 

@@ -111,18 +111,20 @@ class Controller(Protocol):
         """
 
     def decide(self, seen: Observations, memory: Any) -> Decision:
-        """Return the forces of all robots, each based on the robot's own knowledge.
+        """Compute the forces on all robots in a step. Each must depend only on what that robot knows.
 
         Parameters
         ----------
         seen : Observations
+            What the robots know at this step.
         memory : object
-            What `begin` returned, or `Decision.memory` of the previous decision.
+            The result of `begin` in the first step, and later `Decision.memory` of the previous step.
 
         Returns
         -------
         Decision
-            One row for each robot; its `memory` is passed to the next call.
+            The forces, (n, 2) N, and optionally goals, cells and messages. Its memory is passed to the next
+            call.
         """
 
 

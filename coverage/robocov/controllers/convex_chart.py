@@ -280,12 +280,12 @@ def _compute_harmonic_images(mesh: _Mesh, stiffness: FloatArray) -> FloatArray:
 
 
 def _build_weights(mesh: _Mesh, stiffness: FloatArray) -> csr_array:
-    """Build the (v, v) matrix of mean value weights; entry (i, j) is the weight of vertex j in the mean at i.
+    """Build the matrix of mean value weights; entry (i, j) is the weight of vertex j in the mean at vertex i.
 
-    At each of its corners, a triangle with the angle α there adds its stiffness times tan(α/2) / length to
-    the weights of the two edges from that corner. For edge vectors u and v from the corner,
+    A triangle with the angle α at a vertex adds its stiffness times tan(α/2) / length to the weights of its
+    two edges from that vertex. If a and b are the vectors of these edges,
 
-        tan(α/2) = |u × v| / (|u| |v| + u · v)
+        tan(α/2) = |a × b| / (|a| |b| + a · b)
     """
     rows = []
     columns = []
@@ -294,17 +294,17 @@ def _build_weights(mesh: _Mesh, stiffness: FloatArray) -> csr_array:
         vertex = mesh.triangles[:, k]
         next_vertex = mesh.triangles[:, (k + 1) % 3]
         previous_vertex = mesh.triangles[:, (k + 2) % 3]
-        u = mesh.points[next_vertex] - mesh.points[vertex]
-        v = mesh.points[previous_vertex] - mesh.points[vertex]
-        u_length = np.hypot(*u.T)
-        v_length = np.hypot(*v.T)
-        cross = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        tangent_of_half_angle = cross / (u_length * v_length + (u * v).sum(axis=1))
+        a = mesh.points[next_vertex] - mesh.points[vertex]
+        b = mesh.points[previous_vertex] - mesh.points[vertex]
+        a_length = np.hypot(*a.T)
+        b_length = np.hypot(*b.T)
+        cross = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        tangent_of_half_angle = cross / (a_length * b_length + (a * b).sum(axis=1))
         rows += [vertex, vertex]
         columns += [next_vertex, previous_vertex]
         weights += [
-            stiffness * tangent_of_half_angle / u_length,
-            stiffness * tangent_of_half_angle / v_length,
+            stiffness * tangent_of_half_angle / a_length,
+            stiffness * tangent_of_half_angle / b_length,
         ]
     # Entries with the same indices are added up: each inner edge has one from either triangle.
     indices = (np.concatenate(rows), np.concatenate(columns))

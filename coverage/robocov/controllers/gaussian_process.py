@@ -158,16 +158,18 @@ def _list_cells(rows: int, columns: int) -> FloatArray:
 def _find_surrounding_squares(
     coordinates: FloatArray, rows: int, columns: int
 ) -> tuple[IntArray, FloatArray]:
-    """Return the four squares around each point, and their weights in the bilinear interpolation.
+    """Return the indices of the four squares around each point, and their bilinear weights, (k, 4) each.
 
-    The coordinates, (k, 2), are in squares, from the lower left corner of the grid. Points that are not
-    between the centers of squares get the values of the nearest ones.
+    Squares are numbered row by row. `coordinates`, (k, 2), are measured from the lower left corner of the
+    grid, in sides of a square. A point outside the outermost centers is moved to the nearest point between
+    them.
     """
+    # The center of the first square is at 0.
     limits = np.array([columns - 1, rows - 1])
-    from_centers = np.clip(coordinates - 0.5, 0.0, limits)
-    lower = np.minimum(from_centers.astype(np.intp), np.maximum(limits - 1, 0))
+    center_coordinates = np.clip(coordinates - 0.5, 0.0, limits)
+    lower = np.minimum(center_coordinates.astype(np.intp), np.maximum(limits - 1, 0))
     upper = np.minimum(lower + 1, limits)
-    fraction_x, fraction_y = (from_centers - lower).T
+    fraction_x, fraction_y = (center_coordinates - lower).T
     surrounding_squares = np.column_stack(
         [
             lower[:, 1] * columns + lower[:, 0],

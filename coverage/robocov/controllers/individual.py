@@ -309,7 +309,7 @@ def _build_view(seen: Observations, cells: VoronoiPartition, robot: int, memory:
         number=robot,
         position=seen.positions[robot].copy(),
         velocity=seen.velocities[robot].copy(),
-        neighbors=seen.get_neighbor_positions(robot),
+        neighbors=seen.get_neighbor_positions(robot).copy(),
         obstacle_point=obstacle_point,
         region=seen.region,
         time=seen.time,

@@ -103,11 +103,17 @@ def has_memory(controller: object) -> bool:
 
 
 def get_controller_label(name: str) -> str:
-    """Return the label of a controller of any name, without loading it.
+    """Return the label of a controller without loading it.
 
     Parameters
     ----------
     name : str
+        Name of a controller, or ``file.py:Class``.
+
+    Returns
+    -------
+    str
+        The label of a built-in controller; otherwise the name of the class, or the name itself.
 
     Examples
     --------

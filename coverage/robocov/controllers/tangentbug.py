@@ -237,8 +237,8 @@ class TangentBug(BaseController):
             NavigationState(Mode.GOAL, COUNTERCLOCKWISE, position) for position in seen.positions
         )
         obstacle_squares = memory.obstacle_squares or (frozenset(),) * len(team)
-        # Robots navigate after each scan. Before the first scan, they navigate in every step, by the closest
-        # obstacle points.
+        # Robots navigate after each scan. Before the first scan, they navigate in every step, using the
+        # closest obstacle points.
         if not memory.states or seen.scans is not None or returns is None:
             obstacle_squares = tuple(
                 _add_squares(squares, points)
@@ -246,8 +246,8 @@ class TangentBug(BaseController):
             )
             states = self._navigate(seen, team, states, cells.centroids, obstacle_points, obstacle_squares)
         velocities = self._compute_velocities(seen, team, states, cells.centroids)
-        # Paths keep the whole clearance. With half of it as the margin, the avoidance of collisions does not
-        # stop a robot on such a path.
+        # Paths keep the whole clearance. With half of it as the margin, collision avoidance does not stop a
+        # robot on such a path.
         margins = Margins.build_with_gap(team, 0.5 * self.clearance)
         velocities = avoid_collisions(velocities, seen, team, obstacle_points, margins)
         forces = compute_drive_forces(velocities, seen, team, self.response_time)
@@ -489,16 +489,17 @@ class Navigator:
         return self._enter_boundary(state, ends)
 
     def _enter_boundary(self, state: NavigationState, ends: dict[int, ContourEnd]) -> NavigationState:
-        """Fix the goal where it is now, start to follow a boundary, and return the new state.
+        """Fix the goal at its current position, start to follow a boundary, and return the new state.
 
-        If the goal is too close to an obstacle, or the robot may follow the boundary only for a short length,
-        it moves to its best point instead.
+        The robot moves to its best point instead if the goal is too close to an obstacle, or if it may follow
+        the boundary for less than `_MIN_BOUNDARY_LENGTH_M`.
         """
-        attempts = state.attempts
         best_point = None
+        attempts = state.attempts
         if state.fixed_goal is None:
             attempts += 1
         else:
+            # Following another boundary toward the same fixed goal is not a new attempt.
             best_point = state.fixed_goal.best_point
         max_length = self._compute_max_boundary_length(attempts)
         position = copy_read_only(self.position)

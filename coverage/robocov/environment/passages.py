@@ -70,7 +70,7 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     Parameters
     ----------
     free : MultiPolygon, m
-        Free space, as counter-clockwise polygons.
+        Free space.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def find_narrowest_gap(free: MultiPolygon) -> Gap | None:
     Examples
     --------
     >>> rooms = shapely.box(0, 0, 10, 4) - shapely.box(4.9, 0, 5.1, 3.2)
-    >>> find_narrowest_gap(MultiPolygon([shapely.orient_polygons(rooms)])).width
+    >>> find_narrowest_gap(MultiPolygon([rooms])).width
     0.8
     """
     search = PassageSearch(_close_cracks(free))
@@ -112,7 +112,7 @@ def find_narrow_gaps(free: MultiPolygon, max_width: float) -> tuple[Gap, ...]:
     Parameters
     ----------
     free : MultiPolygon, m
-        Free space, as counter-clockwise polygons.
+        Free space.
     max_width : float, m
         All gaps that are found are narrower.
 
@@ -237,7 +237,7 @@ class PassageSearch:
         corners : (c,) int array
             Reflex corners, as returned by `split_corners`.
         min_width, max_width : float, m
-            Limits of the width, exclusive.
+            Limits of the width; the first is inclusive.
 
         Yields
         ------
@@ -265,7 +265,7 @@ class PassageSearch:
         corners : (c,) int array
             Reflex corners, as returned by `split_corners`.
         min_width, max_width : float, m
-            Limits of the distance between the points, exclusive.
+            Limits of the distance between the points; the first is inclusive.
 
         Yields
         ------
@@ -294,7 +294,7 @@ class PassageSearch:
         q = edge_starts + np.clip(fractions, 0.0, 1.0)[:, None] * directions
         offsets = q - p
         widths = compute_lengths(offsets)
-        is_candidate = (widths > min_width) & (widths < max_width)
+        is_candidate = (widths >= min_width) & (widths < max_width)
         # If the angle between the offset and one of the two edges that meet at the corner is less than a
         # right angle, the disc contains part of that edge.
         for other_ends in (self.edge_starts[self._previous[corners]], self.edge_ends[corners]):

@@ -25,33 +25,33 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 def find_overlaps(
-    area: BaseGeometry, others: Mapping[Name, BaseGeometry], container: BaseGeometry | None = None
+    shape: BaseGeometry, others: Mapping[Name, BaseGeometry], container: BaseGeometry | None = None
 ) -> tuple[dict[Name, BaseGeometry], BaseGeometry | None]:
-    """Find the shapes that overlap an area, and the part of the area outside a container.
+    """Find the shapes that overlap another shape, and the part of this shape outside a container.
 
-    Shapes that only touch the area do not overlap it.
+    Shapes that only touch do not overlap.
 
     Parameters
     ----------
-    area : geometry, m
-        The area to check.
+    shape : geometry, m
+        The shape to check.
     others : mapping of name to geometry, m
-        Shapes that should not overlap the area.
+        Shapes that should not overlap it.
     container : geometry or None, m
-        Shape that should contain the area.
+        Shape that should contain it.
 
     Returns
     -------
     overlaps : dict of name to geometry, m
-        Intersections of the area with the shapes that overlap it.
+        Intersections of the shape with those that overlap it.
     excess : geometry or None, m
-        The part of the area that is not in `container`; None if there is no such part.
+        The part of the shape that is not in `container`; None if there is no such part.
     """
-    intersections = {name: area.intersection(shape) for name, shape in others.items()}
-    overlaps = {name: shape for name, shape in intersections.items() if shape.area > _MIN_OVERLAP_M2}
+    intersections = {name: shape.intersection(other) for name, other in others.items()}
+    overlaps = {name: overlap for name, overlap in intersections.items() if overlap.area > _MIN_OVERLAP_M2}
     if container is None:
         return overlaps, None
-    excess = area.difference(container)
+    excess = shape.difference(container)
     if excess.area <= _MIN_OVERLAP_M2:
         return overlaps, None
     return overlaps, excess

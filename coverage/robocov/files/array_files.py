@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from robocov.errors import InputError, OutputError
+from robocov.errors import InputError, OutputError, describe_error
 from robocov.files.cache_folders import find_cache_root, is_private
 from robocov.files.writing import replace_file
 from robocov.typing import AnyArray
@@ -89,7 +89,8 @@ def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) ->
                 arrays[entry.filename.removesuffix(".npy")] = array
             return arrays
     except _DAMAGE_ERRORS as error:
-        raise InputError(f"{source_name}: cannot be read: {error or type(error).__name__}") from error
+        reason = describe_error(error) or type(error).__name__
+        raise InputError(f"{source_name}: cannot be read: {reason}") from error
 
 
 def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:

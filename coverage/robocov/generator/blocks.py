@@ -95,7 +95,8 @@ def build_town(
 ) -> list[Obstacle] | None:
     """Build blocks between streets; streets that separate more blocks are wider.
 
-    The streets are as wide as the blocked area allows, up to a limit. Then all blocks are scaled down.
+    The streets are widened until the blocks have the requested area. If the streets reach their maximum width
+    first, the blocks are scaled down.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ def build_town(
     Returns
     -------
     list of Obstacle or None
-        The blocks. None if some would be too small or too thin.
+        The blocks. None if they cannot fill the requested area, or if some would be too small or too thin.
     """
     cells = divide_into_cells(request, rng)
     if cells is None:
@@ -137,8 +138,8 @@ def build_town(
         else:
             high = middle
     blocks = build_blocks(low)
-    # After the last bisection, the blocks are still slightly larger than requested. Scaling makes their total
-    # area exact.
+    # The blocks are still larger than requested: slightly after the bisection, or more if the streets have
+    # reached their maximum width. Scaling makes their total area exact.
     factor = math.sqrt(request.blocked_area / _sum_areas(blocks))
     blocks = [scale(block, factor, factor, origin="centroid") for block in blocks]
     if not all(_is_thick(block) for block in blocks):

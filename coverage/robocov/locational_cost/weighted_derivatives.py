@@ -70,8 +70,8 @@ def compute_weighted_derivatives(
     density : Density
         The density φ.
     f : Performance
-        The function f of the distance. With `Sensing`, the derivatives are those of minus the cost, which is
-        to be minimized.
+        The function f of the distance. With `Sensing`, the objective is to be maximized; the derivatives are
+        then those of the negative objective.
     max_diameters : (n,) array, m
         Upper bound on the diameter of each cell.
     points : (n, 2) array, m
@@ -90,9 +90,9 @@ def compute_weighted_derivatives(
     starts = edges.starts[selected] - points[edge_cells]
     ends = edges.ends[selected] - points[edge_cells]
     u_nodes, u_weights = _build_outward_rule(f, max_diameters)
-    offsets, weights = _place_nodes(starts, ends, u_nodes[edge_cells], u_weights[edge_cells])
+    offsets, node_weights = _place_nodes(starts, ends, u_nodes[edge_cells], u_weights[edge_cells])
     positions = offsets + (cells.generators + points)[edge_cells][:, None, None]
-    weights = weights * density.evaluate(positions.reshape(-1, 2)).reshape(weights.shape)
+    weights = node_weights * density.evaluate(positions.reshape(-1, 2)).reshape(node_weights.shape)
     dx = offsets[..., 0]
     dy = offsets[..., 1]
     # The cost to be minimized has f = r², r or -1/(r²+h²), where r² = dx² + dy². With c1 = f'(r)/r and

@@ -90,10 +90,10 @@ class MapReport:
         Starts in the file of the map.
     warnings : tuple of str
         Likely mistakes, one line each.
-    density : str or None
+    density_kind : str or None
         Kind of the density; None if the map has no density.
-    density_range : pair of float or None
-        Minimum and maximum value of the density.
+    density_bounds : pair of float or None
+        Lower bound of the density, and its maximum in the whole plane. Its values on the map may span less.
     mean_density : float
         Mean of the density over the free space.
     environment : Environment
@@ -114,8 +114,8 @@ class MapReport:
     narrowest_gap: Gap | None
     starts: tuple[StartReport, ...]
     warnings: tuple[str, ...]
-    density: str | None = None
-    density_range: tuple[float, float] | None = None
+    density_kind: str | None = None
+    density_bounds: tuple[float, float] | None = None
     mean_density: float = 1.0
     environment: Environment = field(kw_only=True, repr=False, compare=False)
 
@@ -144,7 +144,7 @@ class MapReport:
         gap = self.narrowest_gap
         gap_width = None if gap is None else gap.width
         gap_points = None if gap is None else [list(point) for point in gap.between]
-        density_range = None if self.density_range is None else list(self.density_range)
+        density_bounds = None if self.density_bounds is None else list(self.density_bounds)
         return {
             "name": self.name,
             "area_m2": self.area,
@@ -158,8 +158,8 @@ class MapReport:
             "narrowest_gap_m": gap_width,
             "narrowest_gap_between": gap_points,
             "starts": {start.name: {"kind": start.kind, "capacity": start.capacity} for start in self.starts},
-            "density": self.density,
-            "density_range": density_range,
+            "density": self.density_kind,
+            "density_range": density_bounds,
             "mean_density": self.mean_density,
             "warnings": list(self.warnings),
         }
@@ -199,10 +199,10 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
     gap = find_narrowest_gap(environment.free)
     density = environment.density
     density_kind = None
-    density_range = None
+    density_bounds = None
     if density is not None:
         density_kind = density.kind
-        density_range = (density.lower_bound, _find_maximum(density))
+        density_bounds = (density.lower_bound, _find_maximum(density))
     return MapReport(
         name=environment.name,
         area=environment.area,
@@ -214,8 +214,8 @@ def check_map(environment: Environment, radius: float = DEFAULT_RADIUS_M) -> Map
         narrowest_gap=gap,
         starts=tuple(_build_start_report(environment, name, radius) for name in environment.starts),
         warnings=tuple(_find_warnings(environment, gap, radius)),
-        density=density_kind,
-        density_range=density_range,
+        density_kind=density_kind,
+        density_bounds=density_bounds,
         mean_density=float(environment.free_masses.sum()) / environment.free_area,
         environment=environment,
     )
@@ -255,7 +255,7 @@ def _build_start_report(environment: Environment, name: str, radius: float) -> S
 
 
 def _find_maximum(density: Density) -> float:
-    """Return the maximum of a density."""
+    """Return the maximum of a density in the whole plane."""
     if not isinstance(density, Gaussians) or len(density.peaks) < 2:
         return density.upper_bound
     # If peaks overlap, the upper bound is not reached, and the maximum is found by optimization.

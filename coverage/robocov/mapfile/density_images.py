@@ -67,7 +67,7 @@ def _resolve_inside(name: str, folder: Path) -> Path:
 
 
 def read_gray_levels(content: bytes) -> FloatArray:
-    """Read the gray levels of a PNG or PGM image.
+    """Read the gray levels of a PNG or Netpbm (PBM, PGM, PPM) image. Colors are converted to gray.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def read_gray_levels(content: bytes) -> FloatArray:
     Raises
     ------
     InputError
-        If the content is not a PNG or PGM image, or has too many pixels.
+        If the content is not such an image, or has too many pixels.
     """
     from PIL import Image
 
@@ -93,6 +93,10 @@ def read_gray_levels(content: bytes) -> FloatArray:
                 raise InputError(
                     f"expected at most {MAX_RASTER_SIZE} x {MAX_RASTER_SIZE} pixels, got {width} x {height}"
                 )
+            # Pillow opens all Netpbm formats as "PPM", including PFM with floating-point values.
+            if image.mode == "F":
+                raise InputError("expected 8 or 16 bits per pixel, got floating-point values")
+            # The modes "I" and "I;16" are those of 16-bit gray levels.
             if image.mode.startswith("I"):
                 return np.clip(np.asarray(image, dtype=float) / _WHITE_16_BIT, 0.0, 1.0)
             return np.asarray(image.convert("L"), dtype=float) / _WHITE_8_BIT

@@ -167,7 +167,9 @@ class Observations:
         return self.messages[robot] if self.messages else ()
 
     def get_neighbor_positions(self, robot: int) -> FloatArray:
-        """Return the known positions of a robot's neighbors.
+        """Return the positions of a robot's neighbors, as the robot knows them.
+
+        With limited communication, these are the positions in their newest messages.
 
         Parameters
         ----------
@@ -177,10 +179,12 @@ class Observations:
         Returns
         -------
         (k, 2) array, m
-            In the order of `Neighbors.list_neighbors`.
+            In the order of `Neighbors.list_neighbors`. This may be a view, which must not be changed.
         """
-        if self.reported_positions is None or self.neighbors.indptr is None:
+        if self.reported_positions is None:
             return self.positions[self.neighbors.list_neighbors(robot)]
+        # Without limited communication, there are no reports.
+        assert self.neighbors.indptr is not None
         start, stop = self.neighbors.indptr[robot : robot + 2]
         return self.reported_positions[start:stop]
 

@@ -120,8 +120,8 @@ class NodeVisibility:
     def get_entry_nodes(self, position: FloatArray) -> IntArray:
         """Return the nodes at which a path from a position can enter the lattice.
 
-        These are the nodes visible from the position, among the nearest ones with clearance. If none of them
-        is visible, it is the nearest one.
+        These are the visible ones among the nearest nodes with clearance, or only the nearest one if none of
+        them is visible.
 
         Parameters
         ----------
@@ -139,6 +139,7 @@ class NodeVisibility:
             nearest_nodes = self.find_nearest_nodes(position, self.map_window.has_clearance)
             ends = self.map_window.nodes[nearest_nodes]
             is_visible = self.find_clear_lines(position, ends, self.map_window.is_blocked)
-            # A robot whose cell is marked as a wall actually stands next to the wall, and sees no node.
+            # The cell of a robot next to a wall may be marked as part of the wall, so that the robot sees no
+            # node. It then enters at the nearest one.
             self._entry_nodes[key] = nearest_nodes[is_visible] if is_visible.any() else nearest_nodes[:1]
         return self._entry_nodes[key]

@@ -183,21 +183,23 @@ class Record(Drawable):
         robots = format_count(len(self.team), "robot")
         return f"<Record {self.controller} on {self.environment.name}, {robots}, {self.time[-1]:.1f} s>"
 
-    def cells(self, k: int = -1) -> VoronoiPartition | WeightedCells:
+    def compute_cells(self, step: int = -1) -> VoronoiPartition | WeightedCells:
         """Compute the cells of the working robots at a time step.
+
+        Limits of communication are ignored: each cell is that of a robot that knows all others.
 
         Parameters
         ----------
-        k : int
+        step : int
             Index of the time step; by default the last one.
 
         Returns
         -------
         VoronoiPartition or WeightedCells
-            `WeightedCells` if `has_travel_time_cells`. The cells are those under unlimited communication.
+            One cell for each working robot. `WeightedCells` if `has_travel_time_cells`.
         """
-        is_working = self.is_working[k]
-        positions = self.positions[k][is_working]
+        is_working = self.is_working[step]
+        positions = self.positions[step][is_working]
         region = self.environment.region
         density = self.environment.density
         if self.has_travel_time_cells:
@@ -241,7 +243,7 @@ class Record(Drawable):
         )
         goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
         # Figures compute cells by distance themselves if a decision has none.
-        cells = self.cells(k) if self.has_travel_time_cells else None
+        cells = self.compute_cells(k) if self.has_travel_time_cells else None
         decision = Decision(forces=self.forces[k], goals=goals, cells=cells)
         return Snapshot(observations, decision, is_working=is_working)
 

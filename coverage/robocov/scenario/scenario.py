@@ -359,7 +359,7 @@ class Scenario:
         simulation: Simulation | None = None,
         *,
         every: int = 1,
-        should_stop: Callable[[int], bool] | None = None,
+        on_step: Callable[[int], bool] | None = None,
     ) -> Record:
         """Simulate and record the run.
 
@@ -369,8 +369,9 @@ class Scenario:
             The simulation to run; by default a new one.
         every : int
             Number of steps from one recorded step to the next, at least 1. The last step is always recorded.
-        should_stop : callable or None
-            Called with the number of each step; if it returns True, the run ends with this step.
+        on_step : callable or None
+            Called at each step with its number, from 0 for the initial state. The run ends with this step if
+            it returns True.
 
         Returns
         -------
@@ -378,8 +379,10 @@ class Scenario:
 
         Raises
         ------
+        ParameterError
+            If `every` is not a whole number of at least 1.
         RobocovError
-            If `every` is not a whole number of at least 1, the run cannot start, or the controller fails.
+            If the run cannot start, or the controller fails.
         """
         if not is_number(every, Integral) or every < 1:
             raise ParameterError(f"every: expected a whole number of at least 1, got {quote(every)}")
@@ -390,7 +393,7 @@ class Scenario:
             recorder = self.build_recorder(simulation.controller, self.controller)
             for step, snapshot in enumerate(simulation.snapshots(self.duration)):
                 is_last = step == self.steps
-                if should_stop is not None and should_stop(step):
+                if on_step is not None and on_step(step):
                     is_last = True
                 if is_last or step % every == 0:
                     recorder.add(snapshot)

@@ -195,9 +195,9 @@ def _add_boundaries(
     crossings = np.empty((curve_count, curve_count, 2))
     gaps = np.empty((curve_count, 2))
     _find_crossings(curves, line_count, crossings)
-    # Each other curve cuts at most one gap into a curve, which leaves at most `curve_count` sections. A
-    # section becomes at most two pieces.
-    max_new_pieces = 2 * curve_count + 2
+    # Each other curve cuts at most one gap into a curve, which leaves at most `curve_count` sections. Only a
+    # section with the parameter 0 in its interior becomes two pieces.
+    max_new_pieces = curve_count + 1
     for c in range(curve_count):
         pieces = _reserve(pieces, piece_count, max_new_pieces)
         piece_count = _add_boundary(curves[c], crossings[c], gaps, pieces, piece_count)

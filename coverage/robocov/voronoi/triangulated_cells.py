@@ -166,16 +166,16 @@ def _compute_center_and_size(sides: FloatArray) -> tuple[float, float, float]:
 def _compute_region_area(sides: FloatArray) -> float:
     """Return the area of the region, m², by the shoelace formula.
 
-    The coordinates of the vertices, at which the sides start, are taken relative to the center of the region,
+    The coordinates of the vertices, at which the sides start, are taken relative to the center of the region
     to reduce rounding errors.
     """
-    x, y, _ = _compute_center_and_size(sides)
+    center_x, center_y, _ = _compute_center_and_size(sides)
     area = 0.0
     for k in range(len(sides)):
         next_side = k + 1 if k + 1 < len(sides) else 0
         area += 0.5 * (
-            (sides[k, SIDE_X] - x) * (sides[next_side, SIDE_Y] - y)
-            - (sides[next_side, SIDE_X] - x) * (sides[k, SIDE_Y] - y)
+            (sides[k, SIDE_X] - center_x) * (sides[next_side, SIDE_Y] - center_y)
+            - (sides[next_side, SIDE_X] - center_x) * (sides[k, SIDE_Y] - center_y)
         )
     return area
 

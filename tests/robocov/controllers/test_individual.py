@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -84,12 +84,19 @@ def test_a_view_may_be_changed_without_changing_the_observations() -> None:
         def force(self, own: OwnView) -> list[float]:
             own.position += 1.0
             own.velocity += 1.0
+            own.neighbors += 1.0
             return [0.0, 0.0]
 
-    seen = observe(np.array([[2.0, 4.0], [8.0, 4.0]]))
+    reported_positions = np.array([[8.0, 4.0], [2.0, 4.0]])
+    seen = replace(
+        observe(np.array([[2.0, 4.0], [8.0, 4.0]])),
+        neighbors=Neighbors.from_pairs(2, np.array([0, 1]), np.array([1, 0])),
+        reported_positions=reported_positions.copy(),
+    )
     IndividualControllerAdapter(Vandal()).decide(seen, None)
     np.testing.assert_array_equal(seen.positions, [[2.0, 4.0], [8.0, 4.0]])
     np.testing.assert_array_equal(seen.velocities, 0.0)
+    np.testing.assert_array_equal(seen.reported_positions, reported_positions)
 
 
 @pytest.mark.parametrize("answer", [None, 1.0, [1.0], [1.0, np.nan], [1.0, 2.0, 3.0], "up", [[1.0, 2.0]]])

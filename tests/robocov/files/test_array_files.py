@@ -74,6 +74,17 @@ def patch_directory(content: bytes, **changes: object) -> bytes:
     return buffer.getvalue()
 
 
+def test_damage_without_a_message_is_named() -> None:
+    # The entry claims to be longer than the file, for which `zipfile` raises an error without a message.
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("a.npy", build_header(4000))
+    size = len(buffer.getvalue())
+    content = patch_directory(buffer.getvalue(), compress_size=size, file_size=size)
+    with pytest.raises(InputError, match=r"^x\.npz: cannot be read: EOFError$"):
+        read(content)
+
+
 TWO = save_arrays(a=np.zeros(20_000), b=np.ones(20_000))
 
 

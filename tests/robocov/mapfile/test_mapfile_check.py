@@ -194,10 +194,10 @@ def test_the_range_of_overlapping_peaks_ends_at_their_largest_value():
     ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
     report = check_map(Environment("overlapping", ring, density=overlapping))
     max_value = overlapping.evaluate(points).max()
-    assert report.density_range == pytest.approx((0.5, max_value), abs=1e-5)
+    assert report.density_bounds == pytest.approx((0.5, max_value), abs=1e-5)
     single = Gaussians(overlapping.peaks[:1], 0.5)
     report = check_map(Environment("single", ring, density=single))
-    assert report.density_range == pytest.approx((0.5, 2.5), abs=1e-5)
+    assert report.density_bounds == pytest.approx((0.5, 2.5), abs=1e-5)
 
 
 def test_the_unreachable_area_depends_on_the_radius() -> None:

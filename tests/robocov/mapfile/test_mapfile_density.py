@@ -286,6 +286,8 @@ def test_unusable_images_are_rejected(tmp_path):
     )
     (tmp_path / "bomb.pgm").write_bytes(b"P5 100000 100000 255\n")
     assert "got 100000 x 100000" in get_error("bomb.pgm") or "PNG or PGM" in get_error("bomb.pgm")
+    (tmp_path / "float.pgm").write_bytes(b"Pf 2 1 -1.0\n" + np.array([0.25, 0.5], "<f4").tobytes())
+    assert "expected 8 or 16 bits per pixel, got floating-point values" in get_error("float.pgm")
     with (tmp_path / "heavy.png").open("wb") as file:
         file.truncate(MAX_IMAGE_BYTES + 1)
     assert "expected at most 8 MB, got more" in get_error("heavy.png")

@@ -122,7 +122,7 @@ def test_samples_of_a_record_refer_to_the_robots_that_worked_at_that_time(empty:
     assert not replace(record, team=Team.homogeneous(3)).has_travel_time_cells
     assert record.snapshot(-1).seen.neighbors.list_pairs()[0].tolist() == [1, 2]
     expected = partition_by_travel_time(record.positions[-1, 1:], team.max_speed[1:], empty.region)
-    assert record.cells().masses.tolist() == expected.masses.tolist()
+    assert record.compute_cells().masses.tolist() == expected.masses.tolist()
     for excerpt in (record.until(0.1), record.thin(10.0)):
         assert not any(np.shares_memory(getattr(excerpt, name), getattr(record, name)) for name in ARRAYS)
 

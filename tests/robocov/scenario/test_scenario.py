@@ -58,7 +58,7 @@ def test_a_record_is_thinned_and_a_run_is_stopped() -> None:
         steps.append(step)
         return step == 16
 
-    record = scenario.run(every=7, should_stop=stop_at_16)
+    record = scenario.run(every=7, on_step=stop_at_16)
     assert steps == list(range(17))
     assert record.time.tolist() == pytest.approx([0.0, 7 / 60, 14 / 60, 16 / 60])
     assert len(scenario.run(every=7)) == 6

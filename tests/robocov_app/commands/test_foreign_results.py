@@ -140,7 +140,7 @@ def test_the_library_executes_no_code_of_results(shared: Path, monkeypatch: pyte
     for folder in ("run", "offered", "both/Mine", "both/planted"):
         record = Record.load(shared / folder)
         record.snapshot(3)
-        record.cells(3)
+        record.compute_cells(3)
         record.to_json()
         repr(record)
         render_record_html(record)

@@ -453,7 +453,7 @@ def test_cells_by_travel_time_are_displayed_without_the_controller(record: Recor
     session.show_time(0.5)
     cells = session.displayed.get_snapshot(session.timeline.panes[0]).decision.cells
     assert isinstance(cells, WeightedCells)
-    np.testing.assert_array_equal(cells.centroids, record.cells(30).centroids)
+    np.testing.assert_array_equal(cells.centroids, record.compute_cells(30).centroids)
 
 
 def test_gains_that_do_not_exist_any_more_are_named(record: Record) -> None:

@@ -257,9 +257,9 @@ def _format_rows(report: MapReport) -> dict[str, str]:
         "unreachable": _format_unreachable_area(report),
         "narrowest passage": _format_narrowest_gap(report),
     }
-    if report.density is not None and report.density_range is not None:
-        low, high = report.density_range
-        rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
+    if report.density_kind is not None and report.density_bounds is not None:
+        low, high = report.density_bounds
+        rows["density"] = f"{report.density_kind}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
     for start in report.starts:
         rows[f'start "{start.name}"'] = (
             f"{start.kind}, space for about {format_count(start.capacity, 'robot')}"

@@ -34,9 +34,9 @@ _APPROACH_RATE = 10.0
 _MIN_SPEED_LIMIT = 0.15
 """Speed in m/s that a robot may reach even close to a wall."""
 _MAX_EVASION_SPEED = 0.3
-"""Maximum speed in m/s at which a robot passes another one on the left."""
+"""Maximum speed in m/s at which a robot swerves to its left to pass another one."""
 _EVASION_RANGE_M = 1.5
-"""Distance from which robots pass each other on the left."""
+"""Distance below which robots start to swerve."""
 _MIN_DISTANCE_M = 1e-9
 """Minimum divisor; prevents division by zero."""
 
@@ -155,9 +155,9 @@ def _compute_speed_limits(seen: Observations, team: Team) -> FloatArray:
 def _compute_evasion(
     seen: Observations, team: Team, velocities: FloatArray, separation: FloatArray
 ) -> FloatArray:
-    """Return the sideways velocities, (n, 2) m/s, with which robots pass each other on the left.
+    """Return the velocities, (n, 2) m/s, with which robots swerve to their left to pass each other.
 
-    They are zero for robots that approach no other robot too fast.
+    They are zero for robots that approach no other robot faster than the allowed speed.
     """
     offsets = list_neighbor_offsets(seen, _EVASION_RANGE_M)
     if not offsets.shape[1]:

@@ -264,6 +264,7 @@ class PlacementController(WholeMapController):
         placement_map = self._get_placement_map(memory.team)
         planner = placement_map.planner
         sightings = memory.sightings.update(seen, memory.team)
+        # Entry (i, j) is the goal of robot j in the plan of robot i.
         goals = np.full_like(memory.goals, np.nan)
         routes = []
         # Robots with the same knowledge share a plan, which is computed only once.
@@ -291,7 +292,7 @@ class PlacementController(WholeMapController):
         )
 
     def _compute_goals(
-        self, placement_map: PlacementMap, known_positions: FloatArray, previous: FloatArray
+        self, placement_map: PlacementMap, known_positions: FloatArray, last_goals: FloatArray
     ) -> FloatArray:
         """Return the goals of all robots, (n, 2) m, in the plan of one robot; nan for unknown robots.
 
@@ -299,14 +300,15 @@ class PlacementController(WholeMapController):
         ----------
         placement_map : PlacementMap
         known_positions : (n, 2) array, m
-            Its own position and the last known ones of others; nan for robots that it does not know.
-        previous : (n, 2) array, m
-            Goals in its last plan; nan for robots that were not part of it.
+            The planning robot's own position, and the last known ones of the others; nan for robots that it
+            does not know.
+        last_goals : (n, 2) array, m
+            Goals in that robot's last plan; nan for robots that were not part of it.
         """
         is_known = np.isfinite(known_positions[:, 0])
         robots = np.flatnonzero(is_known)
         positions = find_nearest_inside(placement_map.planner.configuration_space, known_positions[robots])
-        previous_goals = np.where(np.isfinite(previous[robots]), previous[robots], positions)
+        previous_goals = np.where(np.isfinite(last_goals[robots]), last_goals[robots], positions)
         known_team = KnownTeam(
             robots=robots,
             positions=positions,
