@@ -98,13 +98,13 @@ def _run_subcommand(name: str, rest: list[str], *, may_supervise: bool) -> int:
     from robocov_app.terminal.standard_streams import StandardStreams
     from robocov_app.terminal.supervision import (
         can_supervise,
-        find_own_controllers,
+        find_user_controllers,
         prepare_supervision,
         report_status,
         supervise,
     )
 
-    controllers = find_own_controllers(rest)
+    controllers = find_user_controllers(rest)
     if may_supervise and controllers and can_supervise():
         status, error_message = supervise(controllers)
         return _print_error(error_message, FAILED) if error_message else status

@@ -334,9 +334,9 @@ class Episode:
     def _share_cost_change(self, coverage: CoverageResult | None, *, is_rewarded: bool) -> FloatArray:
         """Evaluate the cost, and split its change since the last reward among the robots, (n,) m.
 
-        Robots must not be rewarded or punished because others join or fail. If that happens, the cost is
-        evaluated as soon as it does, and the change is computed for only those robots that were available
-        before and after. The other robots get 0.
+        Robots must not be rewarded or punished because others join or fail. When this happens, the cost is
+        evaluated at once, and its change is computed for only those robots that were available both before
+        and after. All other robots get 0.
         """
         previously_available = self._available
         self._update_available_robots()

@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from robocov.errors import ParameterError
 from robocov.typing import Float32Array, FloatArray
 from robocov_app.learning.actions import check_actions, compute_action_limits
 from robocov_app.learning.environment import EpisodeEnv, draw_episode
@@ -245,14 +246,19 @@ class CoverageVectorEnv(SyncVectorEnv):
         Raises
         ------
         ParameterError
-            If the actions of an environment have the wrong shape, or are not finite.
+            If there are not as many rows as environments, or if the actions of an environment have the wrong
+            shape or are not finite.
         """
-        # These environments ignore their actions, because the step only resets them.
-        is_restarted = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
+        if len(actions) != self.num_envs:
+            raise ParameterError(
+                f"actions: expected one array for each of {self.num_envs} environments, got {len(actions)}"
+            )
+        # This step only resets these environments, and ignores their actions.
+        is_reset_only = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         checked = np.zeros((self.num_envs, self.task.robots, 2))
         shared_episodes = {}
         for run, (environment, action) in enumerate(zip(self._environments, actions, strict=True)):
-            if is_restarted[run]:
+            if is_reset_only[run]:
                 continue
             checked[run] = check_actions(action, self.task.robots)
             if environment.episode is not None and environment.episode.shared is not None:

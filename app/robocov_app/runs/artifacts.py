@@ -22,6 +22,7 @@ from robocov.kernel_compilation import compile_kernels
 from robocov.scenario import Scenario
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures
 from robocov_app.runs.execution import Run, execute_scenario
+from robocov_app.runs.saved_runs import COMPARISON_FORMAT, COMPARISON_VERSION
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import replace_non_finite, write_csv, write_json
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from robocov_app.figures.coverage import DistanceSnapshot
     from robocov_app.figures.curves import TimeCurve
 
-_COMPARISON_HEADER = {"format": "robocov-comparison", "version": 1}
+_COMPARISON_HEADER = {"format": COMPARISON_FORMAT, "version": COMPARISON_VERSION}
 _SUMMARY_COLUMNS = (
     "mean_distance_m",
     "cost_m3",

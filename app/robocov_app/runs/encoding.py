@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO, TypeAlias
+from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +132,7 @@ def _pad_to_even_size(frame: Frame) -> Frame:
 
 
 @contextlib.contextmanager
-def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float) -> Iterator[BinaryIO]:
+def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float) -> Iterator[IO[bytes]]:
     """Run the encoder, and yield the pipe for raw frames; raise OutputError if the encoder fails."""
     command = build_encoder_command(temporary, size, fps)
     with tempfile.TemporaryFile() as error_output:
@@ -148,7 +148,7 @@ def _open_encoder(temporary: Path, path: Path, size: tuple[int, int], fps: float
         assert process.stdin is not None
         is_pipe_broken = False
         try:
-            yield process.stdin  # type: ignore[misc]
+            yield process.stdin
             process.stdin.close()
         except BrokenPipeError:
             is_pipe_broken = True

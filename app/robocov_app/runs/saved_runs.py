@@ -23,6 +23,12 @@ _MAX_FOLDER_NAME_CHARS = 64
 """Maximum length of a folder name, apart from a number at its end."""
 
 
+COMPARISON_FORMAT = "robocov-comparison"
+"""Format in ``comparison.json``."""
+COMPARISON_VERSION = 1
+"""Version of this format."""
+
+
 class ComparisonDocument(Document):
     """The content of ``comparison.json``; the list `runs` stays empty until the comparison has ended."""
 
@@ -96,21 +102,27 @@ def load_saved_runs(path: Path) -> list[SavedRun]:
 
 def _load_comparison(path: Path) -> list[SavedRun]:
     """Load the runs of a comparison; raise InputError if they do not have the same map."""
-    content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
+    content = read_document(path, ComparisonDocument, COMPARISON_FORMAT, COMPARISON_VERSION)
     folders = [path.parent / name for name in content.folders]
     for folder in folders:
         if folder.is_symlink():
-            raise InputError(f"{folder}: expected a folder inside the folder of the comparison, got a link")
+            raise InputError(f"{folder}: expected a subfolder of the comparison, got a symbolic link")
+    # If the program was killed, the file has no results, and some of the runs may not have been saved.
     is_complete = bool(content.runs)
     saved = [_load_run(folder) for folder in folders if is_complete or (folder / RUN_FILE).is_file()]
     if not saved:
         raise InputError(f"{path}: expected at least one run, got none")
-    first = build_roster(saved[0].record).environment
+    first_environment = build_roster(saved[0].record).environment
     for run in saved[1:]:
         environment = build_roster(run.record).environment
-        if (environment.boundary, environment.obstacles) != (first.boundary, first.obstacles):
+        if not _have_same_map(environment, first_environment):
             raise InputError(f"{run.folder / RUN_FILE}: expected the same map as in {saved[0].folder}")
     return saved
+
+
+def _have_same_map(first: Environment, second: Environment) -> bool:
+    """Return whether two environments have the same boundary and obstacles."""
+    return first.boundary == second.boundary and first.obstacles == second.obstacles
 
 
 def build_roster(record: Record) -> Roster:

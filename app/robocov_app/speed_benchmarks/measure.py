@@ -111,9 +111,9 @@ def measure_interleaved(
     clock: Callable[[], float] = perf_counter,
     before_round: Call = lambda: None,
 ) -> dict[str, float]:
-    """Measure the times of several calls in alternation, so that other programs slow them down equally.
+    """Time several calls in turn, so that other programs slow all of them down equally.
 
-    The first round is a warm-up and does not count.
+    A warm-up round, which is not timed, comes first.
 
     Parameters
     ----------
@@ -122,11 +122,11 @@ def measure_interleaved(
     min_rounds : int
         Minimum number of rounds.
     min_duration : float, s
-        Minimum total time of the rounds.
+        Minimum duration of all timed rounds together, including the calls of `before_round`.
     clock : callable
         Returns the current time, s.
     before_round : callable
-        Called before each round; the time of this call does not count.
+        Called before each timed round; not part of the times of the calls.
 
     Returns
     -------

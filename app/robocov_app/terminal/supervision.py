@@ -34,8 +34,8 @@ _PARENT_POLL_S = 1.0
 """Time between two checks of whether the parent process is still running."""
 
 
-def find_own_controllers(words: Sequence[str]) -> list[str]:
-    """Find the user's own controllers in a command line and in the study that it names.
+def find_user_controllers(words: Sequence[str]) -> list[str]:
+    """Find the controllers from users' files in a command line and in the study file that it names.
 
     Parameters
     ----------

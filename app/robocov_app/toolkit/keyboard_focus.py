@@ -25,7 +25,7 @@ class FocusGroup(Protocol):
     def set_focus(self, key: str) -> None:
         """Give the focus to a widget."""
 
-    def stop_typing(self) -> None:
+    def clear_focus(self) -> None:
         """Take the focus away from all widgets of the group."""
 
 
@@ -45,7 +45,7 @@ class BasicFocusGroup:
         """Give the focus to an element."""
         self.focus = key
 
-    def stop_typing(self) -> None:
+    def clear_focus(self) -> None:
         """Take the focus away."""
         self.focus = None
 
@@ -109,4 +109,4 @@ class KeyboardFocus:
         """Take the focus away from all widgets."""
         for group in self._list_groups():
             if group.focus is not None:
-                group.stop_typing()
+                group.clear_focus()

@@ -55,7 +55,7 @@ class WindowPart:
         # A part of width or height 0 is hidden.
         self.hidden = not (box.width and box.height)
         if self.hidden:
-            self.ui.stop_typing()
+            self.ui.clear_focus()
         if theme is not self.ui.theme or layout.scale != self.ui.scale:
             self.ui = Ui(self.show_content, theme, layout.scale)
         self.ui.tip_side = self.tip_side
@@ -124,5 +124,5 @@ def offer_event(parts: Sequence[WindowPart], event: pygame.event.Event) -> bool:
     if event.type == pygame.MOUSEBUTTONDOWN:
         for part in parts:
             if part is not user and part.ui.focus is not None:
-                part.ui.stop_typing()
+                part.ui.clear_focus()
     return user is not None

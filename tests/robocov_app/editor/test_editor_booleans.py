@@ -145,7 +145,7 @@ def test_the_result_replaces_the_lowest_obstacle():
         (
             "unite",
             [build_box(0.0, 0.0, 1.0, 1.0), WallObstacle(((1.0, 1.0),), 0.1)],
-            "the wall covers nothing",
+            "wall 2 has no area",
         ),
     ],
 )

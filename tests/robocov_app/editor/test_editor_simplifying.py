@@ -46,6 +46,12 @@ def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
     assert places == sorted(places)
 
 
+@pytest.mark.parametrize("tolerance", [-0.1, 1e9, math.nan])
+def test_impossible_tolerances_are_rejected(tolerance):
+    with pytest.raises(MapError, match=f"expected a tolerance from 0 to .* m, got {tolerance:g} m"):
+        simplify(Sketch(boundary=HALL), Selection(boundary=True), tolerance)
+
+
 def test_holes_do_not_cross_their_outline():
     # In a thin frame, the hole would protrude with a coarse tolerance.
     outer = build_wobbly_ring(120, 0, 3.0, 0.0)

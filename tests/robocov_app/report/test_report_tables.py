@@ -12,7 +12,12 @@ from robocov_app.report.results.result import DamagedRun, Reference, ReportedRun
 from robocov_app.report.tables.controllers import build_controllers_table, build_gain_sets_table
 from robocov_app.report.tables.failures import MAX_FAILURE_ROWS, build_failures_table
 from robocov_app.report.tables.pairs import build_map_pairs_tables, build_pairs_table
-from robocov_app.report.tables.summaries import MAX_RUN_ROWS, build_runs_table, build_summary_tables
+from robocov_app.report.tables.summaries import (
+    MAX_RUN_ROWS,
+    MAX_SETTINGS,
+    build_runs_table,
+    build_summary_tables,
+)
 from robocov_app.report.tables.table import NO_VALUE, PageTable
 
 
@@ -84,6 +89,17 @@ def test_every_map_has_a_table_and_the_table_of_all_maps_has_scaled_distances() 
     assert len(all_maps.head) == len(all_maps.rows[0])
     assert get_column(all_maps, "Mean distance / median") == ["1.000 (1.000–1.000)"]
     assert get_column(museum, "Mean distance, m") == ["9.000 (9.000–9.000)"]
+
+
+def test_the_table_of_too_many_maps_explains_its_columns() -> None:
+    runs = [
+        build_run("rapf", seed, 1.0 + seed, map_name=f"map-{k}")
+        for k in range(MAX_SETTINGS + 1)
+        for seed in (0, 1)
+    ]
+    (all_maps,) = build_summary_tables(build_result(runs))
+    scaling_note, quartiles_note = all_maps.notes
+    assert "median" in scaling_note and "quartiles" in quartiles_note
 
 
 def test_every_run_has_a_row() -> None:

@@ -219,7 +219,7 @@ def test_every_command_changes_something(shared: Driver) -> None:
 def test_every_key_runs_its_command(shared: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[str] = []
     shared.window.dialogs.close()
-    shared.window.panel.ui.stop_typing()
+    shared.window.panel.ui.clear_focus()
     shared.window.focus.leave()
     monkeypatch.setattr(shared.window, "run_command", done.append)
     for command in shared.window.commands.commands:

@@ -61,7 +61,7 @@ def test_a_branch_is_described_under_the_pointer(driver: Driver) -> None:
     before = driver.copy_frame()
     driver.move(box.right - 6, box.centery)
     driver.run_frames(1)
-    assert driver.window.chart._describe_ghost(driver.pixel) == line.text
+    assert driver.window.chart._describe_branch(driver.pixel) == line.text
     assert not driver.shows_frame(before)
 
 

@@ -68,7 +68,7 @@ def test_times_do_not_overlap_in_a_narrow_chart(
         driver.viewer.view.has_panel = False
         driver.settle()
         ends.clear()
-        driver.window.chart._page = None
+        driver.window.chart._image = None
         driver.run_frames(1)
     assert ends
     assert all(left[1] <= right[0] for left, right in pairwise(ends))

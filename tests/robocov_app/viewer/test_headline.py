@@ -126,7 +126,7 @@ def test_a_branch_is_described_under_the_pointer_only(driver: Driver) -> None:
     assert chart.ghosts
     x, y = chart.ghosts[0].points[-2]
     pixel = (round(x), round(y + driver.window.layout.chart.top))
-    description = chart._describe_ghost(pixel)
+    description = chart._describe_branch(pixel)
     assert "RAPF" in description
     assert "Click" in description
-    assert chart._describe_ghost((pixel[0], pixel[1] - 40)) == ""
+    assert chart._describe_branch((pixel[0], pixel[1] - 40)) == ""

@@ -21,7 +21,7 @@ from robocov_app.viewer.launch import ViewerLauncher
 from robocov_app.viewer.session.recorded import build_replay_session, get_control_period
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
-from robocov_app.viewer.session.setup.missing_controller import MissingController
+from robocov_app.viewer.session.setup.missing_controller import MissingController, find_controller
 
 STEPS = 60
 DT = 1 / 60
@@ -380,6 +380,12 @@ def test_a_record_is_displayed_without_its_controller(counting: ControllerChoice
         np.testing.assert_array_equal(snapshot.positions, record.positions[step])
         np.testing.assert_array_equal(snapshot.decision.forces, record.forces[step])
         assert snapshot.decision.goals is None
+
+
+def test_the_package_of_a_missing_controller_without_a_file_is_suggested(counting: ControllerChoice) -> None:
+    choice = find_controller(replace(record_run(counting), controller="learner"))
+    with pytest.raises(ParameterError, match="install the package that offers 'learner', or open it with"):
+        choice.build()
 
 
 def test_a_record_cannot_be_resumed_without_its_controller(counting: ControllerChoice) -> None:

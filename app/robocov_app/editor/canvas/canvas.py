@@ -137,7 +137,7 @@ class EditorCanvas:
         return 0.0, float(legend_height), float(width), float(view_height)
 
     def _build_legend_entries(self) -> list[LegendEntry]:
-        """Build the entries for the current content of the sheet; none while the legend is hidden."""
+        """Build the entries for what the map shows; an empty list while the legend is hidden."""
         editor = self.editor
         if "legend" not in editor.shown:
             return []

@@ -11,7 +11,7 @@ from robocov.errors import MapError, format_count
 from robocov.mapfile.models import MIN_SIZE_M
 from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import extract_polygons, require_size, round_length
-from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, format_numbered_name, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
 MITRE_LIMIT = 1.5  # when obstacles grow, corners sharper than right angles are cut off
@@ -149,7 +149,7 @@ def _require_solid_items(sketch: Sketch, selection: Selection, verb: str) -> lis
     require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
-            raise MapError(f"the {sketch.display_name(item.key)} covers nothing: repair or delete it first")
+            raise MapError(f"{format_numbered_name(sketch, item.key)} has no area: repair or delete it first")
     return items
 
 

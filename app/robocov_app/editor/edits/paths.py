@@ -51,7 +51,7 @@ def add_waypoint(
     item = sketch.get_item(key)
     path = item.shape.path
     if path is None:
-        require(not item.geometry.is_empty, "an obstacle that covers nothing cannot move")
+        require(not item.geometry.is_empty, "an obstacle without an area cannot move")
         ends = (round_map_point(compute_center(item.geometry.bounds)), round_map_point(point))
         return _set_path(sketch, key, ObstaclePath(ends, _round_speed(speed), "back-and-forth"), "moves")
     if index is None:

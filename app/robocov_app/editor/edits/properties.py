@@ -10,7 +10,7 @@ from robocov_app.editor.edits import create, vertices
 from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import extract_polygons, require_size, round_length
-from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, format_numbered_name, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
@@ -183,8 +183,8 @@ def convert_to_polygons(sketch: Sketch, selection: Selection) -> Change:
         if isinstance(item.shape, PolygonObstacle):
             continue
         polygons = extract_polygons(item.geometry, item.shape.name)
-        name = sketch.display_name(item.key)
-        require(polygons, f"the {name} covers nothing: it cannot become a polygon")
+        name = format_numbered_name(sketch, item.key)
+        require(polygons, f"{name} has no area and cannot become a polygon")
         shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
     require(shapes, "select circles or walls first")
     description = f"{Selection.of(*shapes).describe(sketch)} turned into polygons"

@@ -358,11 +358,14 @@ def _join_lines(lines: list[Ring]) -> Ring:
 
 
 def simplify(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
-    """Remove vertices by the algorithm of Douglas and Peucker (1973) with a tolerance, m.
+    """Remove vertices by the algorithm of Douglas and Peucker (1973) with the given tolerance in meters.
 
     The tolerance is reduced if an outline would intersect itself.
     """
-    require(0.0 <= tolerance <= MAX_SIZE_M, "expected a tolerance of 0 m or more")
+    require(
+        0.0 <= tolerance <= MAX_SIZE_M,
+        f"expected a tolerance from 0 to {MAX_SIZE_M:g} m, got {tolerance:g} m",
+    )
 
     def simplify_rings(rings: tuple[Ring, ...], is_closed: bool) -> tuple[Ring, ...]:
         return _simplify_rings(rings, tolerance, is_closed)

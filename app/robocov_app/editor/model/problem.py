@@ -88,7 +88,8 @@ def _translate_path(match: re.Match[str], sketch: Sketch) -> str:
         obstacle = format_numbered_name(sketch, sketch.obstacles[int(number)].key)
         return ", ".join([obstacle, *_describe_steps(steps[1:])])
     if section == "starts":
-        name = "".join(steps[0])
+        step = steps[0]
+        name = step.number or step.attribute or step.key
         return ", ".join([f"start “{name}”", *_describe_steps(steps[1:])])
     return ", ".join([section, *_describe_steps(steps)])
 

@@ -176,7 +176,8 @@ def format_numbered_name(sketch: Sketch, owner: Owner) -> str:
 def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], description: str) -> Change:
     """Return the change that replaces each of the given obstacles by any number of shapes.
 
-    The first shape keeps the key of the obstacle; all of them keep its marks. The new obstacles are selected.
+    The first shape keeps the key of the obstacle. All of them keep its note, group, lock and visibility. An
+    obstacle without shapes is removed. The new obstacles are selected.
     """
     next_key = sketch.next_key
     items: list[Item] = []

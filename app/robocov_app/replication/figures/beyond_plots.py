@@ -29,7 +29,7 @@ _HEIGHTS_SCALE = 0.68 * PAGE_SCALE
 
 
 def prepare_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
-    """Return the functions that draw the plots of the results beyond the paper, by their names."""
+    """Return the functions that draw the plots of the results beyond the paper, by name."""
     theme = get_theme(theme)
     samples = build_gap_samples(results)
     heights_size = (WIDE_PX, round(_HEIGHTS_ASPECT * WIDE_PX))
@@ -37,18 +37,18 @@ def prepare_beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
         {
             "beyond-gaps": partial(draw_gaps, samples, theme) if samples else None,
             "beyond-pairs": prepare_pairs_plot(
-                _list_own_pair_rows(results), "our cost / cost of the other, per pair (1: equal)", theme
+                _list_own_pair_rows(results), "our cost / cost of the other, per pair (1 = equal)", theme
             ),
             "beyond-heights": partial(draw_heights, heights_size, theme, _HEIGHTS_SCALE),
             "beyond-targets": prepare_pairs_plot(
                 _list_target_rows(results),
-                "cost / cost with the centroid, per pair (1: equal)",
+                "cost / cost with the centroid, per pair (1 = equal)",
                 theme,
             ),
             "beyond-density": _plan_density_figure(results, theme),
             "beyond-teams": prepare_pairs_plot(
                 _list_team_rows(results),
-                "mean time with cells by time / with cells by distance, per pair (1: equal)",
+                "mean time with cells by time / with cells by distance, per pair (1 = equal)",
                 theme,
             ),
             "beyond-conditions": _plan_degradations_plot(results, theme),

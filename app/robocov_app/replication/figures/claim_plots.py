@@ -18,9 +18,11 @@ from robocov_app.replication.figures.comparison_plots import (
 from robocov_app.replication.results.outcomes import Outcomes
 from robocov_app.replication.results.study_results import PaperResults
 
+_RATIO_LABEL = "RAPF relative to the other controller, per pair (1 = equal)"
+
 
 def prepare_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
-    """Return the functions that draw the plots of the paper's claims, by their names."""
+    """Return the functions that draw the plots of the paper's claims, by name."""
     theme = get_theme(theme)
     claims = results.claims
     by_start = []
@@ -35,11 +37,11 @@ def prepare_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     return select_plots(
         {
             "claim-1-convex": prepare_pairs_plot(
-                _list_convex_rows(results.convex), "RAPF relative to Lloyd, per pair (1: equal)", theme
+                _list_convex_rows(results.convex), "RAPF relative to Lloyd, per pair (1 = equal)", theme
             ),
             "claim-2-nonconvex": prepare_pairs_plot(
                 _list_nonconvex_rows(claims),
-                "RAPF relative to the other controller, per pair (1: equal)",
+                _RATIO_LABEL,
                 theme,
             ),
             "claim-3-gains": partial(draw_gain_grids, results.gains, theme) if has_gains else None,
@@ -47,7 +49,7 @@ def prepare_paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
             "claim-6-gap": prepare_cost_ratio_plot([("", build_cost_samples(gap_rows))], theme),
             "claim-7-limited": prepare_pairs_plot(
                 _list_nonconvex_rows(results.limited),
-                "RAPF relative to the other controller, per pair (1: equal)",
+                _RATIO_LABEL,
                 theme,
             ),
         }

@@ -32,7 +32,14 @@ from robocov_app.report.results.result import (
     describe_damage,
     replace_unprintable,
 )
-from robocov_app.runs.saved_runs import ComparisonDocument, SavedRun, build_roster, load_saved_runs
+from robocov_app.runs.saved_runs import (
+    COMPARISON_FORMAT,
+    COMPARISON_VERSION,
+    ComparisonDocument,
+    SavedRun,
+    build_roster,
+    load_saved_runs,
+)
 from robocov_app.sweep.study.parameters import UNITS, name_parameter_column
 from robocov_app.sweep.table import get_gain_column
 
@@ -71,7 +78,7 @@ def _load_runs(folder: Path) -> ReportedResult:
     path = folder / COMPARISON_FILE
     if path.is_file():
         kind = "comparison"
-        document = read_document(path, ComparisonDocument, "robocov-comparison", 1)
+        document = read_document(path, ComparisonDocument, COMPARISON_FORMAT, COMPARISON_VERSION)
         run_folders = [folder / name for name in document.folders]
         is_unfinished = not document.runs
     started_folders = run_folders

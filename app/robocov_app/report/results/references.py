@@ -58,7 +58,10 @@ def _is_static(record: Record) -> bool:
 
 
 def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference | None:
-    """Return the reference for the team of a run, from the cache or from a search; None without either."""
+    """Return the reference for the team of a run from the cache or, if `search`, from a search.
+
+    None if it is in neither, or if the free space is too small for all robots.
+    """
     environment = record.environment
     robots = len(record.team)
     radius = float(record.team.radius.max())
@@ -75,7 +78,6 @@ def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference 
     try:
         best = find_optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
     except ParameterError:
-        # The free space is too small for all robots.
         return None
     reference = Reference(best.mean_distance, best.uncovered_area)
     if cache is not None:

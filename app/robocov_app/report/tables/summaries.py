@@ -82,7 +82,7 @@ def build_summary_tables(result: ReportedResult) -> list[PageTable]:
             setting_groups = [group.select(setting) for group in groups]
             tables.append(_build_summary_table(caption, columns, setting_groups))
     if tables and any(len(group.runs) > 1 for group in groups):
-        tables[-1] = replace(tables[-1], notes=(_SEVERAL_RUNS_NOTE,))
+        tables[-1] = replace(tables[-1], notes=(*tables[-1].notes, _SEVERAL_RUNS_NOTE))
     if tables and result.references:
         tables[0] = replace(tables[0], notes=(*tables[0].notes, _REFERENCE_NOTE))
     return tables

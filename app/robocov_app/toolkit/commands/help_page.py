@@ -270,13 +270,13 @@ def _place_lines(lines: Sequence[str | Command], count: int) -> list[_Cell]:
 
 
 def _fill_columns(lines: Sequence[str | Command], rows: int) -> list[_Cell]:
-    """Distribute lines over columns with a number of rows; as many columns as it takes."""
+    """Fill columns of at most `rows` rows from top to bottom, as many columns as are needed."""
     cells: list[_Cell] = []
     column = 0
     row = 0.0
     for line in lines:
         is_heading = isinstance(line, str)
-        if row + (_HEADING_ROWS if is_heading else 1) > rows:
+        if row > 0.0 and row + (_HEADING_ROWS if is_heading else 1) > rows:
             column += 1
             row = 0.0
         if is_heading and row > 0.0:
@@ -301,7 +301,7 @@ def _measure_top(hint_lines: Sequence[str]) -> float:
 
 
 def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> None:
-    """Draw the title, and the hint: below it in lines, or to its right if it has no lines."""
+    """Draw the title, and the hint next to it or, if the hint has several lines, below it."""
     scale = columns.scale
     left = columns.box.left + round(_MARGIN_PX * scale)
     top = columns.box.top
@@ -313,8 +313,8 @@ def _draw_title(screen: Surface, theme: Theme, columns: _Columns, hint: str) -> 
         screen.blit(image, (left, y))
     if not columns.hint_lines:
         image = render_text(hint, columns.text_size, theme.faint)
-        right_end = columns.box.right - round(_MARGIN_PX * scale), top + round(_HINT_MIDDLE_PX * scale)
-        screen.blit(image, image.get_rect(midright=right_end))
+        hint_end = (columns.box.right - round(_MARGIN_PX * scale), top + round(_HINT_MIDDLE_PX * scale))
+        screen.blit(image, image.get_rect(midright=hint_end))
 
 
 def _draw_scroll_bar(screen: Surface, theme: Theme, columns: _Columns, offset: float) -> None:

@@ -177,7 +177,7 @@ class Pointer:
             self.leave()
         elif event.type == pygame.MOUSEBUTTONDOWN:
             for part in self._parts:
-                part.ui.stop_typing()
+                part.ui.clear_focus()
             self.press(event, now)
         else:
             self.handle_wheel(event)

@@ -83,7 +83,7 @@ def handle_list_event(page: Page, event: pygame.event.Event) -> bool:
     page.needs_redraw = True
     response = page.open_list.handle_event(event)
     if response is ListResponse.CLOSED:
-        page.stop_typing()
+        page.clear_focus()
     elif response is ListResponse.PICKED:
         page.focus = None
         page.run()  # In this run, the menu reads the picked option.

@@ -182,7 +182,7 @@ class Page(RowLayout):
         self.tool_tip.set_hovered("")
         self.needs_redraw = True
 
-    def stop_typing(self) -> None:
+    def clear_focus(self) -> None:
         """Take the focus away from all widgets, and close the open list."""
         self.focus = None
         self.edit = None

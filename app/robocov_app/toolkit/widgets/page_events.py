@@ -57,11 +57,11 @@ class PageEvents:
             if page.tool_tip.set_hovered(hovered):
                 page.needs_redraw = True
             return page.is_pointer_inside()
-        self._run_for(event)
+        self._rerun_page(event)
         return True
 
     def _handle_press(self, event: pygame.event.Event) -> bool:
-        """Handle a press of a mouse button; outside the widget with the focus, it ends typing."""
+        """Handle a press of a mouse button; outside the widget with the focus, it clears the focus."""
         page = self._page
         page.pointer = event.pos
         if event.button != 1:
@@ -70,9 +70,9 @@ class PageEvents:
         if handle_list_event(self._page, event):
             return True
         if page.focus is not None and not self._is_focused_widget_at(event.pos):
-            page.stop_typing()
+            page.clear_focus()
         was_held = page.active is not None
-        self._run_for(event)
+        self._rerun_page(event)
         return was_held or page.is_pointer_inside()
 
     def _handle_release(self, event: pygame.event.Event) -> bool:
@@ -81,23 +81,24 @@ class PageEvents:
         if handle_list_event(self._page, event):
             return True
         was_held = page.active is not None
-        self._run_for(event)
+        self._rerun_page(event)
         page.active = None
         return was_held or page.is_pointer_inside()
 
     def _handle_wheel(self, event: pygame.event.Event) -> bool:
         if handle_list_event(self._page, event):
             return True
-        self._run_for(event)
+        self._rerun_page(event)
         return self._page.active is not None or self._page.is_pointer_inside()
 
     def _handle_key(self, event: pygame.event.Event) -> bool:
-        """Handle a key press while a widget has the focus: Tab, Escape, or a key for that widget."""
+        """Handle a key press: pass it to the open list, move or clear the focus, or pass it to a widget."""
         page = self._page
         page.tool_tip.restart()
         if handle_list_event(self._page, event):
             return True
         name = get_key_name(event)
+        # Function keys are commands of the window, also while text is being edited.
         if page.focus is None or (page.edit is not None and is_function_key(name)):
             return False
         if name == "tab":
@@ -105,10 +106,10 @@ class PageEvents:
         elif name == "shift+tab":
             self._move_focus(-1)
         elif name == "escape":
-            page.stop_typing()
+            page.clear_focus()
         elif page.edit is None and name not in _WIDGET_KEYS:
             return False
-        self._run_for(event)
+        self._rerun_page(event)
         return True
 
     def _handle_text(self, event: pygame.event.Event) -> bool:
@@ -130,7 +131,7 @@ class PageEvents:
         page.needs_redraw = True
         return True
 
-    def _run_for(self, event: pygame.event.Event) -> None:
+    def _rerun_page(self, event: pygame.event.Event) -> None:
         self._page.needs_redraw = True
         self._page.run(event)
 

@@ -55,7 +55,8 @@ def show_text_field(
     Returns
     -------
     str or None
-        The new text; None if it has not changed or is not confirmed yet.
+        The text that was confirmed with Enter, even if it equals `text`. With `live`, also the text that is
+        being edited if it differs from `text`. Otherwise None.
     """
     rect = page.cell()
     if page.is_pressed(rect):
@@ -104,7 +105,7 @@ def _read_input(page: Page, key: str, rect: Rect) -> str | None:
     if edit.composed:
         return None
     if name in ENTER_KEYS:
-        page.stop_typing()
+        page.clear_focus()
         return edit.text
     edit.press_key(name, page.clipboard)
     return None

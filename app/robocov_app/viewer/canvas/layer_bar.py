@@ -39,6 +39,8 @@ PRESETS_COMMAND = "presets"
 # Lengths in pixels at scale 1.
 _MARGIN_PX = 8.0
 _CHIP_GAP_PX = 4.0
+_PRESETS_GAP_PX = 8.0
+"""Space between the presets and the layers in the menu."""
 _FOCUS_MARGIN_PX = 3.0  # between a chip and the ring around it
 _MENU_COLUMN_PX = 192.0
 _MIN_MENU_COLUMN_PX = 158.0
@@ -289,19 +291,19 @@ class LayerBar(BasicFocusGroup):
         columns = _divide_into_columns(groups, max_columns)
         column_width = int(min(menu_width / len(columns), _MENU_COLUMN_PX * scale))
         heights = [sum(_measure_group(groups[title]) for title in column) for column in columns]
-        chip_row = (CHIP_HEIGHT_PX + 8.0) * scale
+        presets_height = (CHIP_HEIGHT_PX + _PRESETS_GAP_PX) * scale
         box = Rect(
             left + round(_MARGIN_PX * scale),
             top + round(BAR_HEIGHT_PX * scale),
             len(columns) * column_width + 2 * padding,
-            round(chip_row + max(heights) * scale) + 2 * padding,
+            round(presets_height + max(heights) * scale) + 2 * padding,
         )
         self.menu_box = box
         draw_card(canvas.surface, box, canvas.theme, scale)
         self._draw_presets(canvas, box.left + padding, box.top + padding)
         for index, column in enumerate(columns):
             x = box.left + padding + index * column_width
-            y = box.top + padding + chip_row
+            y = box.top + padding + presets_height
             for title in column:
                 y = self._draw_group(canvas, Rect(x, round(y), column_width, 0), title, groups[title], scenes)
 

@@ -47,7 +47,7 @@ REFRESH_INTERVAL_S = 0.1
 
 
 class Chart:
-    """Chart and time slider of a session. Parts that rarely change are cached as an image, the page.
+    """Chart and time slider of a session. Parts that rarely change are cached as an image.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Chart:
     hover : (x, y) or None, px
         Position of the pointer in the window; None if the tag at the pointer is not shown.
     ghosts : list of GhostLine
-        Curves of other branches on the page.
+        Curves of other branches in the image.
     layout : Layout
         Layout of the window, from `arrange`.
     theme : Theme
@@ -71,24 +71,24 @@ class Chart:
     theme: Theme
 
     def __init__(self, viewer: Presenter) -> None:
-        """Build a chart without a page; it is drawn after `arrange`."""
+        """Build a chart without an image; it is drawn after `arrange`."""
         self.viewer = viewer
         self.hover: tuple[int, int] | None = None
         self.ghosts: list[GhostLine] = []
         self.switch_box: Box | None = None
         self._selected_quantity = DISTANCE
         self._branch_lines: list[BranchLine] = []
-        self._page: pygame.Surface | None = None
+        self._image: pygame.Surface | None = None
         self._scale: ChartScale
-        self._page_key: object = None
-        self._page_samples: object = None
-        self._page_time = -1.0
+        self._image_key: object = None
+        self._image_samples: object = None
+        self._image_time = -1.0
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Adopt the layout and the theme of the window."""
         self.layout = layout
         self.theme = theme
-        self._page = None
+        self._image = None
 
     @property
     def quantity(self) -> PlottedQuantity:
@@ -143,7 +143,7 @@ class Chart:
         if not self._has_times:
             return "all robots are equally fast: the mean time is proportional to the mean distance"
         self._selected_quantity = TIME if self.quantity is DISTANCE else DISTANCE
-        self._page = None
+        self._image = None
         title = self._selected_quantity.title
         return f"plotted: {title[:1].lower()}{title[1:]}"
 
@@ -156,7 +156,7 @@ class Chart:
         point = np.array([pixel[0], pixel[1] - self.layout.chart.top])
         return find_nearest_ghost(self.ghosts, point, GHOST_REACH_PX * self.layout.scale)
 
-    def _describe_ghost(self, pixel: tuple[int, int]) -> str:
+    def _describe_branch(self, pixel: tuple[int, int]) -> str:
         """Describe the branch at a pixel, in the tree or as a curve; empty if there is none."""
         line = find_branch_line(self._frame, self._branch_lines, pixel)
         if line is not None:
@@ -181,10 +181,7 @@ class Chart:
         if not self.layout.time_slider.height:
             return
         frame = self._frame
-        page = self._page
-        if self._update_page_key(frame) or page is None:
-            page = self._draw_page(frame)
-        screen.blit(page, self.layout.chart.position)
+        screen.blit(self._update_image(frame), self.layout.chart.position)
         if self._has_curves:
             cut_off_notes = {
                 pane.number: describe_cut_off(self.viewer, pane) for pane in frame.timeline.panes
@@ -194,18 +191,32 @@ class Chart:
         draw_branch_tree(screen, frame, self._branch_lines, hovered)
         draw_slider_state(screen, frame)
         if self.hover is not None:
-            ghost = self._describe_ghost(self.hover)
-            draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]), ghost)
+            branch_text = self._describe_branch(self.hover)
+            draw_pointer_tag(screen, frame, self.hover, self.to_time(self.hover[0]), branch_text)
 
-    def _update_page_key(self, frame: ChartFrame) -> bool:
-        """Update the key of the page's content; return whether the page must be redrawn.
+    def _update_image(self, frame: ChartFrame) -> pygame.Surface:
+        """Return the image of the parts that rarely change; draw it again if it is outdated.
 
-        Samples that are appended to the curves alone cause a redraw only every `REFRESH_INTERVAL_S`.
+        If only samples were appended to the curves, it is drawn again after `REFRESH_INTERVAL_S`.
+        """
+        key = self._build_image_key(frame)
+        samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
+        is_old = self.viewer.now - self._image_time >= REFRESH_INTERVAL_S
+        has_grown = is_old and samples != self._image_samples
+        if self._image is None or key != self._image_key or has_grown:
+            self._image = self._draw_image(frame)
+            self._image_key = key
+            self._image_samples = samples
+            self._image_time = self.viewer.now
+        return self._image
+
+    def _build_image_key(self, frame: ChartFrame) -> object:
+        """Return everything on which the image depends, except for the samples of the curves.
+
+        The samples change with almost every frame.
         """
         timeline = frame.timeline
-        samples = [(len(curve), curve.last_time, curve.interpolate(np.inf)) for curve in frame.list_curves()]
-        # The key does not contain the samples of the curves, which change with almost every frame.
-        key = (
+        return (
             tuple(pane.number for pane in timeline.panes),
             len(timeline.events),
             len(frame.ghosts),
@@ -219,20 +230,11 @@ class Chart:
             timeline.past_version,
             frame.session.playback.is_playing,
         )
-        is_old = self.viewer.now - self._page_time >= REFRESH_INTERVAL_S
-        has_grown = is_old and samples != self._page_samples
-        if self._page is not None and key == self._page_key and not has_grown:
-            return False
-        self._page_key = key
-        self._page_samples = samples
-        return True
 
-    def _draw_page(self, frame: ChartFrame) -> pygame.Surface:
-        """Draw the page: axes, events, curves, and the empty time slider."""
+    def _draw_image(self, frame: ChartFrame) -> pygame.Surface:
+        """Draw axes, events, curves, and the empty time slider."""
         layout = frame.layout
-        page = pygame.Surface((layout.chart.width, layout.chart.height + layout.time_slider.height), 0, 32)
-        self._page = page
-        self._page_time = self.viewer.now
+        image = pygame.Surface((layout.chart.width, layout.chart.height + layout.time_slider.height), 0, 32)
         curves = [curve.values for curve in frame.list_curves()]
         ghosts = [ghost.values for ghost in frame.list_ghosts()]
         self._branch_lines = []
@@ -241,18 +243,18 @@ class Chart:
         tree_height = measure_tree(len(self._branch_lines))
         scale = build_chart_scale(frame.times, layout, curves + ghosts, tree_height)
         self._scale = scale
-        canvas = create_flat_canvas(page, frame.theme, frame.scale)
-        page.fill(frame.theme.panel)
+        canvas = create_flat_canvas(image, frame.theme, frame.scale)
+        image.fill(frame.theme.panel)
         if self._has_curves:
             self._draw_curves(canvas, frame)
         else:
             self.ghosts = []
             self.switch_box = None
         draw_empty_slider(canvas, frame, scale.times)
-        return page
+        return image
 
     def _draw_curves(self, canvas: Canvas, frame: ChartFrame) -> None:
-        """Draw title, axes, events and curves on the page."""
+        """Draw title, axes, events and curves."""
         scale = self._scale
         title_end = draw_title(canvas, frame)
         self.switch_box = draw_switch(canvas, frame, title_end) if self._has_times else None

@@ -145,7 +145,7 @@ class ViewerPanel(CommandPanel):
         """Request a redraw of the panel if its content has changed; called once per frame."""
         self._age_s += seconds
         if self.is_covered and self.ui.is_busy:
-            self.ui.stop_typing()
+            self.ui.clear_focus()
         viewer = self.viewer
         session = viewer.session
         setups = tuple(session.displayed.get_setup(pane) for pane in session.timeline.panes)

@@ -428,8 +428,8 @@ class ViewerWindow(CommandWindow):
     def handle_mouse(self, event: pygame.event.Event) -> None:
         """Pass a mouse event to the page of the lesson, or else to the panel, the chart or the panes."""
         if event.type == pygame.MOUSEBUTTONDOWN:
-            self.layer_bar.stop_typing()
-            self.chart_focus.stop_typing()
+            self.layer_bar.clear_focus()
+            self.chart_focus.clear_focus()
         if event.type == pygame.MOUSEWHEEL and is_inside(self.layout.panel, self.pointer.pixel):
             distance = -SCROLL_PX_PER_NOTCH * self.layout.scale * get_wheel_notches(event)
             if self.lesson.scroll(distance):

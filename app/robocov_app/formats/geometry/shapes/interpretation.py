@@ -114,7 +114,7 @@ def interpret(drawing: Drawing, *, solid: bool, overlap: bool) -> Interpretation
         has_named_boundary=boundary is not None and boundary.is_named,
         boundary_source=boundary.source if boundary is not None and are_solid else "",
         primitives=obstacles.primitives,
-        outside=obstacles.outside,
+        outside=obstacles.outside_count,
         page=drawing.page if is_background(drawing, boundary) else None,
         repaired=report.repaired,
         notes=report.notes,
@@ -185,9 +185,9 @@ class _Obstacles:
     pillars : sequence of CircleObstacle
     layers : sequence of PaintLayer
         The paint of all obstacles.
-    count : int
+    outline_count : int
         Number of outlines, without those that surround the whole region.
-    outside : int
+    outside_count : int
         Number of shapes outside the region, and of outlines that surround all of it.
     """
 
@@ -195,8 +195,8 @@ class _Obstacles:
     walls: Sequence[WallLine]
     pillars: Sequence[CircleObstacle]
     layers: Sequence[PaintLayer]
-    count: int
-    outside: int
+    outline_count: int
+    outside_count: int
 
     @property
     def primitives(self) -> tuple[Primitive, ...]:
@@ -209,21 +209,22 @@ class _Obstacles:
 def _find_obstacles(
     drawing: Drawing, boundary: Boundary | None, region: MultiPolygon, floors: Floors, *, are_solid: bool
 ) -> _Obstacles:
-    """Return the obstacles in a region, m, whose boundary is given.
+    """Collect the obstacles inside a region. `boundary` is None if the drawing has no boundary.
 
     Outlines are obstacles if `are_solid`; otherwise only those whose color the user declared solid are.
     """
-    used = Boundary(region) if boundary is None else boundary
-    excluded = used.outlines | floors.outlines
-    others = [outline for outline in drawing.outlines if outline not in excluded]
-    outlines = [outline for outline in others if are_solid or outline.role == "solid"]
+    region_boundary = Boundary(region) if boundary is None else boundary
+    excluded = region_boundary.outlines | floors.outlines
+    candidates = [outline for outline in drawing.outlines if outline not in excluded]
+    outlines = [outline for outline in candidates if are_solid or outline.role == "solid"]
+    # A floor is free, but the line around it is a wall.
     edges = [edge for outline in drawing.outlines if outline in floors.outlines for edge in outline.edges]
-    lines = [line for line in drawing.lines if line not in used.lines]
+    lines = [line for line in drawing.lines if line not in region_boundary.lines]
     walls = [line for line in (*lines, *edges) if line.role != "free"]
-    blocks = np.array([outline.area for outline in outlines], dtype=object)
+    areas = np.array([outline.area for outline in outlines], dtype=object)
     shapely.prepare(region)
     # An outline that covers the whole region is a frame around the map, not an obstacle in it.
-    is_frame = shapely.covered_by(region, blocks)
+    is_frame = shapely.covered_by(region, areas)
     layers = [outline.paint_layer for outline in compress(outlines, ~is_frame)]
     layers += [line.paint_layer for line in walls]
     # Nothing is painted over pillars, so their order is infinite.
@@ -234,8 +235,8 @@ def _find_obstacles(
         walls=walls,
         pillars=drawing.pillars,
         layers=layers,
-        count=int((~is_frame).sum()),
-        outside=int((~is_inside).sum() + is_frame.sum()),
+        outline_count=int((~is_frame).sum()),
+        outside_count=int((~is_inside).sum() + is_frame.sum()),
     )
 
 
@@ -280,8 +281,8 @@ def _describe(
         report.repaired.append(boundary.gaps)
     # If the format defines the boundary, it also defines what outlines are: no note is needed.
     is_found = boundary is None or boundary.source != ""
-    if is_found and obstacles.count:
-        count = format_count(obstacles.count, "closed outline")
+    if is_found and obstacles.outline_count:
+        count = format_count(obstacles.outline_count, "closed outline")
         report.notes.append(f"{count} treated as solid (--outlines free: as free space)")
     elif not are_solid and len(drawing.outlines) > 1:
         count = format_count(len(drawing.outlines), "closed outline")

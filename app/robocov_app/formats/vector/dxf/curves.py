@@ -42,34 +42,35 @@ def flatten_polyline(vertices: FloatArray, bulges: FloatArray, tolerance: float)
         If there would be too many points.
     """
     pieces = [vertices[:1]]
-    remaining_points = float(MAX_POINTS)
+    remaining_points = MAX_POINTS
     for (start, end), bulge in zip(pairwise(vertices), bulges[:-1].tolist(), strict=True):
         if abs(bulge) > _MIN_BULGE and (start != end).any():
-            arc, point_count = _flatten_bulge(start, end, bulge, tolerance, remaining_points)
-            remaining_points -= point_count
+            arc = _flatten_bulge(start, end, bulge, tolerance, remaining_points)
+            remaining_points -= len(arc)
             pieces.append(arc[1:-1])
         pieces.append(end[None])
     return np.concatenate(pieces)
 
 
 def _flatten_bulge(
-    start: FloatArray, end: FloatArray, bulge: float, tolerance: float, max_points: float
-) -> tuple[FloatArray, float]:
-    """Return the points of an arc, (k, 2), from its start to its end, and an estimate of their number.
+    start: FloatArray, end: FloatArray, bulge: float, tolerance: float, max_points: int
+) -> FloatArray:
+    """Return the points of an arc, (k, 2), from its start to its end.
 
-    The estimate is made first; ValueError is raised if it exceeds `max_points`.
+    ValueError is raised, before the points are computed, if there would be more than about `max_points`.
     """
     ezdxf_math = import_optional("ezdxf.math", "dxf")
     center, start_angle, end_angle, radius = ezdxf_math.bulge_to_arc(start, end, bulge)
-    point_count = 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
-    if not max_points - point_count > 0.0:  # The estimate may be nan.
+    # A chord whose arc is at most the tolerance away from it spans an angle of sqrt(8 tolerance / radius).
+    point_count = 4 * math.atan(abs(bulge)) * math.sqrt(radius / (8 * tolerance))
+    # The estimate is nan for coordinates that are too large.
+    if math.isnan(point_count) or point_count >= max_points:
         raise ValueError(f"expected at most {MAX_POINTS} points, got more")
     arc = ezdxf_math.ConstructionArc(center, radius, *np.degrees([start_angle, end_angle]))
     # ezdxf's points run counter-clockwise, which is from the start to the end only for positive bulges.
+    # Even with a large tolerance, a circle has about six sides.
     points = to_plane(list(arc.flattening(min(tolerance, radius / 8))))
-    if bulge <= 0.0:
-        points = points[::-1]
-    return points, point_count
+    return points[::-1] if bulge < 0.0 else points
 
 
 def flatten_spline(entity: Any, tolerance: float) -> FloatArray:

@@ -66,7 +66,7 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
     record : Record
         The record.
     controllers : sequence of str
-        Controllers in users' files that may be loaded, as the user has named them. No other file is executed.
+        Controllers that the user named as ``file.py:ClassName``. No other file is executed.
 
     Returns
     -------
@@ -77,14 +77,18 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
     gains = dict(record.gains)
     class_name = name.rpartition(":")[2]
     same_class = [known for known in controllers if known.rpartition(":")[2] == class_name]
-    if name not in (*CONTROLLERS, *same_class):
-        if not same_class:
-            suggestion = f"FILE.py:{class_name}" if class_name != name else class_name
-            advice = f"to resume the run, open it with --controller {suggestion}"
-            reason = f"{record.label} is not one of robocov's controllers; {advice}"
-            return MissingController(name, gains, record.label, reason)
-        name = same_class[0]
-    choice = ControllerChoice(name, gains)
+    if name in CONTROLLERS or name in same_class:
+        choice = ControllerChoice(name, gains)
+    elif same_class:
+        # The user's file may have moved since the run, so that a class of the same name is enough.
+        choice = ControllerChoice(same_class[0], gains)
+    else:
+        advice = f"to resume the run, open it with --controller FILE.py:{class_name}"
+        if class_name == name:
+            advice = f"to resume the run, install the package that offers {name!r}, or open it with "
+            advice += "--controller FILE.py:CLASS"
+        reason = f"{record.label} is not one of robocov's controllers; {advice}"
+        return MissingController(name, gains, record.label, reason)
     try:
         choice.build()
         return choice.drop_defaults()
