@@ -46,7 +46,7 @@ def test_removed_vertices_are_near_the_new_outline(seed, count, tolerance):
     assert places == sorted(places)
 
 
-@pytest.mark.parametrize("tolerance", [-0.1, 1e9, math.nan])
+@pytest.mark.parametrize("tolerance", [-0.1, 20_000.0, math.nan])
 def test_impossible_tolerances_are_rejected(tolerance):
     with pytest.raises(MapError, match=f"expected a tolerance from 0 to .* m, got {tolerance:g} m"):
         simplify(Sketch(boundary=HALL), Selection(boundary=True), tolerance)
