@@ -288,4 +288,4 @@ class Painter:
                     layer.draw(replace(canvas, surface=page), scene)
             return page
 
-        return self._static.get(scene.environment, key, draw_page)
+        return self._static.get_or_compute(scene.environment, key, draw_page)

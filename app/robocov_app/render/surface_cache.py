@@ -92,7 +92,7 @@ class LatestValue(Generic[_Value]):
     def __init__(self) -> None:
         self._cached: tuple[object, object, _Value] | None = None
 
-    def get(self, source: object, key: object, compute: Callable[[], _Value]) -> _Value:
+    def get_or_compute(self, source: object, key: object, compute: Callable[[], _Value]) -> _Value:
         """Return the cached value, or compute it if the source or the key has changed.
 
         Parameters

@@ -93,6 +93,6 @@ def test_surfaces_larger_than_the_cache_are_not_cached() -> None:
 def test_the_latest_value_is_cached_for_each_source_and_key() -> None:
     latest = LatestValue[object]()
     source = [1, 2]
-    value = latest.get(source, "light", object)
-    assert latest.get(source, "light", object) is value
-    assert latest.get(source, "dark", object) is not value
+    value = latest.get_or_compute(source, "light", object)
+    assert latest.get_or_compute(source, "light", object) is value
+    assert latest.get_or_compute(source, "dark", object) is not value

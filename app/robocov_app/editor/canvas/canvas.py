@@ -142,7 +142,7 @@ class EditorCanvas:
         if "legend" not in editor.shown:
             return []
         sketch = editor.sketch
-        has_excess = self._has_hull_excess.get(
+        has_excess = self._has_hull_excess.get_or_compute(
             sketch.boundary, None, lambda: compute_hull_excess(sketch).area > MIN_HULL_EXCESS_M2
         )
         team = self.team
@@ -323,7 +323,9 @@ class EditorCanvas:
         labels = tuple(entry.text for entry in self.entries)
         key = (labels, width, canvas.theme.name, canvas.scale)
         strip = replace(canvas, surface=Surface((width, 1)))
-        legend = self._legend.get(None, key, lambda: legend_strip.render_legend_strip(self.entries, strip))
+        legend = self._legend.get_or_compute(
+            None, key, lambda: legend_strip.render_legend_strip(self.entries, strip)
+        )
         scene.surface.blit(legend, (0, 0))
 
     def _draw_status_strip(self, scene: EditorScene) -> None:

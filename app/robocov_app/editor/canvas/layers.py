@@ -76,7 +76,7 @@ class DraggedObstacles:
 
     def _draw_dragged_image(self, scene: EditorScene, dragged: DraggedImage) -> None:
         camera = scene.view.camera
-        image = self._image.get(
+        image = self._image.get_or_compute(
             scene.committed_sketch,
             (dragged.selection, camera, scene.view.theme.name),
             lambda: self._render_image(scene, dragged.selection),
@@ -112,7 +112,9 @@ class Passages:
             return
         view = scene.view
         look = (view.camera, view.theme.name, view.scale, view.size)
-        hatching = self._hatching.get(measurement, look, lambda: render_hatching(view, measurement))
+        hatching = self._hatching.get_or_compute(
+            measurement, look, lambda: render_hatching(view, measurement)
+        )
         if hatching is not None:
             surface, position = hatching
             scene.surface.blit(surface, position, special_flags=_PREMULTIPLIED)
@@ -240,7 +242,7 @@ class SelectedObjects:
             return canvas.surface
 
         look = (selection, scene.view.camera, scene.view.theme.name, scene.view.scale)
-        image = self._outlines.get(scene.sketch, look, render_image)
+        image = self._outlines.get_or_compute(scene.sketch, look, render_image)
         scene.canvas.surface.blit(image, (0, 0), special_flags=_PREMULTIPLIED)
 
     def _draw_all(self, canvas: Canvas, sketch: Sketch, owners: set[Owner]) -> None:

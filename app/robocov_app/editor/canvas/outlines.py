@@ -130,7 +130,7 @@ class Outlines:
 
     def find_items(self, sketch: Sketch, box: Box) -> list[Item]:
         """Return the obstacles that are not hidden and whose bounds meet a box, m, from bottom to top."""
-        bounds = self._bounds.get(sketch, None, lambda: self._list_bounds(sketch))
+        bounds = self._bounds.get_or_compute(sketch, None, lambda: self._list_bounds(sketch))
         low_x, low_y, high_x, high_y = bounds.T
         is_near = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
         items = [sketch.obstacles[k] for k in np.flatnonzero(is_near)]

@@ -206,7 +206,7 @@ class Sheet:
     def _draw_hull_excess(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw the areas between the boundary and its convex hull, which robots consider to be free."""
         theme = canvas.theme
-        excess = self._hull_excess.get(sketch.boundary, None, lambda: compute_hull_excess(sketch))
+        excess = self._hull_excess.get_or_compute(sketch.boundary, None, lambda: compute_hull_excess(sketch))
         fill = choose_hull_excess_color(theme)
         edge = choose_hull_excess_edge(theme)
         for part in shapely.get_parts(excess):

@@ -70,7 +70,9 @@ class EditorContext(WindowModel):
         sketch = self.sketch
         selection = self.selection
         pixel = self.pixel
-        return self._handles.get(sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel))
+        return self._handles.get_or_compute(
+            sketch, (selection, pixel), lambda: list_handles(sketch, selection, pixel)
+        )
 
     def build_snap_settings(self, reach: float) -> SnapSettings:
         """Build the snap settings for a pointer with a given reach, m."""

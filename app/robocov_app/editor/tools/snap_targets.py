@@ -115,7 +115,7 @@ class Snapper:
         # The key of the cache must be hashable.
         dragged = frozenset(ignored)
         points = tuple(extra_points)
-        future = self._latest.get(
+        future = self._latest.get_or_compute(
             sketch,
             (dragged, points),
             lambda: self._pool.submit(collect_snap_targets, sketch, dragged, points),

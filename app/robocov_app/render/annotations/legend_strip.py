@@ -43,7 +43,7 @@ class LegendLayer:
             canvas.hues[:1].tolist(),
             canvas.visible_layers,
         )
-        strip = self._strip.get(None, key, lambda: render_legend_strip(canvas.legend, canvas))
+        strip = self._strip.get_or_compute(None, key, lambda: render_legend_strip(canvas.legend, canvas))
         canvas.surface.blit(strip, (0, 0))
 
 

@@ -65,7 +65,7 @@ class FieldLayer:
             x, y = convert_axes_to_world(canvas.camera, columns, rows)
             return self._render(canvas, scene, field, x, y)
 
-        picture = self._picture.get(field, key, render_picture)
+        picture = self._picture.get_or_compute(field, key, render_picture)
         canvas.surface.blit(picture, corner.tolist())
         _cover_outside(canvas, scene.environment.region.vertices)
 

@@ -54,7 +54,9 @@ class StartsLayer:
             return canvas.place_sprites([_build_start_ring(canvas, round_to_half(0.5 * size))], centers)
 
         key = (canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size())
-        canvas.surface.fblits(self._rings.get(starts, key, place_rings), pygame.BLEND_PREMULTIPLIED)
+        canvas.surface.fblits(
+            self._rings.get_or_compute(starts, key, place_rings), pygame.BLEND_PREMULTIPLIED
+        )
 
 
 def _build_start_ring(canvas: Canvas, radius: float) -> Sprite:

@@ -215,7 +215,7 @@ class TrajectoriesLayer:
         """Return the color of each trajectory: working robots first, then failed ones."""
         theme = canvas.theme
         hues = canvas.hues.tolist()
-        working = self._colors.get(
+        working = self._colors.get_or_compute(
             None, (theme.name, hues), lambda: choose_trail_colors(theme, hues, self._color_scheme)
         )
         return working + [theme.failed_trajectory] * (n_robots - len(working))

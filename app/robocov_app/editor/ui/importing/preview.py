@@ -107,7 +107,7 @@ class ImportPreview:
                 sheet.draw(image, self.cameras[0], imported.comparison.bounds)
             return image
 
-        screen.blit(self._image.get(imported, look, render_maps), (0, 0))
+        screen.blit(self._image.get_or_compute(imported, look, render_maps), (0, 0))
         captions = _list_captions(imported, theme, has_own_colors=sheet is not None)
         for camera, caption in zip(self.cameras, captions, strict=True):
             self._draw_caption(screen, camera, caption, scale, theme)
