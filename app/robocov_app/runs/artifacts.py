@@ -19,6 +19,7 @@ from robocov.files.result_names import (
     TRAJECTORIES_FIGURE,
 )
 from robocov.kernel_compilation import compile_kernels
+from robocov.metrics import compute_relative_excess
 from robocov.scenario import Scenario
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures
 from robocov_app.runs.execution import Run, execute_scenario
@@ -164,14 +165,14 @@ def build_comparison_rows(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
         One row for each run: its results, and ``above_best``, the relative difference between its mean
         distance and the lowest one.
     """
-    lowest = min(run.summary["mean_distance_m"] for run in runs.values())
+    excess = compute_relative_excess([run.summary["mean_distance_m"] for run in runs.values()])
     rows = []
-    for name, run in runs.items():
+    for (name, run), above_best in zip(runs.items(), excess, strict=True):
         summary = run.summary
-        row = {"controller": name, "label": run.record.label, "gains": dict(run.record.gains)}
+        row: dict[str, Any] = {"controller": name, "label": run.record.label, "gains": dict(run.record.gains)}
         row |= {column: summary[column] for column in _SUMMARY_COLUMNS if column in summary}
         row["mean_path_length_m"] = sum(summary["path_length_m"]) / len(run.record.team)
-        row["above_best"] = summary["mean_distance_m"] / lowest - 1.0
+        row["above_best"] = above_best
         if "notes" in summary:
             row["notes"] = summary["notes"]
         rows.append(row)

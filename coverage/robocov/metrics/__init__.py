@@ -32,7 +32,7 @@ from robocov.metrics.settling import (
     find_settling_time,
     is_team_at_rest,
 )
-from robocov.metrics.summary import summarize
+from robocov.metrics.summary import compute_relative_excess, summarize
 
 __all__ = [
     "MAX_CONTACT_GAP_M",
@@ -44,6 +44,7 @@ __all__ = [
     "compute_cost_history",
     "compute_mean_over_run",
     "compute_path_lengths",
+    "compute_relative_excess",
     "count_contacts",
     "count_stuck_robots",
     "find_settling_time",

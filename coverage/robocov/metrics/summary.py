@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from robocov.metrics.advice import advise
@@ -71,6 +73,41 @@ def summarize(record: Record, history: CostHistory) -> dict[str, Any]:
     if notes:
         summary["notes"] = notes
     return summary
+
+
+def compute_relative_excess(values: Sequence[float]) -> list[float]:
+    """Compute by how much each value exceeds the lowest one, relative to the lowest one.
+
+    Parameters
+    ----------
+    values : sequence of float
+        Values of at least 0; nan if unknown.
+
+    Returns
+    -------
+    list of float
+        0 for the lowest value, and nan for unknown values. If the lowest value is 0, the excess of all higher
+        ones is infinite.
+
+    Examples
+    --------
+    >>> compute_relative_excess([3.0, 2.0, float("nan")])
+    [0.5, 0.0, nan]
+    >>> compute_relative_excess([3.0, 0.0, float("nan")])
+    [inf, 0.0, nan]
+    """
+    lowest = min((value for value in values if not math.isnan(value)), default=math.nan)
+    excess = []
+    for value in values:
+        if math.isnan(value):
+            excess.append(math.nan)
+        elif value == lowest:
+            excess.append(0.0)
+        elif lowest == 0.0:
+            excess.append(math.inf)
+        else:
+            excess.append(value / lowest - 1.0)
+    return excess
 
 
 def _describe_moved_joins(record: Record) -> list[str]:

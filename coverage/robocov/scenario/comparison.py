@@ -14,7 +14,7 @@ from robocov.defaults import DEFAULT_LATTICE
 from robocov.drawing import Drawable
 from robocov.environment import Environment
 from robocov.errors import ParameterError, quote
-from robocov.metrics import CostHistory, compute_cost_history, summarize
+from robocov.metrics import CostHistory, compute_cost_history, compute_relative_excess, summarize
 from robocov.optional_imports import import_optional
 from robocov.record import Record
 from robocov.scenario.scenario import Scenario, require_scenario_options
@@ -82,14 +82,15 @@ class Comparison(Drawable):
             difference between the final mean distance and the lowest one in the table. ``mean_time_s`` is
             missing if all robots have the same speed.
         """
-        lowest = min(summary["mean_distance_m"] for summary in self.summaries.values())
+        mean_distances = [summary["mean_distance_m"] for summary in self.summaries.values()]
+        excess = compute_relative_excess(mean_distances)
         rows = []
-        for label, summary in self.summaries.items():
+        for (label, summary), above_best in zip(self.summaries.items(), excess, strict=True):
             lengths = summary["path_length_m"]
             row = {
                 "controller": label,
                 "mean_distance_m": summary["mean_distance_m"],
-                "above_best": summary["mean_distance_m"] / lowest - 1.0,
+                "above_best": above_best,
                 "cost_m3": summary["cost_m3"],
                 "uncovered_area_m2": summary["uncovered_area_m2"],
                 "settled_at_s": summary["settled_at_s"],
