@@ -209,11 +209,14 @@ def is_box_hidden(boxes: FloatArray, box: int, index: AngularWallIndex, source: 
     half_height = 0.5 * (boxes[box, HIGH_Y] - boxes[box, LOW_Y])
     dx = boxes[box, LOW_X] + half_width - x
     dy = boxes[box, LOW_Y] + half_height - y
-    # The sine of the angle between the direction of the center and that of any point of the box is at most
-    # the half diagonal divided by the distance to the center. An angle is at most pi/2 times its sine, and a
-    # pseudo-angle grows at most as fast as the angle.
+    # The box lies in the circle around its center through its corners. From a source outside this circle, the
+    # sine of the angle between the direction of the center and that of any point of the box is at most the
+    # radius divided by the distance to the center. The angle is then at most pi/2 times its sine, and a
+    # pseudo-angle grows at most as fast as the angle. From a source inside, the box may lie in any direction.
     squared_sine = (half_width * half_width + half_height * half_height) / (dx * dx + dy * dy)
-    half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _ANGLE_PADDING
+    half_angle = 0.5 * _FULL_TURN
+    if squared_sine < 1.0:
+        half_angle = np.sqrt(squared_sine) * (0.5 * np.pi) + _ANGLE_PADDING
     angle = compute_pseudo_angle(dx, dy)
     bins_per_unit = bin_count / _FULL_TURN
     first_bin = int(np.floor((angle - half_angle) * bins_per_unit))

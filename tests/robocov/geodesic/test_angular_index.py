@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from robocov.environment import Environment, PolygonObstacle
 from robocov.geodesic import Geodesics
@@ -97,3 +99,21 @@ def test_each_bin_is_checked_once_however_long_the_box_is():
     assert is_box_hidden(boxes, 0, index, 0)
     index.squared_horizons[0, 5] = 2.0
     assert not is_box_hidden(boxes, 0, index, 0)
+
+
+@given(
+    size=st.tuples(st.floats(0.0, 1e3), st.floats(0.0, 1e3)),
+    offset=st.tuples(st.floats(-2e3, 2e3), st.floats(-2e3, 2e3)),
+    fraction=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)),
+)
+@example(size=(400.0, 2.0), offset=(-380.0, -3.0), fraction=(1.0, 1.0))
+def test_a_box_is_not_hidden_if_one_of_its_points_is_in_an_open_direction(size, offset, fraction):
+    low = np.array(offset)
+    high = low + size
+    point = low + np.multiply(fraction, size)
+    index = AngularWallIndex.allocate(1, 64, 1)
+    index.positions[:] = 0.0
+    index.squared_horizons[:] = 0.0
+    open_bin = int(compute_pseudo_angle(*point) * 16)
+    index.squared_horizons[0, open_bin % 64] = np.inf
+    assert not is_box_hidden(np.array([[*low, *high]]), 0, index, 0)
