@@ -472,8 +472,10 @@ def get_robot_count(team: Team, robots: int, default: int, path: Path) -> int:
     ----------
     team : Team
         The team in the file.
-    robots, default : int
-        Value and default value of the option ``--robots``.
+    robots : int
+        Value of the option ``--robots``.
+    default : int
+        Its default, which cannot be told apart from the same number typed by the user.
     path : Path
         The file.
 
@@ -484,7 +486,7 @@ def get_robot_count(team: Team, robots: int, default: int, path: Path) -> int:
     Raises
     ------
     ParameterError
-        If the option is given and differs from the file.
+        If `robots` is neither the default nor the number in the file.
     """
     if robots not in (default, len(team)):
         raise ParameterError(f"--robots: expected {len(team)} as in {path}, got {robots}")

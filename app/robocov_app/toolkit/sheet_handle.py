@@ -35,14 +35,15 @@ class SheetHandle:
     def handle_event(self, event: pygame.event.Event, layout: Layout) -> bool:
         """Handle a mouse event; return whether it was meant for the handle."""
         if event.type == pygame.MOUSEBUTTONDOWN:
-            is_pressed = event.button == LEFT_BUTTON and is_inside(layout.handle, event.pos)
-            if is_pressed:
-                self._pressed_y = event.pos[1]
+            if event.button != LEFT_BUTTON:
+                return False
+            is_pressed = is_inside(layout.handle, event.pos)
+            self._pressed_y = event.pos[1] if is_pressed else None
             return is_pressed
         pressed_y = self._pressed_y
         if pressed_y is None:
             return False
-        if event.type == pygame.MOUSEBUTTONUP:
+        if event.type == pygame.MOUSEBUTTONUP and event.button == LEFT_BUTTON:
             self._pressed_y = None
             is_tap = is_inside(layout.handle, event.pos)
             is_dragged = event.pos[1] - pressed_y >= _MIN_DRAG_PX * layout.scale

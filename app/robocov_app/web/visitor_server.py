@@ -35,7 +35,7 @@ from robocov_app.web.window_process import (
     ENDING_TIMEOUT_S,
     WindowCommand,
     WindowProcess,
-    start_process,
+    start_window_process,
     wait_until_open,
 )
 
@@ -322,7 +322,7 @@ class VisitorServer:
         async with self._openings:
             if self._is_ending:
                 raise InputError("the server is ending")
-            process, receiver = start_process(self._command, self._options, folder, self._link)
+            process, receiver = start_window_process(self._command, self._options, folder, self._link)
             self._processes.append(process)
             return await wait_until_open(process, receiver, folder)
 

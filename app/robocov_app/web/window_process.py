@@ -130,7 +130,7 @@ class WindowProcess:
             self.folder.rmdir()
 
 
-def start_process(
+def start_window_process(
     command: WindowCommand, options: Any, folder: Path, link: ShareLink
 ) -> tuple[SpawnProcess, Connection]:
     """Start the process of a window.
@@ -151,6 +151,11 @@ def start_process(
     process : SpawnProcess
     receiver : Connection
         Receives an `OpeningResult`.
+
+    Raises
+    ------
+    OSError
+        If the process cannot be started.
     """
     own_options = replace(options, each=False, host="127.0.0.1", port=0, folder=folder)
     context = multiprocessing.get_context("spawn")
@@ -160,9 +165,14 @@ def start_process(
         # Starting this tracker unblocks signals, so it must be started before they are blocked.
         resource_tracker.ensure_running()
     block_interrupts()
-    process.start()
-    unblock_interrupts()
-    sender.close()
+    try:
+        process.start()
+    except BaseException:
+        receiver.close()
+        raise
+    finally:
+        unblock_interrupts()
+        sender.close()
     return process, receiver
 
 

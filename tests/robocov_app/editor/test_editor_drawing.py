@@ -243,9 +243,17 @@ def test_measuring_shows_lengths_and_changes_nothing(driver: EditorDriver) -> No
     assert "Δx 3.00  Δy 4.00" in preview.label
     driver.click_all((1, 1), (4, 1), (4, 5))
     driver.press_key("return")
-    assert "7.00 m in all" in driver.editor.tool.build_overlay(driver.editor).label
+    assert "total 7.00 m, area 6.00 m²" in driver.editor.tool.build_overlay(driver.editor).label
     driver.press_key("escape")
     assert driver.editor.tool.build_overlay(driver.editor) == EditorToolOverlay() and driver.sketch is before
+
+
+def test_a_measured_line_that_crosses_itself_has_no_area(driver: EditorDriver) -> None:
+    driver.press_key("m")
+    driver.click_all((1, 1), (4, 4), (4, 1), (1, 4))
+    driver.press_key("return")
+    label = driver.editor.tool.build_overlay(driver.editor).label
+    assert "total" in label and "m²" not in label
 
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(driver: EditorDriver, tmp_path: Path) -> None:

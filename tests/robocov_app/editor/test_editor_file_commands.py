@@ -170,6 +170,9 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(driver: EditorDriver, tmp_p
     assert len(driver.shapes) == 1 and driver.editor.document.history.has_unsaved_changes
     driver.press_key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
+    driver.post(pygame.DROPFILE, file=str(path))
+    driver.settle()
+    assert driver.message == "Read again: untitled.json"
     path.unlink()
     driver.window.run_frame(2.0)
     driver.window.run_frame(2.0)
@@ -317,7 +320,7 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(folders: Path) 
     document.save(folders / "plan.json")
     document.flush()
     with (
-        pytest.raises(InputError, match="another editor has it open"),
+        pytest.raises(InputError, match="already open in another editor"),
         open_launched_editor(folders, folders / "plan.json"),
     ):
         pass

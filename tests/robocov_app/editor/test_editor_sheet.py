@@ -207,6 +207,13 @@ def test_names_are_written_where_they_fit() -> None:
     assert build_outline(shapely.Polygon()).name_space.width == 0.0
 
 
+def test_the_space_for_a_name_is_inside_the_obstacle() -> None:
+    triangle = shapely.Polygon([(0, 0), (6, 0), (3, 6)])
+    x, y, width, height = build_outline(triangle).name_space
+    assert triangle.buffer(1e-9).covers(shapely.LineString([(x - width / 2, y), (x + width / 2, y)]))
+    assert triangle.buffer(1e-9).covers(shapely.LineString([(x, y - height / 2), (x, y + height / 2)]))
+
+
 @pytest.mark.parametrize(
     ("size", "lines"),
     [

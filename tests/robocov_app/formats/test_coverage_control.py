@@ -78,7 +78,12 @@ def test_the_size_of_a_cell_scales_the_world(tmp_path: Path) -> None:
         ("CircularBND\n1 2 3 0\n", None, "expected a feature with a weight inside the world"),
         ("CircularBND\n1 2 3 4\n" * 1001, None, "expected at most 1000 features"),
         ("Uniform\n3 1\n0 0\n1024 0\n0 1024\n" * 70, None, "expected smaller or fewer polygons"),
-        ("CircularBND\n1 2 3 4\n", "1 2\n3\n", "world.pos: expected an x and a y for each robot"),
+        (
+            "CircularBND\n1 2 3 4\n",
+            "1 2\n3\n",
+            "world.pos: expected an x and a y for each robot, got 3",
+        ),
+        ("CircularBND\n1 2 3 4\n", "1 2 x 3\n", "world.pos: expected a number, got 'x'"),
     ],
 )
 def test_other_files_are_rejected(tmp_path: Path, content: str, positions: str | None, message: str) -> None:

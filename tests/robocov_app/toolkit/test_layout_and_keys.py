@@ -1,5 +1,7 @@
 """Layout and scale of a window, names of keys, and typed commands."""
 
+import re
+
 import pytest
 
 from robocov_app.toolkit.commands.command import split_command
@@ -29,6 +31,13 @@ def test_the_scale_is_limited_by_the_window_size(size: tuple[int, int], scale: f
 def test_a_window_in_portrait_orientation_needs_less_width_for_a_scale() -> None:
     assert explain_reduced_scale(2.0, (700, 1000)) == "scale 2 needs a window of 720 × 1200; using 1.625"
     assert explain_reduced_scale(2.0, (720, 1200)) == ""
+
+
+@pytest.mark.parametrize("scale", [1.1, 1.125, 1.9, 3.3])
+def test_a_window_of_the_recommended_size_has_the_requested_scale(scale: float) -> None:
+    recommended = re.search(r"a window of (\d+) × (\d+);", explain_reduced_scale(scale, (900, 600)))
+    assert recommended is not None
+    assert explain_reduced_scale(scale, (int(recommended[1]), int(recommended[2]))) == ""
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_each_force_is_described_with_its_cause():
         "slowed with 0.40 N by viscosity",
         "resultant of these forces 0.30 N north",
         "its rim is 32 cm from the obstacle south of it",
-        "2 robots in communication range, the nearest is robot 7, 80 cm west",
+        "2 robots in communication range; the nearest is robot 7, 80 cm west",
     ]
     assert get_line(report, "attraction").vector == (0.31, 0.0)
     assert get_line(report, "viscosity").vector == (-0.4, 0.0)
@@ -328,7 +328,7 @@ def test_missing_surroundings_are_described(reach, text):
 
 def test_only_robots_in_communication_range_are_counted():
     report = build_report([[4, 4], [5, 4], [7, 4]], communication_range=1.5)
-    assert "1 robot in communication range, the nearest is robot 2, 1.0 m east" in list_texts(report)
+    assert "1 robot in communication range: robot 2, 1.0 m east" in list_texts(report)
 
 
 def test_a_goal_at_the_centroid_is_named():

@@ -17,7 +17,7 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.settings import VideoSettings
 from robocov_app.viewer.branch_output.parts import split_branch
-from robocov_app.viewer.branch_output.video import draw_branch_frames
+from robocov_app.viewer.branch_output.video import count_video_frames, draw_branch_frames
 from robocov_app.viewer.session.editing.edits import PlaceRobot
 from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.run_saver import RunSaver
@@ -141,6 +141,14 @@ def test_a_video_has_a_legend_and_names_the_edits(tmp_path: Path) -> None:
     bottom = slice(360 - 14, 360)
     assert (first[bottom].min(axis=2) > 200).all(), "the first frame names no edit"
     assert (last[bottom].min(axis=2) < 100).sum() > 50
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.1])
+def test_a_video_in_slow_motion_has_more_frames(speed: float) -> None:
+    branch = select_present_branch(build_branched_session())
+    settings = VideoSettings(size=(320, 180), fps=30, speed=speed)
+    frames = list(draw_branch_frames(branch, split_branch(branch), [], settings))
+    assert len(frames) == pytest.approx(count_video_frames(branch, settings), abs=1)
 
 
 def test_a_drag_belongs_to_the_part_before_and_is_recorded_there() -> None:

@@ -59,6 +59,24 @@ def test_undo_returns_to_the_run_before_a_restart():
     assert session.displayed.time == 20 / 60
 
 
+@pytest.mark.parametrize("is_playing", [True, False])
+def test_a_step_that_an_unexpected_error_interrupts_is_reverted(monkeypatch, is_playing):
+    session = advance_session(start_session(RAPF, LLOYD), 5)
+    session.playback.is_playing = is_playing
+    point = session.build_save_point()
+
+    def fail(pull):
+        raise ZeroDivisionError
+
+    with monkeypatch.context() as patch:
+        patch.setattr(session.timeline.panes[1], "step", fail)
+        with pytest.raises(ZeroDivisionError):
+            session.playback.step()
+    session.restore(point)
+    assert [pane.simulation.time for pane in session.timeline.panes] == [session.timeline.end_time] * 2
+    assert session.timeline.step == 5
+
+
 def test_all_edits_can_be_undone_across_restarts():
     session = start_session()
     circle = CircleObstacle((5.2, 0.4), 0.2)

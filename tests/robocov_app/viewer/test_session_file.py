@@ -154,6 +154,8 @@ def test_the_branches_of_a_file_are_described_before_they_are_recomputed(tmp_pat
         ),
         (("edits", 1, "changes", 0, "robot"), "two", 'changes[0].robot: expected an integer, got "two"'),
         (("edits", 1, "changes", 0, "do"), "fly", "edits[1].changes[0].do: expected one of 'drag', "),
+        (("edits", 1, "changes", 0), {"robot": 2}, "edits[1].changes[0].do: missing"),
+        (("edits", 1, "changes", 0), 5, "edits[1].changes[0]: expected an object, got 5"),
         (("edits", 1, "changes"), [], "edits[1].changes: expected at least 1 item, got []"),
         (("edits", 1, "curves"), {"0 speed": [[0], [1]]}, 'edits[1].curves: expected "0 distance", '),
         (

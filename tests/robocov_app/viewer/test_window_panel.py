@@ -75,6 +75,7 @@ def test_user_controllers_with_equal_labels_have_unique_menu_entries(tmp_path: P
         names[0]: "RAPF (mine.py)",
         names[1]: f"RAPF ({names[1]})",
     }
+    assert label_controllers(["rapf"], {"learner": "RAPF"})["learner"] == "RAPF (learner)"
     with open_viewer(tmp_path, RAPF, RPF, RPF, RPF) as driver:
         for name in names:
             driver.viewer.attempt(lambda name=name: driver.window.commands.run_text(f"controller {name}"))

@@ -13,7 +13,7 @@ from robocov_app.web.window_process import (
     OpeningFailure,
     WindowAddress,
     get_server_access,
-    start_process,
+    start_window_process,
     wait_until_open,
 )
 
@@ -72,7 +72,9 @@ def print_and_open(options: WindowOptions) -> int:
 
 
 def test_text_that_a_command_prints_is_not_mistaken_for_a_result(tmp_path):
-    process, receiver = start_process(print_and_open, WindowOptions(serve=True, each=True), tmp_path, LINK)
+    process, receiver = start_window_process(
+        print_and_open, WindowOptions(serve=True, each=True), tmp_path, LINK
+    )
     window = asyncio.run(wait_until_open(process, receiver, tmp_path))
     process.join()
     assert window.address == WindowAddress(0, "secret")

@@ -60,8 +60,9 @@ class Outline:
     def name_space(self) -> NameSpace:
         """Space for the name of the obstacle; all 0 for an empty geometry.
 
-        It is in the middle of the widest interval inside the obstacle on two horizontal lines: one through
-        the centroid, and one through a point inside.
+        The candidates are at the middles of two horizontal cuts: through the centroid, and through a point
+        inside. Each is moved up or down to the middle of the obstacle there. A later candidate must be wider
+        by `MIN_NAME_GAIN`.
         """
         best = NameSpace()
         if self.geometry.is_empty:
@@ -74,8 +75,12 @@ class Outline:
                     for column in _cut_vertically(self.geometry, x)
                     if column.bounds[1] <= y <= column.bounds[3]
                 ]
-                if columns and row.length > best.width * MIN_NAME_GAIN:
-                    best = NameSpace(x, columns[0].centroid.y, row.length, columns[0].length)
+                if not columns:
+                    continue
+                middle_y = columns[0].centroid.y
+                width = min(row.length, _measure_row(self.geometry, x, middle_y))
+                if width > best.width * MIN_NAME_GAIN:
+                    best = NameSpace(x, middle_y, width, columns[0].length)
         return best
 
 
@@ -83,6 +88,14 @@ def _cut_horizontally(geometry: shapely.Geometry, y: float) -> list[shapely.Geom
     """Return the parts of a geometry on the horizontal line at height y, m, as lines."""
     low_x, _, high_x, _ = geometry.bounds
     return _intersect_line(geometry, [(low_x - 1.0, y), (high_x + 1.0, y)])
+
+
+def _measure_row(geometry: shapely.Geometry, x: float, y: float) -> float:
+    """Return the width of a geometry, m, at a point: the length of its part on the horizontal line there."""
+    for row in _cut_horizontally(geometry, y):
+        if row.bounds[0] <= x <= row.bounds[2]:
+            return float(row.length)
+    return 0.0
 
 
 def _cut_vertically(geometry: shapely.Geometry, x: float) -> list[shapely.Geometry]:

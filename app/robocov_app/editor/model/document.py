@@ -157,7 +157,7 @@ class Document:
         path : Path
             Path of the file. A missing suffix is added.
         overwrites : bool
-            Whether to replace the file even if another program has changed it.
+            Whether to replace a file that another program has changed, or that exists at a new path.
 
         Returns
         -------

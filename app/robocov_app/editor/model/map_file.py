@@ -112,7 +112,7 @@ def write_sketch(
 def _require_unchanged(path: Path, expected: FileVersion | None) -> None:
     if expected is None or expected.path != path:
         if _read_stamp(path) is not None:
-            raise FileChangedError(f"{to_one_line(path)}: expected a new file, but it already exists")
+            raise FileChangedError(f"{to_one_line(path)}: this file already exists")
     elif check_file(expected) == "changed":
         raise FileChangedError(
             f"{to_one_line(path)}: was changed by another program since it was opened or saved"

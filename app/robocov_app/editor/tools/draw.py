@@ -264,7 +264,10 @@ class MeasureTool(LineTool):
         return super().cancel(context) or had_line
 
     def build_overlay(self, context: EditorContext) -> EditorToolOverlay:
-        """Return the line with its length and, from three points on, the area that it encloses."""
+        """Return the line with its length and, from three points on, the area that it encloses.
+
+        A line that crosses itself has no area.
+        """
         points = self.clicked
         if self.points:
             points = [*self.points, self.outline.cursor]
@@ -276,7 +279,10 @@ class MeasureTool(LineTool):
         label = f"{format_bearing(start, end)}   {format_shift(dx, dy)}"
         if len(points) > 2:
             total = sum(distance(a, b) for a, b in pairwise(points))
-            label += f"   {format_length(total)} in all, {shapely.Polygon(points).area:.2f} m²"
+            label += f"   total {format_length(total)}"
+            outline = shapely.Polygon(points)
+            if outline.is_valid:
+                label += f", area {outline.area:.2f} m²"
         return EditorToolOverlay(line=tuple(points), shows_lengths=True, label=label)
 
 

@@ -166,8 +166,13 @@ class FileCommands:
 
         self.editor.dialogs.ask(create_list_choice("Recent and bundled maps", lambda: options, choose))
 
-    def open(self, path: Path) -> None:
+    def open(self, path: Path) -> str | None:
         """Open a map, or import a file of another format. If the map is open already, it is reloaded.
+
+        Returns
+        -------
+        str or None
+            Status message of a reload. Other results are shown when the document is open.
 
         Raises
         ------
@@ -182,16 +187,16 @@ class FileCommands:
             and path.exists()
             and path.samefile(current_path)
         ):
-            self.reload()
-            return
+            return self.reload()
         self._close_document_to_open()
         if is_open_elsewhere(self.draft_folder, path=path):
-            raise MapError(f"{path.name}: another editor has it open")
+            raise MapError(f"{path.name}: already open in another editor; close it there first")
         result = open_or_detect(path, self.draft_folder)
         if isinstance(result, Document):
             self._open_when_closed(result, describe_opening(result))
         else:
             self.ask_import(path, result)
+        return None
 
     def ask_import(self, path: Path, importer: Importer) -> None:
         """Open the import dialog for a file of another format, and then open the imported map.

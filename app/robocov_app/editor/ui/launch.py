@@ -135,7 +135,7 @@ class EditorLauncher:
         if self.path is None:
             return Document.new(draft_folder)
         if is_open_elsewhere(draft_folder, path=self.path):
-            raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")
+            raise InputError(f"{self.path}: already open in another editor; close that one, or open a copy")
         return open_or_detect(self.path, draft_folder)
 
     def _describe_opening(self, opened: Document | Importer) -> str:

@@ -386,9 +386,9 @@ class EditorWindow(CommandWindow):
         if not self.dialogs.is_open:
             self.run_command("quit")
 
-    def open_file(self, path: Path) -> None:
-        """Open or import a file that was dropped on the window."""
-        self.file_commands.open(path)
+    def open_file(self, path: Path) -> str | None:
+        """Open or import a file that was dropped on the window; return the status message, if there is one."""
+        return self.file_commands.open(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
         """Use a key for a text field or for the value typed for the tool; return whether it was used."""

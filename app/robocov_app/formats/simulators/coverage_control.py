@@ -247,10 +247,15 @@ def _read_positions(path: Path) -> tuple[tuple[float, float], ...]:
     if not path.exists():
         return ()
     text, source_name = read_text(path, b"\n")
-    numbers = [parse_number(word) for word in text.split()]
-    if len(numbers) % 2 or not np.isfinite(numbers).all():
+    numbers = []
+    for word in text.split():
+        number = parse_number(word)
+        if not np.isfinite(number):
+            raise MapError(f"{source_name}: expected a number, got {quote(word)}")
+        numbers.append(number)
+    if len(numbers) % 2:
         raise MapError(
-            f"{source_name}: expected an x and a y for each robot, got {format_count(len(numbers), 'word')}"
+            f"{source_name}: expected an x and a y for each robot, got {format_count(len(numbers), 'number')}"
         )
     require_shapes(len(numbers) // 2, source_name)
     for value in numbers:

@@ -86,7 +86,10 @@ def _interpolate_fractions(
 def _place_samples(
     start: int, count: int, step: int
 ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-    """Place samples at multiples of a step along an axis.
+    """Place samples one step apart along an axis.
+
+    Sample i is at the pixel coordinate (i + 0.5) * step wherever the box starts, so that adjacent boxes fit
+    together.
 
     Parameters
     ----------
@@ -100,7 +103,6 @@ def _place_samples(
     interpolate : callable
         Interpolates values at the samples, (d, k), linearly to values at the pixels, (count, k).
     """
-    # Sample i is at the pixel coordinate (i + 0.5) * step.
     sample_units = (start + np.arange(count) + 0.5) / step - 0.5
     before = np.floor(sample_units).astype(np.intp)
     weights = (sample_units - before)[:, None]

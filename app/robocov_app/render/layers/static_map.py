@@ -133,11 +133,11 @@ def _draw_moving_obstacle(
     for part in shapely.get_parts(visible):
         if not isinstance(part, shapely.Polygon):
             continue
-        corners = _get_corners(canvas, part.exterior)
-        # Filling would also cover the holes.
+        # `fill_polygon` cannot leave out holes, so that obstacles with holes only have outlines.
         if not part.interiors:
-            canvas.fill_polygon(corners, (*fill, 255))
-        canvas.draw_outline(corners, edge, 2 * width)
+            canvas.fill_polygon(_get_corners(canvas, part.exterior), (*fill, 255))
+        for ring in (part.exterior, *part.interiors):
+            canvas.draw_outline(_get_corners(canvas, ring), edge, 2 * width)
     for start, end in pairwise(camera.to_pixels(obstacle.path).tolist()):
         canvas.draw_dashed_line(start, end, theme.ink, width)
     middle = camera.to_pixels(obstacle.middle)

@@ -222,8 +222,8 @@ class CommandWindow(BaseWindow):
         """React when the user closes the window."""
         self.closed = True
 
-    def open_file(self, path: Path) -> None:
-        """Open a file that was dropped on the window."""
+    def open_file(self, path: Path) -> str | None:
+        """Open a file that was dropped on the window; return a status message, if there is one."""
 
     def use_key(self, event: pygame.event.Event) -> bool:
         """Offer a key to the parts before commands get it; return whether it was used."""

@@ -340,8 +340,10 @@ def explain_reduced_scale(requested: float | None, size: tuple[int, int]) -> str
     if requested is None or requested <= max_scale:
         return ""
     min_width, min_height = _get_min_size(size)
-    width = round(min_width * requested)
-    height = round(min_height * requested)
+    # Scales are rounded down to multiples of 1 / _SCALE_STEPS.
+    needed_scale = ceil(_SCALE_STEPS * requested) / _SCALE_STEPS
+    width = ceil(min_width * needed_scale)
+    height = ceil(min_height * needed_scale)
     return f"scale {requested:g} needs a window of {width} × {height}; using {max_scale:g}"
 
 

@@ -56,14 +56,19 @@ def draw_branch_frames(
         Size, speed and layers of the video.
     """
     drawer = _build_drawer(branch, parts, costs, settings)
+    frame_period = settings.speed / settings.fps
     due = 0.0
     frame: Frame | None = None
     for run, node in branch.replay():
         if run.time + _TIME_TOLERANCE_S < due and not branch.is_end(run, node):
             continue
-        due += settings.speed / settings.fps
         frame = drawer.draw(run, node)
         yield frame
+        due += frame_period
+        # In slow motion, several frames show the same step.
+        while due <= run.time + _TIME_TOLERANCE_S:
+            yield frame
+            due += frame_period
     assert frame is not None
     for _ in range(round(VIDEO_HOLD_S * settings.fps)):
         yield frame

@@ -249,9 +249,11 @@ def list_surroundings(situation: RobotSituation) -> list[str]:
         texts.append(f"{goal.name} is {goal.distance_text}")
     texts += _list_sensed(situation)
     neighbors = situation.neighbors
-    if neighbors:
+    if len(neighbors) == 1:
+        texts.append(f"1 robot in communication range: {neighbors[0].position_text}")
+    elif neighbors:
         count = format_robot_count(len(neighbors))
-        texts.append(f"{count} in communication range, the nearest is {neighbors[0].position_text}")
+        texts.append(f"{count} in communication range; the nearest is {neighbors[0].position_text}")
     else:
         texts.append("no robot in communication range")
     return texts

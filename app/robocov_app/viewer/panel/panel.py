@@ -492,7 +492,9 @@ def label_controllers(names: Iterable[str], shown: Mapping[str, str]) -> dict[st
     for name in dict.fromkeys([*names, *shown]):
         label = shown[name] if name in shown else _load_label(name)
         file = Path(name.rpartition(":")[0]).name
-        candidates = (label, f"{label} ({file})", f"{label} ({name})")
+        candidates = [label, f"{label} ({name})"]
+        if file:
+            candidates.insert(1, f"{label} ({file})")
         labels[name] = next(candidate for candidate in candidates if candidate not in labels.values())
     return labels
 

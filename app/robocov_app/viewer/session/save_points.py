@@ -124,6 +124,7 @@ def restore_save_point(timeline: Timeline, point: SavePoint) -> None:
             pane.sensed = old_panes[pane.number].sensed.copy()
             pane.sensed.remove_after(run.time)
     timeline.follow(None)
+    timeline.is_advancing = False
     timeline.replace_present(Present(point.head, run, point.history))
     timeline.shown_index = point.shown_index
     timeline.record_end_time = point.record_end_time

@@ -290,19 +290,10 @@ class Session:
         """Return the present state as an argument for `restore`."""
         return build_save_point(self.timeline)
 
-    def restore(self, point: SavePoint, *, in_step: bool) -> None:
-        """Return to a save point after an unexpected error, and pause; do nothing if nothing has changed.
-
-        Parameters
-        ----------
-        point : SavePoint
-            State to return to.
-        in_step : bool
-            Whether the error may have interrupted a simulation step, which a comparison with the save point
-            cannot detect.
-        """
-        is_step_interrupted = in_step and self.playback.is_playing
-        if is_at_save_point(self.timeline, point) and not is_step_interrupted:
+    def restore(self, point: SavePoint) -> None:
+        """Return to a save point after an unexpected error, and pause; do nothing if nothing has changed."""
+        # A comparison with the save point cannot detect that a step was interrupted.
+        if is_at_save_point(self.timeline, point) and not self.timeline.is_advancing:
             return
         restore_save_point(self.timeline, point)
         self.playback.is_playing = False

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robocov.errors import ParameterError
+from robocov.errors import ParameterError, RobocovError
 from robocov_app.viewer.session.document import Node, SessionDocument
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.pane_group import PaneGroup
@@ -78,6 +78,7 @@ class Timeline:
         self.is_record_reproducible = is_record_reproducible
         self.past_version = 0
         self.pending_seek: Seek | None = None
+        self.is_advancing = False
         self._followed_path: list[Node] = []
         self.replace_present(present or Present.start(document.nodes[0]))
 
@@ -175,6 +176,16 @@ class Timeline:
 
     def advance(self) -> None:
         """Simulate one step. Controllers may raise any exception."""
+        self.is_advancing = True
+        try:
+            self._advance()
+        except RobocovError:
+            # The error was expected, and nothing has to be restored.
+            self.is_advancing = False
+            raise
+        self.is_advancing = False
+
+    def _advance(self) -> None:
         self.head.automatic_events.update(self.run.advance())
         # A branch may have started within a node whose edits lasted several steps, such as a drag.
         self.head.apply_edits(self.run)

@@ -229,7 +229,7 @@ class ViewerWindow(CommandWindow):
 
         def roll_back() -> None:
             if viewer.session is session:
-                session.restore(point, in_step=True)
+                session.restore(point)
             viewer.tool.cancel(viewer.session)
             viewer.revision += 1
 

@@ -138,7 +138,7 @@ def join_line_ends(lines: Sequence[LineString], tolerance: float) -> list[LineSt
     ends = [shapely.get_point(lines, 0), shapely.get_point(lines, -1)]
     points = np.concatenate(ends)
     index, neighbor = STRtree(points).query(points, predicate="dwithin", distance=tolerance)
-    # Each end moves to the first one in the file among those close to it.
+    # Each end moves to the close end with the lowest index. The starts of all lines come before their ends.
     first = np.full(len(points), len(points))
     np.minimum.at(first, index, neighbor)
     joined = shapely.get_coordinates(points[first])

@@ -178,9 +178,10 @@ def _make_new_folder(folder: Path, stem: str) -> Path:
             target.mkdir(parents=True)
         except FileExistsError:
             # If another program has just created the folder, try the next name. Otherwise, one of its parents
-            # is a file.
+            # is a file or a broken link.
             if not target.exists():
-                raise OutputError(f"{target}: cannot be created") from None
+                reason = f"{folder} or a folder above it is a file or a broken link"
+                raise OutputError(f"{target}: cannot be created: {reason}") from None
         except OSError as error:
             raise OutputError(f"{target}: cannot be created: {error.strerror or error}") from error
         else:

@@ -305,8 +305,8 @@ def _build_issue(detail: Any) -> Issue:
     """Convert an error of pydantic to a robocov `Issue` with a path and a plain message."""
     steps = list(detail["loc"])
     # Remove the kinds that pydantic has inserted, because they are not part of the JSON path.
-    kinds = [index for index in range(2, len(steps)) if steps[index - 2] in _STEPS_BEFORE_KIND]
-    path = tuple(step for index, step in enumerate(steps) if index not in kinds)
+    kind_indices = [index for index in range(2, len(steps)) if steps[index - 2] in _STEPS_BEFORE_KIND]
+    path = tuple(step for index, step in enumerate(steps) if index not in kind_indices)
     message = str(detail["msg"])
     match detail["type"]:
         case "missing":
@@ -315,7 +315,9 @@ def _build_issue(detail: Any) -> Issue:
             return Issue.at_path(path, message)
         case "extra_forbidden":
             return Issue.at_path(path, "unknown key", at_key=True)
-        case "model_type" | "dataclass_type":
+        case "union_tag_not_found":
+            return Issue.at_path((*path, "do"), "missing")
+        case "model_type" | "dataclass_type" | "model_attributes_type":
             return Issue.at_path(path, f"expected an object, got {quote_json(detail['input'])}")
     unknown_tag = _UNKNOWN_TAG.match(message)
     if unknown_tag is not None:
