@@ -200,8 +200,8 @@ class CoverageCost:
         Raises
         ------
         InputError
-            If there is no robot, a robot is outside the free space, or `speeds` is not one positive number
-            per robot. The message names the robot.
+            If there is no robot, the positions have the wrong shape, a robot is outside the free space, or
+            `speeds` is not one positive number per robot. The message names a robot outside the free space.
         """
         positions = _to_positions(positions)
         grid_positions, is_inside = self.geodesics.snap_to_free_space(positions)

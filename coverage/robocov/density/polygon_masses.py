@@ -49,7 +49,7 @@ def compute_polygon_masses(density: Density, polygons: Sequence[shapely.Polygon]
 
 
 def compute_square_means(density: Density, centers: FloatArray, side: float) -> FloatArray:
-    """Compute the mean density in each of several axis-parallel squares of the same size.
+    """Compute the mean density in each of several axis-aligned squares of the same size.
 
     Parameters
     ----------

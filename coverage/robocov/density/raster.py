@@ -158,7 +158,7 @@ class Raster(Density):
         return float(self.values.max())
 
     def evaluate(self, points: FloatArray) -> FloatArray:
-        """Evaluate the density at points. Points outside have the value of the nearest border pixel.
+        """Evaluate the density at points. A point outside has the value of the nearest point of the image.
 
         Parameters
         ----------

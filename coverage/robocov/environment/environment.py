@@ -116,7 +116,7 @@ class Environment(Drawable):
         Raises
         ------
         MapError
-            If it is not a list of at least three finite points, or edges of the boundary meet.
+            If it is not a list of at least three finite points, or crosses or touches itself.
         """
         location = f"map {self.name}: boundary"
         polygon = build_polygon(location, self.boundary)
@@ -130,7 +130,7 @@ class Environment(Drawable):
         Raises
         ------
         MapError
-            If edges of the boundary or of an obstacle meet.
+            If the boundary or an obstacle crosses or touches itself.
         """
         inside = shapely.set_precision(self.boundary_polygon, GRID_M)
         if self.obstacles:

@@ -46,11 +46,12 @@ def bound_point_count(area: BaseGeometry, spacing: float) -> int:
     Returns
     -------
     int
-        No packing has more points.
+        No packing has more points if all parts of the area are convex; otherwise an estimate.
     """
     # Discs of diameter `spacing` around the points do not overlap, and lie in the area dilated by their
-    # radius. No packing of the plane is denser than the hexagonal lattice. In each separate part of the area,
-    # one more disc may fit.
+    # radius. No packing of the plane is denser than the hexagonal lattice. For a convex part, the bound
+    # follows from Groemer's inequality (1960): N <= 2/√3 A + P/2 + 1 for spacing 1, with the area A and the
+    # perimeter P. For other parts, it is an estimate.
     max_count = 0
     for part in shapely.get_parts(area):
         max_count += 1 + int(part.buffer(spacing / 2).area / (spacing**2 * _AREA_PER_POINT))

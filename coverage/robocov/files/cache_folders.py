@@ -46,7 +46,7 @@ def open_private_folder(folder: Path) -> Path | None:
         The folder. None if it cannot be created or written to, belongs to another user, is writable by other
         users, or lies in a folder in which other users could replace it.
     """
-    # An error means that the folder cannot be used, and nothing else.
+    # An error only means that the folder cannot be used.
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         # Only creating a file shows reliably whether the folder can be written to.

@@ -81,7 +81,7 @@ _MIN_PIECE_ROUNDING_STEPS = 4.0
 
 
 class Box(NamedTuple):
-    """An axis-parallel rectangle.
+    """An axis-aligned rectangle.
 
     Attributes
     ----------

@@ -149,7 +149,7 @@ class Geodesics:
         length_columns: int,
         progress: Callable[[float], None] | None = None,
     ) -> tuple[IntArray, FloatArray]:
-        """Compute two tables with rows for all corners, in batches of corners.
+        """Compute two tables of rows for the corners, one batch of corners after another.
 
         Parameters
         ----------
@@ -164,9 +164,9 @@ class Geodesics:
         Returns
         -------
         indices : (r, index_columns) int array
-            All rows that `compute` has written to its table of whole numbers.
+            All rows of `indices` that `compute` has written, in the order of the batches.
         lengths : (r, length_columns) array, grid steps
-            All rows that `compute` has written to its table of lengths.
+            All rows of `lengths` that `compute` has written, in the order of the batches.
         """
         corner_count = len(self.corners)
         all_indices = [np.empty((0, index_columns), np.int64)]

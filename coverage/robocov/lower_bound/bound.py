@@ -425,20 +425,20 @@ class _Dual:
         scale = max(self.placement_cost, _MIN_SCALE * self.total_weight * self.geodesics.size)
         s = smoothing * scale / self.robot_count
 
-        def compute_negative_dual(prices: FloatArray) -> tuple[float, FloatArray]:
+        def compute_negative_dual(trial_prices: FloatArray) -> tuple[float, FloatArray]:
             """Return minus the smoothed dual for given prices, and its gradient, both divided by `scale`."""
             heartbeat()
-            profits = self.table.compute_profits(prices, weights)
+            profits = self.table.compute_profits(trial_prices, weights)
             # Subtracting the maximum prevents an overflow of the exponential function.
             max_profit = profits.max()
             shares = np.exp((profits - max_profit) / s)
             smooth_max = max_profit + s * math.log(shares.sum())
-            dual = float(weights @ prices) - self.robot_count * smooth_max
-            # In the gradient, the n robots are divided among the positions in proportion to their shares. If
-            # the price of a site is raised by 1, the dual changes by the weight of the site times one minus
-            # the number of robots that the site pays for, which are those nearer than its price.
+            dual = float(weights @ trial_prices) - self.robot_count * smooth_max
+            # The n robots are divided among the positions in proportion to their shares. A site pays for the
+            # robots that are nearer to it than its price. The derivative of the dual with respect to this
+            # price is the weight of the site times one minus the number of robots that it pays for.
             robot_counts = shares * (self.robot_count / shares.sum())
-            paid_robot_counts = self.table.count_paid_robots(prices, robot_counts)
+            paid_robot_counts = self.table.count_paid_robots(trial_prices, robot_counts)
             return -dual / scale, weights * (paid_robot_counts - 1.0) / scale
 
         solution = minimize(

@@ -110,7 +110,7 @@ def bound_profits(
     prices : (m,) array, grid steps
         Prices of the sites.
     triangles : (t, 3, 2) array, grid steps
-        Vertices of the triangles.
+        Vertices of the triangles, which must lie in the free space: across a wall, the bound would not hold.
     centers : (t, 2) array, grid steps
         A point of the free space in each triangle.
     scratch : TriangleScratch
@@ -252,7 +252,7 @@ def halve_triangles(triangles: FloatArray) -> FloatArray:
     Parameters
     ----------
     triangles : (t, 3, 2) array
-        Vertices of the triangles.
+        Vertices of the triangles, which must lie in the free space: across a wall, the bound would not hold.
 
     Returns
     -------

@@ -357,9 +357,9 @@ def _find_path_warnings(environment: Environment) -> Iterator[str]:
         if obstacle.path is None:
             continue
         area = compute_swept_area(obstacle.polygon, obstacle.path)
-        overlapped, outside = find_overlaps(area, fixed, environment.boundary_polygon)
-        names = [_format_obstacle(environment, other) for other in overlapped]
-        if outside is not None:
+        overlaps, excess = find_overlaps(area, fixed, environment.boundary_polygon)
+        names = [_format_obstacle(environment, other) for other in overlaps]
+        if excess is not None:
             names.append("the boundary")
         if names:
             yield f"{_format_obstacle(environment, k)} moves through {summarize_names(names)}"

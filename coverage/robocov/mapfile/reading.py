@@ -257,7 +257,7 @@ def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, sou
         return model.build()
     if model.rows is not None:
         values = np.array(model.rows, dtype=float)
-        # The weights of an image need no such limit, because they are rounded to fewer decimal places.
+        # Smaller weights are read as 0. Those of an image are rounded to multiples of more than `MIN_WEIGHT`.
         values[values < MIN_WEIGHT] = 0.0
     else:
         values = _read_weights(model, folder, source_name)

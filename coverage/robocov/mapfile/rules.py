@@ -21,7 +21,7 @@ from robocov.environment import (
     UniformStart,
     WallObstacle,
 )
-from robocov.errors import Issue, JsonPath, MapError, StartError, format_path
+from robocov.errors import Issue, JsonPath, MapError, StartError, format_path, format_position
 from robocov.mapfile.models import MAX_SIZE_M, MIN_SIZE_M
 from robocov.mapfile.structure import NO_WEIGHT
 from robocov.typing import FloatArray
@@ -129,8 +129,10 @@ def _build_crossing_issue(path: JsonPath, points: FloatArray, polygon: Polygon) 
             break
     first, second = sorted((first, second))
     other_edge = format_path((*path, second))
-    message = f"the edge from here meets the edge from {other_edge} near [{x:g}, {y:g}]"
-    return Issue.at_path((*path, first), f"{message}, expected a ring that does not meet itself")
+    message = f"the edge from here meets the edge from {other_edge} near {format_position(x, y)}"
+    return Issue.at_path(
+        (*path, first), f"{message}, expected a ring that neither crosses nor touches itself"
+    )
 
 
 def _find_polygon_issues(path: JsonPath, shape: PolygonObstacle | WeightedArea) -> Iterator[Issue]:
@@ -200,7 +202,7 @@ def _find_capacity_issues(
         area = "the free space"
         if isinstance(start, DiscStart):
             x, y = start.center
-            area = f"the disc of radius {start.radius:g} m at [{x:g}, {y:g}]"
+            area = f"the disc of radius {start.radius:g} m at {format_position(x, y)}"
         message = f"a robot of radius {DEFAULT_RADIUS_M:g} m does not fit into {area}"
         yield Issue.at_path(("starts", name), message)
 

@@ -88,12 +88,12 @@ class DensitySensor:
         def measure(robots: IntArray, points: FloatArray) -> FloatArray:
             offsets = points - known_positions[robots]
             distances = compute_point_distances(points, known_positions[robots])
-            is_too_far = distances > sensing_ranges[robots] + _RANGE_TOLERANCE_M
-            if is_too_far.any():
-                k = int(np.flatnonzero(is_too_far)[0])
+            is_in_range = distances <= sensing_ranges[robots] + _RANGE_TOLERANCE_M
+            if not is_in_range.all():
+                k = int(np.flatnonzero(~is_in_range)[0])
                 raise ParameterError(
                     f"density: robot {robots[k] + 1}: expected a point within its sensing range of "
-                    f"{sensing_ranges[robots[k]]:g} m, got a point at {distances[k]:.3f} m"
+                    f"{sensing_ranges[robots[k]]:.10g} m, got a point at {distances[k]:.10g} m"
                 )
             if density is None:
                 return np.ones(len(points))
@@ -168,7 +168,7 @@ class RecordedDensitySensor(DensitySensor):
             if key not in self.log:
                 x, y = points[k].tolist()
                 raise ParameterError(
-                    f"density: robot {robot + 1}: expected a point that it has measured, got ({x:g}, {y:g})"
+                    f"density: robot {robot + 1}: expected a point that it has measured, got [{x!r}, {y!r}]"
                 )
             values[k] = self.log[key]
         return values

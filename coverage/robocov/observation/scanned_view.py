@@ -229,7 +229,8 @@ def is_behind_wall(x: float, y: float, wall_distances: FloatArray) -> bool:
     ----------
     x, y : float, m
     wall_distances : (rays,) array, m
-        Distances of the walls along the robot's rays; infinite where there is none.
+        Distances of the walls along evenly spaced rays, counter-clockwise from the direction of x; infinite
+        where there is none. The ray nearest to the direction of the point is used.
 
     Returns
     -------

@@ -9,7 +9,7 @@ import shapely
 
 from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Environment
-from robocov.errors import ParameterError, is_number, quote
+from robocov.errors import ParameterError, format_position, is_number, quote
 from robocov.team import Team
 
 MIN_DT_S = 1e-4
@@ -145,5 +145,5 @@ def check_joins(environment: Environment, conditions: Conditions | None) -> None
             left, bottom, right, top = environment.boundary_polygon.bounds
             inside = f"inside the boundary of map {environment.name!r}"
             extent = f"x from {left:g} to {right:g} m, y from {bottom:g} to {top:g} m"
-            got = f"got [{x:g}, {y:g}] for robot {join.robot}"
+            got = f"got {format_position(x, y)} for robot {join.robot}"
             raise ParameterError(f"{prefix}: expected a position {inside} ({extent}), {got}")

@@ -233,7 +233,8 @@ class Simulation:
         ParameterError
             If forces are not finite or not of shape (n, 2), or the controller fails.
         StartError
-            If there is no space for a robot that joins.
+            If there is no space for a robot that joins. The robots have moved then, but time, memory and
+            messages have not changed, so that the simulation must not be continued.
         """
         robot_count = len(self.team)
         if external_forces is not None:

@@ -442,7 +442,8 @@ def _intersect(first: FloatArray, second: FloatArray) -> _Intersection:
             enter = constant / numerator
             leave = numerator / quadratic
         return _Intersection(enter, leave, is_first_outside=False, is_second_outside=False)
-    # The curves do not intersect, so that the quadratic function has the same sign on the whole first curve.
+    # The curves do not intersect, so that the quadratic function has the same sign on the whole first curve:
+    # that of `constant` at t = 0, and that of `quadratic` at infinity. Their sum has it even if one is zero.
     # If g >= 1, exactly one of the curves is on the cell's side of the other one; if g <= -1, both or neither
     # are.
     is_first_outside = quadratic + constant > 0.0

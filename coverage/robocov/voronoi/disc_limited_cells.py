@@ -60,8 +60,8 @@ def compute_disc_limited_moments(edges: CellEdges, radii: FloatArray) -> tuple[F
     Notes
     -----
     By the divergence theorem, an integral over a cell is a sum of signed contributions of its edges. Each
-    edge contributes the part inside the disc of the triangle between the edge and the generator. This is a
-    smaller triangle for the section of the edge in the disc, and circular sectors for the rest.
+    edge contributes the part of its triangle with the generator that lies in the disc: a smaller triangle for
+    the section of the edge inside the disc, and circular sectors for the rest.
     """
     cell_count = len(radii)
     # If a disc contains the whole cell, its radius does not matter. Infinite radii are therefore replaced by
@@ -146,7 +146,7 @@ def build_disc_limited_polygons(edges: CellEdges, radii: FloatArray) -> CellEdge
 
 
 def _cut_by_discs(edges: CellEdges, edge_radii: FloatArray) -> _CutEdges:
-    """Return edges that are cut by discs around their generators, with a radius for each edge, (e,) m.
+    """Cut each edge of cells by a disc around its generator, with the radius in `edge_radii`, (e,) m.
 
     The boundary of the intersection of a cell with its disc follows each edge inside the disc. Outside the
     disc, the edge is replaced by an arc of the disc that spans the same directions.

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment
-from robocov.errors import StartError
+from robocov.errors import StartError, format_position
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray
 from robocov.world.free_positions import find_free_position
@@ -76,7 +76,9 @@ class ChangingWorld:
         self._environment = environment
         self._obstacles = build_obstacles(environment)
         self.positions = np.array(positions, dtype=float)
-        self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
+        self.velocities = np.zeros_like(self.positions)
+        if velocities is not None:
+            self.velocities = np.array(velocities, dtype=float)
         self.steering = initialize_steering(team, self.velocities, steering)
         self.is_working = conditions.find_working_robots(time, len(team))
         self._failed = conditions.find_failed_robots(time, len(team))
@@ -181,7 +183,7 @@ class ChangingWorld:
             )
         except StartError:
             raise StartError(
-                f"robot {robot + 1} joins at {time:g} s at [{x:g}, {y:g}], "
+                f"robot {robot + 1} joins at {time:g} s at {format_position(x, y)}, "
                 f"but there is no space for it in map {self._environment.name!r}"
             ) from None
 

@@ -33,9 +33,11 @@ def test_robots_measure_within_their_sensing_range() -> None:
     assert not seen.has_known_uniform_density
     points = STARTS + [1.5, 0.0]
     np.testing.assert_array_equal(seen.measure_density([0, 1], points), PEAK.evaluate(points))
-    message = r"robot 2: expected a point within its sensing range of 1\.5 m, got a point at 1\.600 m"
+    message = r"robot 2: expected a point within its sensing range of 1\.5 m, got a point at 1\.6 m"
     with pytest.raises(ParameterError, match=message):
         seen.measure_density(1, STARTS[1:] + [1.6, 0.0])
+    with pytest.raises(ParameterError, match="got a point at nan m"):
+        seen.measure_density(1, np.array([[np.nan, 3.0]]))
 
 
 def test_a_known_density_can_be_measured_everywhere() -> None:
@@ -62,7 +64,9 @@ def test_a_pickled_sensor_repeats_its_measurements_without_the_density() -> None
     assert b"Gaussians" not in data
     repeated: DensitySensor = pickle.loads(data)
     np.testing.assert_array_equal(repeated.measure([0, 1], STARTS), values)
-    with pytest.raises(ParameterError, match=r"robot 1: expected a point that it has measured, got \(6, 3\)"):
+    with pytest.raises(
+        ParameterError, match=r"robot 1: expected a point that it has measured, got \[6\.0, 3\.0\]"
+    ):
         repeated.measure(0, STARTS[1:])
 
 

@@ -129,6 +129,18 @@ def test_contacts_with_failed_robots_are_counted() -> None:
     assert count_contacts(record, clearances - 0.01) == 1
 
 
+def test_whole_numbers_are_accepted_as_velocities() -> None:
+    team = Team.homogeneous(1)
+    worlds = [
+        ChangingWorld(Conditions(), HALL, team, np.array([[4.0, 4.0]]), np.array([[1, 0]], dtype=kind))
+        for kind in (int, float)
+    ]
+    for world in worlds:
+        world.step(np.zeros((1, 2)), 0.1, time=0.0)
+    np.testing.assert_array_equal(worlds[0].velocities, worlds[1].velocities)
+    assert 0.0 < worlds[0].velocities[0, 0] < 1.0
+
+
 def test_robots_sense_failed_robots() -> None:
     starts = np.array([[4.0, 4.0], [6.0, 4.0]])
     simulation = Simulation(HALL, Rapf(), starts, conditions=Conditions(failures=((2, 0.1),)))

@@ -387,7 +387,7 @@ class EditorWindow(CommandWindow):
             self.run_command("quit")
 
     def open_file(self, path: Path) -> str | None:
-        """Open or import a file that was dropped on the window; return the status message, if there is one."""
+        """Open or import a file that was dropped on the window; return a status message, if there is one."""
         return self.file_commands.open(path)
 
     def use_key(self, event: pygame.event.Event) -> bool:
