@@ -216,7 +216,7 @@ def check_sent_bytes(row: Row, information: str, location: str) -> None:
     row : dict
         Row of a run, as checked by `check_row`.
     information : str
-        Information that the controller declares. It excludes messages if it is "own".
+        Information that the controller declares. With "own", robots send nothing but their positions.
     location : str
         Place of the row, for the message.
     """
@@ -225,6 +225,7 @@ def check_sent_bytes(row: Row, information: str, location: str) -> None:
     track = suite.TRACKS[row["track"]]
     message_rate = track.changes.get("conditions", {}).get("message_rate", 1.0 / DEFAULT_DT_S)
     bytes_per_robot = POSITION_BYTES * message_rate * track.duration
+    # Robots that fail may have sent nothing.
     min_bytes = track.survivors * bytes_per_robot
     if row["sent_bytes"] < min_bytes * (1.0 - _ROUNDING):
         raise InputError(

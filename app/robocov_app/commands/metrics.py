@@ -102,7 +102,7 @@ def _compute_metrics(options: Arguments, saved: SavedRun) -> RunMetrics:
 
 
 def _build_row(saved: SavedRun, metrics: RunMetrics) -> dict[str, Any]:
-    """Build the JSON content about a run."""
+    """Build the JSON object with the metrics of a run."""
     from robocov.metrics.run_metrics import find_time_near_final
 
     record = saved.record

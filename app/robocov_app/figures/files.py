@@ -156,7 +156,7 @@ def check_figure_path(path: Path) -> None:
     Raises
     ------
     OutputError
-        If the folder does not exist.
+        If the folder does not exist, or the path leads to something other than a file.
     ParameterError
         If the suffix is not that of a figure format.
 

@@ -103,8 +103,7 @@ def plot_gains(
         Label of the value axis.
     choices : sequence of str
         Possible values of a text-valued gain; empty for a numeric one. For a numeric gain, a line connects
-        the medians, the axis is logarithmic if its range is wide, and "none", for no limit, is at its right
-        end.
+        the medians, the axis is logarithmic if its range is wide, and "no limit" is at its right end.
 
     Returns
     -------
@@ -233,7 +232,7 @@ def _set_number_axis(axes: Axes, gains: FloatArray) -> float | None:
     labels = [format_value(value, digits=4) for value in ticks]
     if has_unlimited:
         ticks.append(end)
-        labels.append("none")
+        labels.append("no limit")
     axes.xaxis.set_major_locator(FixedLocator(ticks))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels(labels)

@@ -156,7 +156,7 @@ def write_numbers(
     ----------
     axes : matplotlib.axes.Axes
     centers : (n, 2) array
-        Centers of the texts, points of the page.
+        Centers of the texts, points from the lower left corner of the page.
     texts : sequence of str
     colors : sequence of Color
     theme : Theme

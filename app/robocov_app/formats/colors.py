@@ -201,9 +201,10 @@ def parse_css_color(text: str) -> tuple[Color, float] | None:
 
 
 def _parse_rgb_arguments(arguments: str) -> tuple[Color, float] | None:
-    """Return the color and the opacity given by the arguments of ``rgb()``, in any notation of CSS Color 4.
+    """Return the color and the opacity given by the arguments of ``rgb()``; None if they are invalid.
 
-    None stands for invalid arguments. Numbers above the maximum are clipped, as in CSS.
+    The arguments are three numbers or percentages and an optional opacity, separated by spaces, commas or a
+    slash. Values above the maximum are clipped, as in CSS. Negative numbers and ``none`` are not supported.
     """
     levels: list[float] = []
     for word in re.split(r"[\s,/]+", arguments.strip()):

@@ -11,7 +11,10 @@ NO_VALUE = "–"
 
 
 def format_amount(value: float, unit: str = "") -> str:
-    """Format a number with about three significant digits and its unit.
+    """Format a number with its unit.
+
+    It has about three significant digits. Percentages have at most one decimal place, and ratios from 1 to
+    1.1 have three.
 
     Parameters
     ----------
@@ -35,7 +38,7 @@ def format_amount(value: float, unit: str = "") -> str:
         return text if text == "0%" else f"−{text}"
     if unit == "%":
         percent = 100.0 * value
-        has_decimal = percent < 99.95 and round(percent, 1) % 1
+        has_decimal = percent < 99.95 and round(percent, 1) != round(percent)
         return f"{percent:.1f}%" if has_decimal else f"{percent:.0f}%"
     if not unit and 1.0 < value < 1.1:
         # Ratios near 1 differ in their third decimal place.

@@ -83,7 +83,7 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
     with plain_style():
         page = FigurePage((_WIDTH_PX, height), theme, scale=1.0)
         page.write(
-            "Time as a multiple of the baseline's",
+            "Time relative to the baseline",
             _MARGIN_PX,
             _TITLE_CENTER_PX,
             points=HEADING_SIZE_PT,

@@ -92,6 +92,7 @@ def supervise(controllers: Sequence[str]) -> tuple[int, str]:
     if received_signals:
         # If a signal ends a process, its status is -signal in Python, and 128 + signal in shells.
         exit_status = 128 - status if status < 0 else status
+        # Without a message, status 0 does not mean success.
         return exit_status or 1, ""
     names = ", ".join(controllers)
     reason = f"it terminated Python ({describe_status(status)}) before the command had finished"

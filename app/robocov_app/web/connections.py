@@ -265,8 +265,8 @@ def respond_with_page(connection: ServerConnection, *, may_be_framed: bool, cook
         f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
     )
     if cookie:
-        # Without a path, the cookie belongs to the path of the page, even behind a proxy. Lax: a visitor who
-        # returns by a link in a mail or on a course page comes from another site, and keeps the cookie.
+        # Without a path, the cookie belongs to the path of the page, even behind a proxy. With Lax, visitors
+        # who follow a link from an email or a course page keep it.
         headers["Set-Cookie"] = f"{cookie}; HttpOnly; SameSite=Lax"
     return respond_with(connection, HTTPStatus.OK, page.encode(), "text/html; charset=utf-8", headers)
 

@@ -257,7 +257,7 @@ def test_a_scale_for_which_the_window_is_too_small_is_reported(folders: Path, ca
 def test_settings_are_remembered(folders: Path) -> None:
     with open_launched_editor(folders) as window:
         window.editor.theme = "dark"
-        window.editor.attempt(lambda: run_typed_command(window.editor, "0.25", "grid"))
+        window.editor.attempt(lambda: run_typed_command(window.editor, "grid", "0.25"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.file_commands.remember(folders / "x.json")

@@ -230,7 +230,7 @@ def test_saved_obstacles_move_in_a_run(tmp_path: Path) -> None:
 def test_commands_and_buttons_change_paths(tmp_path: Path) -> None:
     with open_editor(tmp_path, build_sheet(MOVING)) as driver:
         driver.editor.select(Selection.of(0))
-        run_typed_command(driver.editor, "0.75", "speed")
+        run_typed_command(driver.editor, "speed", "0.75")
         assert get_path(driver.sketch).speed == 0.75
         driver.push_button("tab:object")
         driver.push_button("path:repeat")

@@ -34,7 +34,7 @@ def test_characters_have_their_meaning(tmp_path: Path) -> None:
     assert shapely.equals(foreign.free, expected)
     assert foreign.cell == 1.0
     assert foreign.notes == (
-        "no cell size given: assuming 1 m (--cell)",
+        "no cell size given; assuming 1 m. Set it with --cell.",
         "6 x 5 cells of 1 m: 30.0% free, 70.0% blocked",
     )
     assert read(tmp_path, GRID, trees="free").free.area == 10

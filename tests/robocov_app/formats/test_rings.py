@@ -36,7 +36,7 @@ HALL = [build_square(0, 0, 20, 10), build_square(1, 1, 2, 2), build_square(5, 5,
 def test_the_first_ring_is_the_outline(tmp_path: Path, document: Any) -> None:
     foreign = read(tmp_path, "rings", document)
     assert foreign.free.equals(Polygon(HALL[0], HALL[1:]))
-    assert foreign.notes[0] == "no unit in the file: assuming 1 m (--scale)"
+    assert foreign.notes[0] == "no unit in the file; assuming 1 m. Set it with --scale."
     assert foreign.dropped == (
         ("15 third coordinates, z from 3 to 3",)
         if "dimensions" in document and document["dimensions"] == 3

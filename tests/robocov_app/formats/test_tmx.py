@@ -68,7 +68,7 @@ def test_tiles_declared_solid_are_solid(tmp_path: Path) -> None:
     foreign = read(tmp_path, TILES.format(""), build_tiles("Ground"))
     assert are_equal(compute_solid_area(foreign), WALLS)
     assert (foreign.cell, foreign.name) == (1.0, "map")
-    assert foreign.notes == ("no tile size given: tiles 1 m wide assumed (--cell)",)
+    assert foreign.notes == ("no tile size given; assuming tiles 1 m wide. Set it with --cell.",)
 
 
 def test_layers_are_solid_by_name_property_or_option(tmp_path: Path) -> None:

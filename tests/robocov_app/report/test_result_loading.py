@@ -129,7 +129,7 @@ def test_missing_runs_of_an_unfinished_sweep_are_counted(folder, tmp_path) -> No
     assert (len(result.runs), result.missing_count) == (7, 17)
     assert result.runs == tuple(move_runs(load_result(folder).runs[:7], copy))
     (copy / "results.csv").write_text(lines[0] + "\n")
-    with pytest.raises(InputError, match="expected finished runs, got none of 24"):
+    with pytest.raises(InputError, match="none of the 24 runs has finished"):
         load_result(copy)
 
 

@@ -136,7 +136,7 @@ def _display_outcomes(
     new_outcomes: Mapping[str, MapReport | InputError],
     previous_reports: Mapping[str, MapReport],
 ) -> None:
-    """Display new outcomes with their changes. A terminal is cleared first, and also shows all other maps."""
+    """Display new outcomes and what has changed; in a terminal, on a clear screen and with all other maps."""
     if console.is_terminal:
         console.clear()
     clock_time = time.strftime("%H:%M:%S")
@@ -146,7 +146,7 @@ def _display_outcomes(
         for name, outcome in outcomes.items():
             if name not in new_outcomes:
                 _display(console, name, outcome)
-        console.print("watching; Ctrl+C ends", style="dim")
+        console.print("Watching for changes. Press Ctrl+C to stop.", style="dim")
     console.file.flush()
 
 

@@ -457,7 +457,7 @@ def _simplify_ring(ring: Ring, tolerance: float, is_closed: bool) -> Ring:
 
 
 def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
-    """Straighten the edges of one ring; return it unchanged if it would become degenerate."""
+    """Straighten the edges of one ring; return a closed ring unchanged if it would become degenerate."""
     points = to_array(ring)
     count = len(points)
     if count < 2:
@@ -469,13 +469,11 @@ def _straighten_ring(ring: Ring, degrees: float, is_closed: bool) -> Ring:
     max_slope = math.tan(math.radians(degrees))
     widths, heights = np.abs(edges).T
     has_length = np.maximum(widths, heights) > 0.0
+    is_upright = (widths <= max_slope * heights) & has_length
+    is_level = (heights <= max_slope * widths) & has_length
+    # Both ends of an upright edge get the same x, and those of a level edge the same y.
     xs, ys = points.T
-    moved = np.column_stack(
-        [
-            _align_straight_edges(xs, (widths <= max_slope * heights) & has_length),
-            _align_straight_edges(ys, (heights <= max_slope * widths) & has_length),
-        ]
-    )
+    moved = np.column_stack([_align_straight_edges(xs, is_upright), _align_straight_edges(ys, is_level)])
     if is_closed:
         has_corners = len({tuple(point) for point in moved.tolist()}) >= 3
         if not has_corners or Polygon(moved).area == 0.0:

@@ -218,11 +218,9 @@ class SelectTool(EditorTool):
 
     def choose_cursor(self, context: EditorContext) -> CursorShape:
         """Return the shape of the cursor."""
-        handle = self.hovered_handle
-        if self.drag is not None:
-            handle = self._handle
-            if self.drag.cursor_shape is not None:
-                return self.drag.cursor_shape
+        if self.drag is not None and self.drag.cursor_shape is not None:
+            return self.drag.cursor_shape
+        handle = self.hovered_handle if self.drag is None else self._handle
         if handle is not None:
             return _SIDE_CURSORS.get(handle.side, "hand")
         if self.hovered is None:

@@ -50,20 +50,20 @@ def list_typed_commands(editor: Editor) -> list[Command]:
 
 
 def _carry_out(editor: Editor, word: str, value: str) -> None:
-    editor.carry_out(lambda: run_typed_command(editor, value, word))
+    editor.carry_out(lambda: run_typed_command(editor, word, value))
 
 
-def run_typed_command(editor: Editor, value: str, word: str) -> None:
+def run_typed_command(editor: Editor, word: str, value: str) -> None:
     """Run a typed command.
 
     Parameters
     ----------
     editor : Editor
         The editor.
-    value : str
-        Value that the user typed.
     word : str
         Name of the command.
+    value : str
+        Value that the user typed.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def run_typed_command(editor: Editor, value: str, word: str) -> None:
         If the value is invalid, or the command cannot be carried out.
     """
     value = value.strip()
-    require(value, f"{word}: expected a value after it")
+    require(value, f"{word}: expected a value, got nothing")
     TYPED_COMMANDS[word].action(editor, value)
 
 

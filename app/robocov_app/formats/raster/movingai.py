@@ -84,13 +84,13 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
     cell = get_or_default(options.cell, DEFAULT_CELL_M)
     notes: tuple[str, ...] = ()
     if options.cell is None:
-        notes = (f"no cell size given: assuming {DEFAULT_CELL_M:g} m (--cell)",)
+        notes = (f"no cell size given; assuming {DEFAULT_CELL_M:g} m. Set it with --cell.",)
     return build_grid_map(
         cells,
         GridFrame(cell),
         source_name,
         name=path.stem,
-        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
+        description=f"A grid with cells of {cell:g} m, imported from a MovingAI file.",
         notes=notes,
     )
 

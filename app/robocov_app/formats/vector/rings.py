@@ -47,7 +47,7 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.add_outline([ring * scale for ring in rings], location=f"polygon {number}")
     shapes.notes = [f"a unit is {scale:g} m"]
     if not options.scale:
-        shapes.notes = [f"no unit in the file: assuming {scale:g} m (--scale)"]
+        shapes.notes = [f"no unit in the file; assuming {scale:g} m. Set it with --scale."]
     return shapes.build_foreign_map(get_map_name(path), "Imported from rings.", solid=False, overlap=True)
 
 

@@ -19,8 +19,8 @@ _STRIP_TEXT_HEIGHT_PX = 22.0
 _STRIP_TEXT_MARGIN_PX = 2.0
 """Space in the box of a text of the strip, to the left and right of the text."""
 _MAX_LOW_PANE_PX = 240.0
-_MIN_BAR_PX = 30.0
-"""Minimum space for the scale bar, px of the surface."""
+_MIN_SPACE_PX = 30.0
+"""Minimum space for the scale bar, px of the surface at any scale. The bar itself may be shorter."""
 _MAX_BAR_PX = 160
 BAR_TEXT_GAP_PX = 8
 """Space between the bar and its text."""
@@ -116,7 +116,7 @@ def choose_bar_length(canvas: Canvas) -> float:
     Returns
     -------
     float, m
-        A round length that suits the zoom.
+        The largest round length that fits into the space for the bar.
     """
-    max_width = min(max(canvas.surface.get_width() / 8, _MIN_BAR_PX), _MAX_BAR_PX * canvas.scale)
+    max_width = min(max(canvas.surface.get_width() / 8, _MIN_SPACE_PX), _MAX_BAR_PX * canvas.scale)
     return round_down(max_width / canvas.camera.zoom)

@@ -122,7 +122,7 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
         ),
         _build_goal(
             "every-map",
-            f"On every map {label}'s median is within {format_amount(MAX_MAP_GAP, '%')} of the reference.",
+            f"On every map, {label}'s median is within {format_amount(MAX_MAP_GAP, '%')} of the reference.",
             Criterion("highest median of a map", highest, high=MAX_MAP_GAP, unit="%"),
             _describe_highest(finished.compute_medians_by_map(key), MAX_MAP_GAP),
             finished,
@@ -136,16 +136,16 @@ def _judge_gap_goals(outcomes: Outcomes, own: Contender, contenders: Sequence[Co
 
 
 def _judge_comparison(pairs: PairedComparison, own: Contender, other: Contender, finished: Outcomes) -> Claim:
-    """Judge whether a contender is on no map much worse than another one."""
+    """Judge whether a contender is not much worse than another one on any map."""
     own_medians = pairs.outcomes.compute_medians_by_map(own.key, "final")
     other_medians = pairs.outcomes.compute_medians_by_map(other.key, "final")
     ratios = {name: own_medians[name] / other_medians[name] for name in own_medians}
     margin = format_amount(NEVER_WORSE - 1.0, "%")
     return _build_goal(
         f"not-worse-{other.key}",
-        f"On no map {own.label}'s median is more than {margin} above that of {other.label}.",
+        f"On no map is {own.label}'s median more than {margin} above that of {other.label}.",
         Criterion(
-            f"highest ratio of a map's medians to {other.label}",
+            f"highest ratio to the median of {other.label} on a map",
             estimate_worst_ratio(pairs),
             high=NEVER_WORSE,
         ),

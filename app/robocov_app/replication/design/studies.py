@@ -184,7 +184,7 @@ def build_figure_studies(plan: Plan) -> dict[str, Study]:
 
 
 def build_best_figure_studies(plan: Plan, paper_contenders: Sequence[Contender]) -> dict[str, Study]:
-    """Build the sweeps of figures 4 to 8 with the best gains; empty if these are unknown.
+    """Build the sweeps of figures 4 to 8 with the best gains; empty if no best gains are known.
 
     Returns
     -------
@@ -192,10 +192,12 @@ def build_best_figure_studies(plan: Plan, paper_contenders: Sequence[Contender])
         Sweeps by name.
     """
     best = tuple(contender for contender in paper_contenders if contender.key.endswith("-best"))
+    if not best:
+        return {}
     studies = {}
     for name, case in FIGURE_CASES.items():
         # Figures that compare with Lloyd's algorithm are not drawn for the best gains.
-        if best and LLOYD not in case.contenders:
+        if LLOYD not in case.contenders:
             studies[f"{name}-best"] = _build_figure_study(plan, case, best)
     return studies
 

@@ -250,12 +250,12 @@ def _build_grid_plot(
         values=medians,
     )
     figure = plot_gain_grid(grid, PANEL_SIZE_PX)
-    title = f"{group.label} over {first.name} and {second.name}"
-    distance = SCALED_DISTANCE_LABEL
+    title = f"{group.label}: distance against {first.name} and {second.name}"
+    distance_label = SCALED_DISTANCE_LABEL
     if axis.label == FINAL_DISTANCE_LABEL:
-        distance = "final distance in m"
+        distance_label = "final distance in m"
     span = _describe_grid(medians, first, second, columns, rows)
-    return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance}, {span}."))
+    return PagePlot(title, inline_svg(figure, key, f"{title}: medians of the {distance_label}, {span}."))
 
 
 def _compute_cell_medians(

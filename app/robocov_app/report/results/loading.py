@@ -200,7 +200,9 @@ def _load_sweep(folder: Path) -> ReportedResult:
     study = _read_study(results.study, folder / STUDY_FILE)
     rows = list(results.rows())
     if not rows:
-        raise InputError(f"{folder}: expected finished runs, got none of {study.run_count}")
+        raise InputError(
+            f"{folder}: none of the {study.run_count} runs has finished; continue the sweep before the report"
+        )
     runs = [_build_run_of_row(row, study, folder) for row in rows]
     facts = dict(study.facts)
     if study.teams:
@@ -230,6 +232,7 @@ def _read_study(content: Mapping[str, Any], path: Path) -> _SweepStudy:
             maps[str(map_content["name"])] = from_json(map_content["map"], f"{path}: maps")
         gain_names = {}
         for controller, gains in content["gains"].items():
+            # All sets of gains of a controller have the same names.
             gain_names[controller] = list(gains["choices"][0])
         fact_names = ("duration_s", "dt_s", "lattice", "cost_hz", "record_hz")
         return _SweepStudy(

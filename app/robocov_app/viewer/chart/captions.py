@@ -32,14 +32,14 @@ _MAX_PERCENT_WITH_DECIMAL = 99.95
 def draw_captions(
     screen: pygame.Surface, frame: ChartFrame, value_scale: ChartScale, cut_off_notes: Mapping[int, str]
 ) -> None:
-    """Draw the captions directly onto the window, since they change more often than the cached page.
+    """Draw the captions directly onto the window, since they change more often than the cached image.
 
     Parameters
     ----------
     screen : pygame.Surface
     frame : ChartFrame
     value_scale : ChartScale
-        Scale of the value axis with which the page was drawn.
+        Scale of the value axis with which the image was drawn.
     cut_off_notes : mapping of int to str
         Text about the area that no robot reaches, by the number of the pane; empty where there is none.
     """

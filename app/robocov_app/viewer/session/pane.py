@@ -439,6 +439,7 @@ def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:
     -------
     Simulation
     """
+    # If the team follows a schedule, the simulation contains all robots, not only the working ones.
     robots = state.all_robots
     if robots is None:
         robots = TeamState(positions=state.positions, velocities=state.velocities, steering=state.steering)

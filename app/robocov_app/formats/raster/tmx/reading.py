@@ -91,7 +91,7 @@ def _choose_pixel_size(tile: FloatArray, options: ReadOptions, notes: list[str])
         return options.scale
     cell = options.cell
     if cell is None:
-        notes.append(f"no tile size given: tiles {DEFAULT_TILE_M:g} m wide assumed (--cell)")
+        notes.append(f"no tile size given; assuming tiles {DEFAULT_TILE_M:g} m wide. Set it with --cell.")
         cell = DEFAULT_TILE_M
     return cell / float(tile[0])
 
