@@ -15,6 +15,9 @@ from robocov.planning.discovered_map import FREE, UNKNOWN, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 
 
+NO_DOOR = slice(0, 0)
+
+
 def build_planner(is_blocked: np.ndarray, clearance: float = 0.15) -> GridPlanner:
     map_window = build_map_window(is_blocked, clearance)
     return GridPlanner(map_window.known_map, map_window.window, clearance)
@@ -49,12 +52,15 @@ def test_robots_that_share_a_map_share_its_planner() -> None:
     assert GridPlanner.get_shared(known_map, window, 0.2) is not planner
 
 
-def test_team_candidates_are_those_of_the_robots_own_component() -> None:
-    planner = build_planner(build_wall_with_door(slice(0, 0)))
+def test_team_candidates_are_in_the_component_of_the_given_node() -> None:
+    planner = build_planner(build_wall_with_door(NO_DOOR))
     left = planner.visibility.find_nearest_node(np.array([1.0, 2.0]))
     right = planner.visibility.find_nearest_node(np.array([5.0, 2.0]))
+    # The last case repeats the first one: the stored candidates of a component must not replace those of
+    # another one.
     for node, is_left in ((left, True), (right, False), (left, True)):
         candidates = planner.get_team_candidates(node)
+        assert len(candidates.nodes) > 0
         assert ((planner.map_window.nodes[candidates.nodes, 0] < 3.0) == is_left).all()
         np.testing.assert_array_equal(
             candidates.distances[:, node], planner.graph.get_distances(node)[candidates.nodes]

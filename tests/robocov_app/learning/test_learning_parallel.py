@@ -17,6 +17,7 @@ with warnings.catch_warnings():
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError
+from robocov.team import Team
 from robocov_app.learning import CoverageParallelEnv, CoverageTask, ObservationLayout, coverage_v0
 
 SMALL = {"robots": 3, "lattice": 8, "duration": 2.0, "dt": 0.05, "repeat": 2}
@@ -133,17 +134,39 @@ def test_robots_that_fail_are_terminated_and_robots_that_join_appear(empty: Envi
     assert [agents for agents in ended if agents] == [["robot_1"]]
 
 
-def test_spaces_depend_on_the_limits_of_each_robot(empty: Environment) -> None:
-    from robocov.team import Team
+@pytest.mark.parametrize(
+    ("action", "limits"),
+    [
+        # The force m a + ν v: 1 kg · 2 m/s² + 2 N s/m · 1 m/s, and 2 kg · 3 m/s² + 4 N s/m · 0.5 m/s.
+        ("force", {"robot_1": 4.0, "robot_2": 8.0}),
+        # The maximum speeds.
+        ("velocity", {"robot_1": 1.0, "robot_2": 0.5}),
+    ],
+)
+def test_action_spaces_have_the_limits_of_each_robot(
+    empty: Environment, action: str, limits: dict[str, float]
+) -> None:
+    team = Team(
+        radius=np.array([0.1, 0.2]),
+        mass=np.array([1.0, 2.0]),
+        max_speed=np.array([1.0, 0.5]),
+        max_acceleration=np.array([2.0, 3.0]),
+        viscosity=np.array([2.0, 4.0]),
+        sensing_range=np.array([3.0, 1.0]),
+        communication_range=np.array([9.0, 9.0]),
+    )
+    env = build_environment(empty, team=team, action=action)
+    assert env.possible_agents == list(limits)
+    for agent, limit in limits.items():
+        space = env.action_space(agent)
+        assert space.high.tolist() == [limit, limit]
+        assert space.low.tolist() == [-limit, -limit]
 
-    limits = ([0.1, 0.2], [1, 2], [1, 0.5], [2, 1], [2, 4], [3, 1], [9, 9])
-    team = Team(*(np.array(pair) for pair in limits))
-    env = build_environment(empty, team=team)
-    assert env.action_space("robot_1").high.tolist() == [4.0, 4.0]  # 1 x 2 + 2 x 1
-    assert env.action_space("robot_2").high.tolist() == [4.0, 4.0]  # 2 x 1 + 4 x 0.5
-    driven = build_environment(empty, team=team, action="velocity")
-    assert driven.action_space("robot_2").high.tolist() == [0.5, 0.5]
-    assert env.state_space.contains(env.reset(seed=0) and env.state())
+
+def test_the_state_is_in_the_state_space(empty: Environment) -> None:
+    env = build_environment(empty)
+    env.reset(seed=0)
+    assert env.state_space.contains(env.state())
 
 
 def test_attributes_of_a_task_can_be_changed(empty: Environment) -> None:
