@@ -12,6 +12,7 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.canvas.canvas import list_map_facts
 from robocov_app.editor.canvas.overlay import STEM_PX
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.settings import LAYERS
 from robocov_app.look.theme import DARK, LIGHT, Theme
 from robocov_app.toolkit.sentence_case import to_sentence_case
 
@@ -125,19 +126,41 @@ def test_an_empty_sheet_is_drawn(tmp_path: Path) -> None:
             driver.press_key("escape", times=3)
 
 
+def draw_map(driver: EditorDriver) -> np.ndarray:
+    """Draw the window, and return the pixels of the map."""
+    left, top, width, height = driver.window.layout.arena
+    return draw_without_message(driver)[top : top + height, left : left + width]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
-def test_all_layers_are_drawn_at_every_scale_and_theme(tmp_path: Path, scale: float) -> None:
+@pytest.mark.parametrize(("scale", "theme"), [(1.0, "dark"), (1.5, "light"), (2.0, "dark")])
+def test_every_layer_can_be_seen(tmp_path: Path, scale: float, theme: str) -> None:
     starts = (("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1)))))
     size = round(900 * scale), round(600 * scale)
-    sketch = build_sheet(CROSSED, *NARROW, CircleObstacle((8, 8), 1.0), starts=starts)
-    with open_editor(tmp_path, sketch, size=size, scale=scale, theme="dark") as driver:
-        driver.press_key("a")
+    sketch = build_sheet(*NARROW, CircleObstacle((8, 8), 1.0, name="pillar"), starts=starts)
+    with open_editor(tmp_path, sketch, size=size, scale=scale, theme=theme) as driver:
+        driver.press_key("ctrl+a")
+        driver.editor.toggle_layer("robots")
+        wait_until(driver, lambda: driver.window.canvas.team is not None)
+        # The sketch has no background image.
+        for layer in LAYERS.keys() - {"picture"}:
+            shown = draw_map(driver)
+            driver.editor.toggle_layer(layer)
+            assert not np.array_equal(draw_map(driver), shown), layer
+            driver.editor.toggle_layer(layer)
+            assert np.array_equal(draw_map(driver), shown), layer
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_every_tab_of_a_dark_editor_opens_at_every_scale(tmp_path: Path, scale: float) -> None:
+    size = round(900 * scale), round(600 * scale)
+    with open_editor(tmp_path, build_sheet(CROSSED), size=size, scale=scale, theme="dark") as driver:
         driver.press_key("ctrl+a")
         for tab in ("map", "object", "snap", "problems"):
             driver.open_tab(tab)
-        picture = driver.copy_frame()
-        assert picture.mean() < 110 and picture.std() > 15
+            assert driver.window.panel.tab == tab
+            assert driver.copy_frame().mean() < 110, "the window is not dark"
 
 
 def test_lengths_are_next_to_the_cursor_and_typed_text_below_it(tmp_path: Path) -> None:

@@ -70,15 +70,16 @@ def test_unknown_files_are_rejected(tmp_path: Path) -> None:
 
 
 def test_a_format_may_be_forced(tmp_path: Path) -> None:
-    path = write_ros_map(tmp_path, draw_pixels(PLAN))
-    image = path.with_suffix(".pgm").rename(tmp_path / "image.bin")
-    environment, report, foreign = import_map(
-        image, format="image", options=ReadOptions(cell=0.25, threshold=0.9)
-    )
-    assert (report.format, foreign.cell) == ("image", 0.25)
-    assert environment.free_area == pytest.approx(68 / 16)
-    with pytest.raises(MapError):
-        import_map(image, format="movingai")
+    # A map of ROS with a key "world" looks like a world of IR-SIM.
+    path = write_ros_map(tmp_path, draw_pixels(PLAN), world={"width": 10, "height": 10})
+    assert detect_format(path).name == "irsim"
+    environment, report, _ = import_map(path, format="ros")
+    assert report.format == "ros"
+    free_cells = PLAN.count(".")
+    cell_area = 0.25**2
+    assert environment.free_area == pytest.approx(free_cells * cell_area)
+    with pytest.raises(MapError, match="line 1: expected type octile, height N, width N or map"):
+        import_map(path, format="movingai")
 
 
 @pytest.mark.parametrize(

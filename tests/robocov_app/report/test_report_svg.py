@@ -71,10 +71,16 @@ def test_ids_start_with_the_key_and_all_references_are_valid(kind) -> None:
     svg = inline_svg(FIGURES[kind](), "f7", "description")
     root = ElementTree.fromstring(svg)
     ids = [each.get("id") for each in root.iter() if each.get("id")]
+    assert ids
     assert len(ids) == len(set(ids))
     assert all(name.startswith("f7-") for name in ids)
     references = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', svg))
     assert {name for pair in references for name in pair if name} <= set(ids)
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_figures_refer_neither_to_other_files_nor_to_fonts_of_matplotlib(kind) -> None:
+    svg = inline_svg(FIGURES[kind](), "f7", "description")
     assert "http" not in svg
     assert "DejaVu" not in svg
 

@@ -79,13 +79,16 @@ def test_all_of_a_new_map_is_shown(driver: Driver, tmp_path: Path, scale: float)
         assert top <= y <= top + height
 
 
-def test_the_view_stays_while_the_map_is_edited(driver: Driver) -> None:
+def test_edits_and_restarts_keep_the_zoom(driver: Driver) -> None:
+    fitted = driver.find_pixel((1.0, 1.0))
     driver.turn_wheel(200, 150, 5)
     before = driver.find_pixel((1.0, 1.0))
+    assert before != pytest.approx(fitted)
     driver.viewer.attempt(lambda: driver.session.edit_map(replace(HALL, obstacles=()), "emptied"))
     driver.run_frames(2)
     driver.press_key("ctrl+z")
     driver.run_frames(2)
+    # N starts again with the next seed.
     driver.press_key("n")
     driver.run_frames(2)
     assert driver.find_pixel((1.0, 1.0)) == pytest.approx(before)

@@ -187,13 +187,18 @@ def test_hints_of_tools_on_a_phone_mention_neither_keys_nor_clicks(upright_phone
         assert not re.search(r"click|Enter|Alt|Shift|wheel|\[", upright_phone.viewer.message), name
 
 
-def test_a_list_has_a_button_that_closes_it(phone: Driver) -> None:
-    """Phones have no Escape key."""
+def open_controller_list(phone: Driver) -> None:
+    """Open the list of the controllers with which the current one can be compared."""
     phone.window.set_appearance(
         PageAppearance(scale=RATIO, theme="light", shows_panel=False, is_compact=True, is_motion_reduced=True)
     )
     run_page_command(phone, "pane:add")
     phone.run_frames(2)
+
+
+def test_a_list_has_a_button_that_closes_it(phone: Driver) -> None:
+    """Phones have no Escape key."""
+    open_controller_list(phone)
     box = phone.window.dialogs.box
     button = phone.window.dialogs.ui.find("button", "close")
     assert box is not None
@@ -206,15 +211,11 @@ def test_a_list_has_a_button_that_closes_it(phone: Driver) -> None:
 
 
 def test_options_of_a_list_are_large_enough_for_fingers(phone: Driver) -> None:
-    phone.window.set_appearance(
-        PageAppearance(scale=RATIO, theme="light", shows_panel=False, is_compact=True, is_motion_reduced=True)
-    )
-    run_page_command(phone, "pane:add")
-    phone.run_frames(2)
+    open_controller_list(phone)
     box = phone.window.dialogs.box
     assert phone.window.screen.get_rect().contains(box)
     options = [widget.rect for widget in phone.window.dialogs.ui.widgets.values() if widget.kind == "option"]
-    assert min(option.height for option in options) >= 40 * RATIO
+    assert min(option.height for option in options) >= TARGET_PX * RATIO
     assert all(box.contains(option) for option in options)
 
 
