@@ -121,7 +121,7 @@ def _build_section(result: ReportedResult, key: str, max_bytes: int) -> dict[str
         "facts": facts.list_facts(result),
         "gain_meanings": facts.list_gain_meanings(result),
         "densities": facts.format_densities(result),
-        "missing_runs": findings.list_missing_runs(result),
+        "missing_runs": findings.describe_incomplete_runs(result),
         "problems": findings.list_problems(result),
         "settings": len(list_settings(result)),
         "controllers": build_controllers_table(result),

@@ -85,7 +85,7 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
     return f"{subject}: {', '.join(texts)}."
 
 
-def list_missing_runs(result: ReportedResult) -> list[str]:
+def describe_incomplete_runs(result: ReportedResult) -> list[str]:
     """Describe how many runs failed, cannot be read, or are missing, in one sentence each."""
     sentences = []
     if result.failed_runs:

@@ -151,7 +151,7 @@ def test_only_individual_controllers_are_adapted() -> None:
 
 
 @pytest.mark.parametrize("shy", [-3.0, "a", np.nan])
-def test_gains_of_a_class_of_the_user_have_to_be_in_their_range(shy: Any) -> None:
+def test_gains_of_user_defined_controllers_must_be_in_range(shy: Any) -> None:
     @dataclass(frozen=True)
     class Homing:
         shy: float = gain(0.0, "m", "how far it stays away from walls")
@@ -164,7 +164,7 @@ def test_gains_of_a_class_of_the_user_have_to_be_in_their_range(shy: Any) -> Non
         require_controller(Homing(shy=shy))
 
 
-def test_plain_numbers_of_a_class_of_the_user_have_no_range() -> None:
+def test_plain_fields_of_user_defined_controllers_have_no_range() -> None:
     @dataclass(frozen=True)
     class Homing:
         limit: float = np.inf

@@ -14,7 +14,6 @@ from map_window_cases import (
 from robocov.planning.discovered_map import FREE, UNKNOWN, DiscoveredMap
 from robocov.planning.grid_planner import GridPlanner
 
-
 NO_DOOR = slice(0, 0)
 
 

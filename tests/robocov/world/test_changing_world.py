@@ -20,6 +20,7 @@ from robocov.world import ChangingWorld, World
 from robocov.world.obstacle_pieces import build_obstacles
 
 HALL = Environment("hall", ((0, 0), (10, 0), (10, 8), (0, 8)))
+ROBOT_RADIUS_M = 0.1
 STARTS = np.array([[1.0, 1.0], [2.0, 1.5], [1.0, 3.0], [3.0, 2.5]])
 
 
@@ -141,20 +142,33 @@ def test_whole_numbers_are_accepted_as_velocities() -> None:
     assert 0.0 < worlds[0].velocities[0, 0] < 1.0
 
 
+def step_until_failure(simulation: Simulation) -> None:
+    """Take the steps until a robot that fails at 0.1 s has failed."""
+    for _ in range(8):
+        simulation.step()
+    assert simulation.time > 0.1
+
+
 def test_robots_sense_failed_robots() -> None:
     starts = np.array([[4.0, 4.0], [6.0, 4.0]])
     simulation = Simulation(HALL, Rapf(), starts, conditions=Conditions(failures=((2, 0.1),)))
     assert np.isnan(simulation.observe().obstacle_points[0]).all()
-    for _ in range(8):
-        simulation.step()
+    step_until_failure(simulation)
     obstacle_point = simulation.observe().obstacle_points[0]
     offset = simulation.positions[0] - simulation.positions[1]
-    expected = simulation.positions[1] + 0.1 * offset / np.hypot(*offset)
+    expected = simulation.positions[1] + ROBOT_RADIUS_M * offset / np.hypot(*offset)
     np.testing.assert_allclose(obstacle_point, expected, atol=1e-9)
     assert np.isnan(simulation.observe().obstacle_points[1]).all()
-    twin = simulation.copy()
+
+
+def test_a_copy_senses_failed_robots_at_the_time_of_the_copy() -> None:
+    starts = np.array([[4.0, 4.0], [6.0, 4.0]])
+    simulation = Simulation(HALL, Rapf(), starts, conditions=Conditions(failures=((2, 0.1),)))
+    step_until_failure(simulation)
+    obstacle_point = simulation.observe().obstacle_points[0]
+    copy = simulation.copy()
     simulation.step()
-    np.testing.assert_array_equal(twin.observe().obstacle_points[0], obstacle_point)
+    np.testing.assert_array_equal(copy.observe().obstacle_points[0], obstacle_point)
 
 
 def test_robots_that_have_not_joined_have_no_contacts() -> None:

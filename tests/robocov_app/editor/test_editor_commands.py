@@ -194,14 +194,18 @@ def test_an_obstacle_becomes_the_boundary_and_back(driver: EditorDriver) -> None
     assert driver.sketch.boundary == LOW.vertices and len(driver.shapes) == 4
 
 
-def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
+def test_the_next_start_is_selected_and_made_the_default(tmp_path: Path) -> None:
     starts = (("one", DiscStart((2, 2), 1.0)), ("two", DiscStart((7, 7), 1.0)))
     with open_editor(tmp_path, build_sheet(starts=starts)) as driver:
         assert driver.editor.start_name == "one"
         driver.press_key("shift+n")
         assert driver.editor.start_name == "two" and driver.editor.selection == Selection.of("two")
         driver.press_key("shift+d")
+        # The first start is the default.
         assert driver.editor.start_names == ["two", "one"]
+
+
+def test_a_map_without_starts_has_no_next_start(tmp_path: Path) -> None:
     with open_editor(tmp_path, build_sheet()) as driver:
         driver.press_key("shift+n")
         assert "no start yet" in driver.message

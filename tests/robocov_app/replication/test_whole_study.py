@@ -54,8 +54,8 @@ TINY_COMMAND = Path(__file__).parents[1] / "tiny_paper_command.py"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def small_parts():
-    """Try two sets of gains for two baselines and one for the others; time few steps."""
+def reduced_study():
+    """Reduce the gain grids and speed measurements to a minimum, and run tasks in this process."""
     grids = {name: grid[:1] for name, grid in GAIN_GRIDS.items()}
     for name in ("dispersion", "range-limited"):  # the fastest
         grids[name] = (GAIN_GRIDS[name][0], GAIN_GRIDS[name][-1])

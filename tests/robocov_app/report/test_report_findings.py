@@ -16,7 +16,7 @@ from robocov_app.report.facts import (
     list_facts,
     list_gain_meanings,
 )
-from robocov_app.report.findings import list_findings, list_missing_runs, list_problems
+from robocov_app.report.findings import describe_incomplete_runs, list_findings, list_problems
 from robocov_app.report.results.result import DamagedRun, Reference, ReportedResult
 
 RUNS = [
@@ -62,17 +62,17 @@ def test_the_findings_on_a_single_run_have_its_gap_to_the_reference() -> None:
 
 
 def test_a_complete_result_has_no_missing_runs() -> None:
-    assert list_missing_runs(build_result(RUNS)) == []
+    assert describe_incomplete_runs(build_result(RUNS)) == []
 
 
 def test_missing_failed_and_damaged_runs_are_listed() -> None:
     result = build_result(RUNS, expected_count=6)
-    assert list_missing_runs(result) == ["Not finished: 1 of 6 runs is missing."]
+    assert describe_incomplete_runs(result) == ["Not finished: 1 of 6 runs is missing."]
     errors = ["no", "no", "a", "b", "c"]
     failed_runs = [build_run("rpf", seed, error=error) for seed, error in enumerate(errors)]
     result = build_result([*RUNS, *failed_runs], expected_count=20)
     result = replace(result, damaged_runs=(DamagedRun("run-7", "no zip file"),))
-    assert list_missing_runs(result) == [
+    assert describe_incomplete_runs(result) == [
         "5 of 10 runs failed (RPF 5 of 5): no; a; b; and 1 more reason.",
         "1 run cannot be read and is left out: run-7 (no zip file).",
         "Not finished: 9 of 20 runs are missing.",

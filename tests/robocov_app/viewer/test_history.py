@@ -19,6 +19,8 @@ DT = 1 / 60
 MIN_STATES = 24
 PANE_BYTES = 700
 ROBOT_BYTES = 2 * 16
+MIN_THINNED_EDITS = 8
+"""With fewer edits, the states right after all of them are kept."""
 STATE_BYTES = PANE_BYTES + ROBOT_BYTES
 """Size of a state with one pane and one robot."""
 
@@ -89,14 +91,23 @@ def test_the_past_is_bounded_and_becomes_coarser_with_age(steps, max_states):
 
 @st.composite
 def edited_runs(draw):
-    """Draw runs with edits, at some of which the number of robots changes."""
+    """Draw runs with edits, some of which change the number of robots."""
     kinds = st.sampled_from(["step"] * 6 + ["edit", "robots"])
     return draw(st.lists(st.tuples(kinds, st.integers(1, 40)), max_size=40))
 
 
+def assert_lookups_are_right(history, end_time):
+    """Check that a lookup of a time returns the last state that is not later."""
+    between_steps = 0.37 * end_time
+    for time in (-1.0, 0.0, between_steps, end_time, 1e9):
+        index = history.find_index(time)
+        assert index == 0 or history.get_time(index) <= time + 1e-6
+        assert index == len(history) - 1 or history.get_time(index + 1) > time
+
+
 @given(edited_runs())
 @settings(max_examples=count_examples(200))
-def test_the_past_of_an_edited_run_stays_in_order(run):
+def test_an_edited_history_is_ordered_bounded_and_searchable(run):
     max_bytes = 80 * STATE_BYTES
     history = RunHistory(DT, max_bytes)
     step = 0
@@ -119,11 +130,8 @@ def test_the_past_of_an_edited_run_stays_in_order(run):
         assert (np.diff(history.steps) > 0).all()
         assert compute_bytes(history) <= max_bytes or len(history) <= MIN_STATES
         assert history.steps[0] == 0
-        for time in (-1.0, 0.0, 0.37 * step * DT, step * DT, 1e9):
-            index = history.find_index(time)
-            assert index == 0 or history.get_time(index) <= time + 1e-6
-            assert index == len(history) - 1 or history.get_time(index + 1) > time
-    if len(edited_steps) < 8:
+        assert_lookups_are_right(history, step * DT)
+    if len(edited_steps) < MIN_THINNED_EDITS:
         assert edited_steps <= set(history.steps)
 
 

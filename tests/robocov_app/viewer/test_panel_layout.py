@@ -27,7 +27,7 @@ MIN_SLIDER_PX = 140
 
 
 @pytest.mark.parametrize("name", list(CONTROLLERS))
-def test_gains_have_names_in_everyday_words(name: str) -> None:
+def test_labels_of_gains_are_unique_and_capitalized(name: str) -> None:
     parameters = list(list_gain_parameters(ControllerChoice(name)))
     labels = [parameter.label for parameter in parameters]
     assert len(set(labels)) == len(labels)
@@ -35,6 +35,11 @@ def test_gains_have_names_in_everyday_words(name: str) -> None:
         assert parameter.name in GAIN_LABELS
         assert parameter.label[:1].isupper()
         assert "_" not in parameter.label
+
+
+@pytest.mark.parametrize("name", list(CONTROLLERS))
+def test_only_a_few_numbers_are_basic_gains(name: str) -> None:
+    parameters = list_gain_parameters(ControllerChoice(name))
     basic = [parameter for parameter in parameters if not parameter.is_advanced]
     assert len(basic) <= MAX_BASIC_GAINS
     assert all(isinstance(parameter, NumberParameter) for parameter in basic)

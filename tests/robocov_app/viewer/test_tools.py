@@ -248,10 +248,10 @@ def test_an_unfinished_polygon_is_shown():
     session = start_session()
     click(tool, session, CORNERS[0])
     tool.move(session, build_event((3.2, 3.7)))
-    state = tool.build_overlay(session)
-    assert state.line == ((3.2, 3.2), (3.2, 3.7))
-    assert not state.is_closed
-    assert state.label == "0.50 m"
+    overlay = tool.build_overlay(session)
+    assert overlay.line == ((3.2, 3.2), (3.2, 3.7))
+    assert not overlay.is_closed
+    assert overlay.label == "0.50 m"
     click(tool, session, CORNERS[1])
     assert tool.build_overlay(session).is_closed
     assert tool.cancel(session)
@@ -282,14 +282,15 @@ def test_invalid_polygons_are_rejected():
 # wall
 
 
-def test_enter_ends_a_wall():
+def test_finishing_a_wall_drops_the_previewed_segment():
     tool = AddWallTool()
     session = start_session()
     click(tool, session, (3.2, 3.2), (3.2, 3.8))
     tool.move(session, build_event((3.8, 3.8)))
-    state = tool.build_overlay(session)
-    assert state.obstacles == (WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M),)
-    assert state.label == "0.60 m, 0.1 m wide"
+    overlay = tool.build_overlay(session)
+    previewed_wall = WallObstacle(((3.2, 3.2), (3.2, 3.8), (3.8, 3.8)), DEFAULT_WALL_WIDTH_M)
+    assert overlay.obstacles == (previewed_wall,)
+    assert overlay.label == "0.60 m, 0.1 m wide"
     assert tool.finish(session) == "wall drawn"
     assert session.displayed.environment.obstacles[-1] == WallObstacle(
         ((3.2, 3.2), (3.2, 3.8)), DEFAULT_WALL_WIDTH_M

@@ -331,12 +331,20 @@ def test_the_arena_fills_the_place_of_a_hidden_panel(driver: Driver) -> None:
     driver.press_key("h")
     assert driver.window.layout.panel.width == 0
     assert driver.window.panel.hidden
-    assert driver.window.layout.arena.width == 900 - RAIL_WIDTH_PX
-    driver.click(880, 80)
-    driver.press_key("space")
-    driver.run_frames(3)
+    window_width = driver.window.layout.size[0]
+    assert driver.window.layout.arena.width == window_width - RAIL_WIDTH_PX
     driver.press_key("h")
     assert not driver.window.panel.hidden
+
+
+def test_clicks_and_shortcuts_work_without_a_panel(driver: Driver) -> None:
+    center = pygame.Rect(driver.window.layout.panel).center
+    driver.press_key("h")
+    # The hidden panel must not take the click.
+    driver.click(*center)
+    assert driver.window.panel.hidden
+    driver.press_key("space")
+    driver.run_frames(3)
     assert driver.session.timeline.end_time > 0.0
 
 

@@ -48,6 +48,14 @@ ROOMS = Environment(
 CORNER = [[0.8, 0.8], [1.3, 0.8], [0.8, 1.3], [1.3, 1.3]]
 HALL = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
 
+ROBOT_RADIUS_M = 0.1
+PILLARS_X_M = 7.0
+"""Position of the row of pillars in the map "gaps"."""
+MIN_CLEARANCE_M = 0.005
+"""Robots that do not touch anything have at least this clearance."""
+CLOSE_CLEARANCE_M = 0.05
+"""A robot with a smaller clearance has to turn carefully."""
+
 
 def build_simulation(kind: type[Atlas] = Atlas, n: int = 4) -> Simulation:
     """Return a simulation of robots that start in a corner of the two rooms."""
@@ -92,8 +100,11 @@ def test_robots_plan_again_when_all_others_have_come_to_rest(final_simulation: S
 
 
 @pytest.mark.slow
-def test_robots_that_turn_back_before_a_narrow_gap_do_not_touch_its_walls() -> None:
-    """When the gap turns out to be too narrow, turning must leave acceleration for braking."""
+def test_robots_that_turn_close_to_a_narrow_gap_do_not_touch_its_rim() -> None:
+    """Turning must leave acceleration for braking.
+
+    From exactly these starts, a robot once used all of its acceleration to turn, and touched a pillar.
+    """
     starts = [
         (6.606354578438451, 3.582792226112388), (5.82911286359781, 4.5164725372712775),
         (5.893535020701633, 3.786360212980583), (5.341358005239178, 3.400674457312083),
@@ -101,7 +112,9 @@ def test_robots_that_turn_back_before_a_narrow_gap_do_not_touch_its_walls() -> N
     ]  # fmt: skip
     team = Team.homogeneous(6, sensing_range=6.0)
     record = Simulation(load_map("gaps"), Atlas(), starts, team, dt=0.02).run(11.0)
-    assert compute_clearances(record).min() > 0.005
+    # Some robots pass between the pillars, and at least one of them comes close to a pillar.
+    assert (record.positions[-1, :, 0] > PILLARS_X_M).any()
+    assert MIN_CLEARANCE_M < compute_clearances(record).min() < CLOSE_CLEARANCE_M
 
 
 @pytest.mark.slow
@@ -109,7 +122,7 @@ def test_robots_move_without_contacts() -> None:
     record = build_simulation().run(25.0)
     clearance = compute_clearances(record)
     assert count_contacts(record, clearance) == 0
-    assert clearance.min() > 0.005
+    assert clearance.min() > MIN_CLEARANCE_M
 
 
 @pytest.mark.slow
@@ -417,20 +430,24 @@ def test_robots_that_are_not_at_their_assumed_positions_are_forgotten() -> None:
 def crosses_door(seed: int) -> bool:
     """Return whether a team crosses a door, 1.6 to 2.2 diameters wide, in a wall at a random angle."""
     rng = np.random.default_rng(seed)
-    width = 0.2 * rng.uniform(1.6, 2.2)
+    width = 2.0 * ROBOT_RADIUS_M * rng.uniform(1.6, 2.2)
     angle = rng.uniform(-0.6, 0.6)
-    door = rng.uniform(-1.5, 1.5)
+    door_offset = rng.uniform(-1.5, 1.5)
     center = np.array([4.0, 3.0])
     along = np.array([-math.sin(angle), math.cos(angle)])
     across = np.array([along[1], -along[0]])
-    ends = [
-        (center + along * distance).tolist() for distance in (-3.6, door - width / 2, door + width / 2, 3.6)
-    ]
-    walls = (WallObstacle(ends[:2], 0.1), WallObstacle(ends[2:], 0.1))
+    # The wall leaves at most 3 cm to the boundary, because cos(0.6) * 3.6 m is 2.97 m.
+    half_length = 3.6
+    offsets = (-half_length, door_offset - width / 2, door_offset + width / 2, half_length)
+    ends = [(center + along * offset).tolist() for offset in offsets]
+    wall_width = 0.1
+    walls = (WallObstacle(ends[:2], wall_width), WallObstacle(ends[2:], wall_width))
+    # A robot has crossed the wall when all of it is on the other side.
+    crossed_distance = ROBOT_RADIUS_M + wall_width / 2
     boundary = ((0.0, 0.0), (8.0, 0.0), (8.0, 6.0), (0.0, 6.0))
     simulation = Simulation(Environment("door", boundary, walls), Atlas(), CORNER[:3])
     while simulation.time < 30.0:
-        if ((simulation.positions - center) @ across).max() >= 0.15:
+        if ((simulation.positions - center) @ across).max() >= crossed_distance:
             return True
         simulation.step()
     return False
@@ -438,6 +455,7 @@ def crosses_door(seed: int) -> bool:
 
 @pytest.mark.slow
 def test_robots_cross_doors_that_are_wide_enough() -> None:
+    # In one of these maps, the team may need longer than the 30 s of a run.
     assert sum(crosses_door(seed) for seed in range(12)) >= 11
 
 
