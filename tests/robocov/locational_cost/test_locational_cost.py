@@ -92,9 +92,14 @@ def test_values_agree_with_quadrature(f: Performance, p: tuple[float, float]) ->
 
 
 def integrate_by_dilogarithms(ring: np.ndarray, p: np.ndarray, h: float) -> float:
-    """Return ∫ dq / (|q-p|² + h²) over a ring in closed form, by the imaginary parts of dilogarithms."""
+    """Return ∫ dq / (|q-p|² + h²) over a ring in closed form, by the imaginary parts of dilogarithms.
 
-    def evaluate_clausen(z: complex) -> float:
+    In polar coordinates about p, an edge at the distance d contributes ½ ∫ ln(1 + d² / (h² cos² θ)) dθ. With
+    q = (h / (d + √(d² + h²)))², the logarithm is ln|1 + q e^(2iθ)|² - ln|1 + e^(2iθ)|² - ln q, and an
+    antiderivative of ln|1 + q e^(2iθ)|² with respect to θ is -Im Li₂(-q e^(2iθ)).
+    """
+
+    def evaluate_imag_dilogarithm(z: complex) -> float:
         """Return Im Li₂(-z)."""
         return float(np.imag(spence(1.0 + z)))
 
@@ -102,14 +107,14 @@ def integrate_by_dilogarithms(ring: np.ndarray, p: np.ndarray, h: float) -> floa
     for a, b in pairwise([*(ring - p), ring[0] - p]):
         along = (b - a) / np.hypot(*(b - a))
         d = a[0] * along[1] - a[1] * along[0]
-        root = (h / (abs(d) + np.hypot(d, h))) ** 2
+        q = (h / (abs(d) + np.hypot(d, h))) ** 2
         ends = []
         for s in (a @ along, b @ along):
             angle = np.arctan2(s, abs(d))
             ends.append(
-                -angle * np.log(root)
-                - evaluate_clausen(root * np.exp(2j * angle))
-                + evaluate_clausen(np.exp(2j * angle))
+                -angle * np.log(q)
+                - evaluate_imag_dilogarithm(q * np.exp(2j * angle))
+                + evaluate_imag_dilogarithm(np.exp(2j * angle))
             )
         total += np.sign(d) * 0.5 * (ends[1] - ends[0])
     return total

@@ -36,30 +36,42 @@ def shade(picture: Brightness) -> np.ndarray:
     return picture.level / picture.max_level
 
 
-def test_pgm_of_8_and_16_bits_is_read(tmp_path: Path) -> None:
-    plain = "P2\n# a comment\n4 # and here\n3\n#another\n255\n" + "\n".join(
-        " ".join(map(str, row)) for row in GRAY
-    )
-    deep = np.rint(GRAY / 255 * 65535).astype(int)
-    files = [
-        build_pgm(GRAY),
-        build_pgm(GRAY, head="# one\n#two\n\n"),
-        build_pgm(GRAY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
-        b"P5\r\n4 3\r\n255\r\n" + GRAY.tobytes(),
-        build_pgm(GRAY) + b"and more after it",
-        plain.encode(),
-        plain.replace("\n", "\r\n").encode(),
-        plain.replace("17 34", "17 # in the midst\n34").encode(),
-        build_pgm(deep, 65535),
-        f"P2 4 3 65535 {' '.join(map(str, deep.ravel()))}".encode(),
-        build_pgm(np.rint(GRAY / 255 * 15), 15),
-    ]
-    for data in files:
-        picture = read(tmp_path, data)
-        np.testing.assert_allclose(shade(picture), GRAY / 255, atol=1e-5)
-        assert picture.alpha is None
-        assert is_picture(data)
-    # The first byte after the header may look like a line break.
+PLAIN_PGM = "P2\n# a comment\n4 # and here\n3\n#another\n255\n" + "\n".join(
+    " ".join(map(str, row)) for row in GRAY
+)
+DEEP_GRAY = np.rint(GRAY / 255 * 65535).astype(int)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(build_pgm(GRAY), id="8 bits"),
+        pytest.param(build_pgm(GRAY, head="# one\n#two\n\n"), id="comments"),
+        pytest.param(
+            build_pgm(GRAY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1), id="spaces and tabs"
+        ),
+        pytest.param(b"P5\r\n4 3\r\n255\r\n" + GRAY.tobytes(), id="CR LF"),
+        pytest.param(build_pgm(GRAY) + b"and more after it", id="trailing bytes"),
+        pytest.param(PLAIN_PGM.encode(), id="plain"),
+        pytest.param(PLAIN_PGM.replace("\n", "\r\n").encode(), id="plain, CR LF"),
+        pytest.param(
+            PLAIN_PGM.replace("17 34", "17 # in the middle\n34").encode(), id="plain, comment between values"
+        ),
+        pytest.param(build_pgm(DEEP_GRAY, 65535), id="16 bits"),
+        pytest.param(
+            f"P2 4 3 65535 {' '.join(map(str, DEEP_GRAY.ravel()))}".encode(), id="plain, 16 bits, one line"
+        ),
+        pytest.param(build_pgm(np.rint(GRAY / 255 * 15), 15), id="maximum of 15"),
+    ],
+)
+def test_all_pgm_variants_give_the_same_brightness(tmp_path: Path, data: bytes) -> None:
+    picture = read(tmp_path, data)
+    np.testing.assert_allclose(shade(picture), GRAY / 255, atol=1e-5)
+    assert picture.alpha is None
+    assert is_picture(data)
+
+
+def test_the_first_byte_after_the_header_of_a_pgm_may_look_like_a_line_break(tmp_path: Path) -> None:
     first = np.full((1, 3), 10, dtype=np.uint8)
     np.testing.assert_array_equal(read(tmp_path, b"P5 3 1 255\n" + first.tobytes()).level, first)
 

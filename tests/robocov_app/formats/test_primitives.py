@@ -167,7 +167,7 @@ WKT = "POLYGON ((0 0, 9 0, 9 6, 0 6, 0 0))\nPOINT (3 3)\nLINESTRING (5 0, 5 2.5)
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "options", "named", "others"),
+    ("name", "text", "options", "has_names", "other_count"),
     [
         ("plan.dxf", "\n".join(map(str, DXF)) + "\n", {}, True, 1),
         ("plan.svg", SVG, {"scale": 1.0}, True, 3),
@@ -177,19 +177,20 @@ WKT = "POLYGON ((0 0, 9 0, 9 6, 0 6, 0 0))\nPOINT (3 3)\nLINESTRING (5 0, 5 2.5)
     ids=["dxf", "svg", "geojson", "wkt"],
 )
 def test_primitives_of_a_file_are_kept(
-    tmp_path: Path, name: str, text: str, options: dict[str, Any], named: bool, others: int
+    tmp_path: Path, name: str, text: str, options: dict[str, Any], has_names: bool, other_count: int
 ) -> None:
     path = tmp_path / name
     path.write_text(text)
     environment, _, _ = import_map(path, options=ReadOptions(**options))
-    circle = CircleObstacle((3.0, 3.0), 0.5, "pillars" if named else None)
-    wall = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.1, "walls" if named else None)
+    circle = CircleObstacle((3.0, 3.0), 0.5, "pillars" if has_names else None)
+    wall = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.1, "walls" if has_names else None)
     assert circle in environment.obstacles
-    found = [one for one in environment.obstacles if isinstance(one, WallObstacle)]
-    assert wall in found or WallObstacle(wall.points[::-1], 0.1, wall.name) in found
-    assert len(environment.obstacles) == 2 + others
-    if others:
-        assert any(one.width == 0.3 and len(one.points) == 3 for one in found)
-    if name == "plan.svg":  # a square end reaches on; a round one is no wall's
-        assert WallObstacle(((0.9, 5.0), (2.1, 5.0)), 0.2) in found
-        assert sum(isinstance(one, PolygonObstacle) for one in environment.obstacles) == 1
+    walls = [obstacle for obstacle in environment.obstacles if isinstance(obstacle, WallObstacle)]
+    assert wall in walls or WallObstacle(wall.points[::-1], 0.1, wall.name) in walls
+    assert len(environment.obstacles) == 2 + other_count
+    if other_count:
+        assert any(wall.width == 0.3 and len(wall.points) == 3 for wall in walls)
+    if name == "plan.svg":
+        # A square cap lengthens the wall by half its width; a line with round caps becomes a polygon.
+        assert WallObstacle(((0.9, 5.0), (2.1, 5.0)), 0.2) in walls
+        assert sum(isinstance(obstacle, PolygonObstacle) for obstacle in environment.obstacles) == 1

@@ -17,6 +17,9 @@ from robocov_app.formats.geometry.shapes.collection import Shapes
 from robocov_app.formats.vector.wkt.parser import WktParser
 
 HALL = "POLYGON ((0 0, 10 0, 10 5, 0 5, 0 0), (1 1, 2 1, 2 2, 1 2, 1 1))"
+LARGE_HALL = box(0, 0, 20, 10)
+CORRIDORS = [box(-2, 4, 12, 6), box(9, -3, 11, 8), box(5, 2, 22, 3), box(3, 8, 4, 9)]
+"""Corridors that overlap the large hall; the last one is inside it."""
 
 
 def test_a_walkable_area_is_free_space_with_obstacles(tmp_path: Path) -> None:
@@ -69,19 +72,25 @@ def test_empty_points_are_omitted(tmp_path: Path) -> None:
 )
 def test_accessible_areas_that_overlap_are_one_free_space(tmp_path: Path, layout: str) -> None:
     # Corridors that overlap a hall are not obstacles, and nothing between them is solid.
-    areas = [box(0, 0, 20, 10), box(-2, 4, 12, 6), box(9, -3, 11, 8), box(5, 2, 22, 3), box(3, 8, 4, 9)]
+    areas = [LARGE_HALL, *CORRIDORS]
     parts = [area.wkt if "MULTI" not in layout else area.wkt.removeprefix("POLYGON ") for area in areas]
     foreign = read(tmp_path, "wkt", layout.format(",".join(parts)))
     assert foreign.free.equals(shapely.union_all(areas))
     environment, report, _ = import_map(tmp_path / "plan.wkt")
     assert environment.free_area == pytest.approx(shapely.union_all(areas).area)
     assert (len(environment.obstacles), report.dropped) == (0, ())
-    # This also holds if one area contains all others.
-    nested = [areas[0], box(3, 8, 4, 9), box(6, 5, 7, 9)]
-    text = ",".join(area.wkt for area in nested)
+
+
+def test_areas_within_an_accessible_area_are_free_unless_outlines_are_solid(tmp_path: Path) -> None:
+    text = ",".join(area.wkt for area in (LARGE_HALL, box(3, 8, 4, 9), box(6, 5, 7, 9)))
     assert read(tmp_path, "wkt", text).free.area == pytest.approx(200)
     assert read(tmp_path, "wkt", text, outlines="solid").free.area == pytest.approx(200 - 5)
-    assert read(tmp_path, "wkt", ",".join(area.wkt for area in areas), outlines="solid").free.area < 200
+
+
+def test_corridors_across_a_hall_are_solid_if_outlines_are(tmp_path: Path) -> None:
+    text = ",".join(area.wkt for area in (LARGE_HALL, *CORRIDORS))
+    free = read(tmp_path, "wkt", text, outlines="solid").free
+    assert free.area == pytest.approx((LARGE_HALL - shapely.union_all(CORRIDORS)).area)
 
 
 HOLED = Polygon(box(0, 0, 10, 10).exterior, [box(2, 2, 6, 6).exterior])

@@ -50,6 +50,8 @@ from robocov_app.sweep.tasks import generate_tasks
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
 
 FIRST = parts.record_partition()
+RUN_COUNT = 142
+"""Number of runs of the tiny study without those beyond the paper."""
 TINY_COMMAND = Path(__file__).parents[1] / "tiny_paper_command.py"
 
 
@@ -333,6 +335,12 @@ def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None
         time.sleep(0.02)
 
 
+def assert_same_files(folder: Path, other: Path, names: list[str]) -> None:
+    """Check that files of two folders are the same byte for byte."""
+    for name in names:
+        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
+
+
 class TestStopping:
     def test_an_interrupted_and_killed_study_ends_like_an_undisturbed_one(self, folder, paper_page, tmp_path):
         out = tmp_path / "out"
@@ -341,15 +349,16 @@ class TestStopping:
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does
         output, messages = process.communicate(timeout=300)
         assert process.returncode == 130
-        first = next(line for line in messages.splitlines() if line.startswith("paper"))
-        assert first.startswith("paper (quick): 142 runs, about ")
-        assert "on 2 processes (measured: rapf 0." in first and "Ctrl+C keeps finished runs" in first
+        forecast = next(line for line in messages.splitlines() if line.startswith("paper"))
+        assert forecast.startswith(f"paper (quick): {RUN_COUNT} runs, about ")
+        assert re.search(r"on 2 processes \(measured: rapf \d", forecast)
+        assert "Ctrl+C keeps finished runs" in forecast
         assert f"To resume: robocov paper --out {out} --quick --without-beyond" in output
-        kept = count_finished_runs(out)
-        assert 12 <= kept < 142
+        finished_count = count_finished_runs(out)
+        assert 12 <= finished_count < RUN_COUNT
 
         process = start_study("--out", str(out), "--workers", "2")
-        wait_for_runs(out, kept + 12, process)
+        wait_for_runs(out, finished_count + 12, process)
         process.kill()
         process.communicate(timeout=300)
 
@@ -357,15 +366,12 @@ class TestStopping:
         output, messages = process.communicate(timeout=500)
         assert process.returncode == 0, messages
         answer = json.loads(output)
-        assert (answer["runs"], answer["failed"], answer["interrupted"]) == (142, 0, False)
-        assert (out / "claims.json").read_bytes() == (folder / "claims.json").read_bytes()
+        assert (answer["runs"], answer["failed"], answer["interrupted"]) == (RUN_COUNT, 0, False)
         assert (out / "index.html").read_text(encoding="utf-8") == paper_page
-        for name in ("gains", "convex", "claims"):
-            table = Path("studies") / name / "results.csv"
-            assert (out / table).read_bytes() == (folder / table).read_bytes()
         assert {path.name for path in (out / "figures").iterdir()} == set(SAVED_FIGURES)
-        for name in SAVED_FIGURES:
-            assert (out / "figures" / name).read_bytes() == (folder / "figures" / name).read_bytes()
+        tables = [f"studies/{name}/results.csv" for name in ("gains", "convex", "claims")]
+        figures = [f"figures/{name}" for name in SAVED_FIGURES]
+        assert_same_files(out, folder, ["claims.json", *tables, *figures])
 
     def test_no_run_starts_after_ctrl_c(self, folder, tmp_path):
         open_folder(tmp_path / "out", TINY)
