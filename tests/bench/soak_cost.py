@@ -92,19 +92,24 @@ def list_well_placed(environment: Environment, points: FloatArray) -> list[list[
     return [p for p in points.tolist() if brute_force_geodesic.is_well_placed(free, tuple(p), SIDE)]
 
 
-def compute_brute_force_error(environment: Environment, positions: FloatArray) -> float:
-    """Return the largest error of a cost on a coarse lattice, relative to the size of the map."""
+def compute_brute_force_error(environment: Environment, positions: FloatArray) -> float | None:
+    """Return the largest error of a cost on a coarse lattice, relative to the size of the map.
+
+    The result is None if no distance can be compared.
+    """
     cost = CoverageCost(environment, BRUTE_FORCE_LATTICE)
     robots = list_well_placed(environment, positions)[:MAX_BRUTE_FORCE_ROBOTS]
     points = list_well_placed(environment, cost.points)
     if not robots or not points:
-        return 0.0
+        return None
     expected = brute_force_geodesic.compute_distances(environment.free, robots, points).min(axis=0)
     is_compared = [p in points for p in cost.points.tolist()]
     distances = cost(robots).distances[is_compared]
     is_reached = np.isfinite(expected)
     assert (np.isfinite(distances) == is_reached).all()
-    return float(np.abs(distances[is_reached] - expected[is_reached]).max(initial=0.0)) / SIDE
+    if not is_reached.any():
+        return None
+    return float(np.abs(distances[is_reached] - expected[is_reached]).max()) / SIDE
 
 
 def check_case(case: Case, errors: MaxErrors) -> None:
@@ -117,8 +122,9 @@ def check_case(case: Case, errors: MaxErrors) -> None:
     errors.maps += 1
     if len(shapely.get_coordinates(environment.free)) <= MAX_BRUTE_FORCE_VERTICES:
         brute_force_error = compute_brute_force_error(environment, positions)
-        errors.brute_force_error = max(errors.brute_force_error, brute_force_error)
-        errors.brute_force_maps += 1
+        if brute_force_error is not None:
+            errors.brute_force_error = max(errors.brute_force_error, brute_force_error)
+            errors.brute_force_maps += 1
 
 
 def check_cases(first_seed: int, duration: float, errors: MaxErrors) -> None:

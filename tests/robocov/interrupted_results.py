@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
+from enum import IntEnum
 from pathlib import Path
 
 from robocov.errors import OutputError
@@ -31,8 +32,23 @@ NEW = {**NUMBERS, "cost.csv": "new", "frames/000000.png": "new"}
 FOREIGN = {"frames/2024-holiday.png": "mine", ".x.part.zip": "mine"}
 
 CALLS = {"os.rename", "os.remove", "os.mkdir", "os.rmdir"}
-COMPLETED = 100
-"""Status of a process that has finished before the call at which it would have been interrupted."""
+
+
+class ExitStatus(IntEnum):
+    """How a process ended that was interrupted, or failed, at a call."""
+
+    TOLERATED = 0
+    """The call failed, but the function succeeded."""
+    CRASHED = 1
+    """The function raised an error that is no OutputError."""
+    REPORTED = 2
+    """The function raised an OutputError that names the reason of the failed call."""
+    MISREPORTED = 3
+    """The function raised another OutputError."""
+    KILLED = 9
+    """The process was ended before the call."""
+    COMPLETED = 100
+    """The function finished before the call."""
 
 
 def write_files(folder: Path, files: dict[str, str]) -> None:
@@ -97,13 +113,12 @@ SCENARIOS: dict[str, tuple[Callable[[Path], None], Callable[[Path], None]]] = {
 
 
 def run_interrupted(act: Callable[[Path], None], folder: Path, k: int, *, fail: bool) -> int:
-    """Run a function in a process whose k-th call is its last, or fails.
+    """Run a function in a process that ends before its k-th call, or whose k-th call fails.
 
     Returns
     -------
     int
-        Exit status of the process: `COMPLETED` if it made fewer calls; 0 if the failing call was tolerated,
-        2 if it was reported, 3 if another error was, and 9 if the process was ended.
+        Exit status of the process; see `ExitStatus`.
     """
     pid = os.fork()
     if pid:
@@ -120,17 +135,18 @@ def run_interrupted(act: Callable[[Path], None], folder: Path, k: int, *, fail: 
             if calls == k + 1:
                 if fail:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                os._exit(9)
+                os._exit(ExitStatus.KILLED)
 
     sys.addaudithook(count_call)
-    status = 1
+    status = ExitStatus.CRASHED
     try:
         act(folder)
-        status = 0
+        status = ExitStatus.TOLERATED if calls > k else ExitStatus.COMPLETED
     except OutputError as error:
-        status = 2 if os.strerror(errno.ENOSPC) in str(error) else 3
+        names_reason = os.strerror(errno.ENOSPC) in str(error)
+        status = ExitStatus.REPORTED if names_reason else ExitStatus.MISREPORTED
     finally:
-        os._exit(status if status != 0 or calls > k else COMPLETED)
+        os._exit(status)
 
 
 def main() -> None:
@@ -142,7 +158,7 @@ def main() -> None:
     states: list[dict[str, str]] = []
     statuses: list[int] = []
     states_after_retry: list[dict[str, str]] = []
-    while not statuses or statuses[-1] != COMPLETED:
+    while not statuses or statuses[-1] != ExitStatus.COMPLETED:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
         prepare(folder)

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from interrupted_results import COMPLETED, FOREIGN, NEW, NUMBERS, OLD, read_contents, write_files
+from interrupted_results import FOREIGN, NEW, NUMBERS, OLD, ExitStatus, read_contents, write_files
 from property_examples import count_examples
 
 from robocov.errors import InputError, OutputError, RobocovError
@@ -68,8 +68,11 @@ def test_after_an_interruption_the_folder_contains_the_old_or_the_new_result(
     assert all(state in states for state in report["states"])
     assert report["states_after_retry"] == [states[-1]]
     *statuses, last_status = report["statuses"]
-    assert len(statuses) >= 12 and last_status == COMPLETED
-    assert set(statuses) == ({9} if outcome == "kill" else {0, 2})
+    assert len(statuses) >= 12 and last_status == ExitStatus.COMPLETED
+    expected_statuses = {ExitStatus.TOLERATED, ExitStatus.REPORTED}
+    if outcome == "kill":
+        expected_statuses = {ExitStatus.KILLED}
+    assert set(statuses) == expected_statuses
 
 
 @pytest.mark.parametrize("has_manifest", [True, False])

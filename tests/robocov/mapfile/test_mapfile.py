@@ -354,16 +354,22 @@ def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
         save_map(from_json(DOCUMENT), tmp_path / "none" / "m.json")
 
 
-def test_links_are_kept_when_saving(tmp_path: Path) -> None:
-    (tmp_path / "there").mkdir()
+def test_a_broken_link_is_rejected(tmp_path: Path) -> None:
     link = tmp_path / "m.json"
-    link.symlink_to(tmp_path / "there" / "real.json")
+    link.symlink_to(tmp_path / "missing.json")
     with pytest.raises(OutputError, match="expected a file, got a broken link"):
         save_map(from_json(DOCUMENT), link)
-    (tmp_path / "there" / "real.json").touch()
+
+
+def test_saving_to_a_link_writes_its_target(tmp_path: Path) -> None:
+    target = tmp_path / "folder" / "target.json"
+    target.parent.mkdir()
+    target.touch()
+    link = tmp_path / "m.json"
+    link.symlink_to(target)
     save_map(from_json(DOCUMENT), link)
     assert link.is_symlink()
-    assert load_map(tmp_path / "there" / "real.json") == from_json(DOCUMENT)
+    assert load_map(target) == from_json(DOCUMENT)
 
 
 def test_an_invalid_map_is_not_written(tmp_path: Path) -> None:

@@ -57,13 +57,14 @@ def test_gains_with_a_former_spelling_are_loaded_with_the_present_one(record: Re
     assert Record.load(tmp_path).gains == {"neighbors": 3.0}
 
 
-def test_former_keys_of_joins_and_edits_are_read(record: Record, tmp_path: Path) -> None:
+def test_keys_of_earlier_formats_are_read(record: Record, tmp_path: Path) -> None:
     session = {
         "edits": [{"from_s": 0.0, "to_s": 0.5, "robots": [1]}],
         "placements": [{"time_s": 0.2, "robots": [1]}],
     }
     conditions = Conditions(joins=((2, 0.5, (1.0, 1.0)),))
-    joined = (JoinedRobot(2, 0.5, (1.0, 1.5), (1.0, 1.0)),)
+    joined_robot = JoinedRobot(robot=2, time=0.5, position=(1.0, 1.5), requested_position=(1.0, 1.0))
+    joined = (joined_robot,)
     saved = replace(record, session=session, conditions=conditions, joined=joined)
     saved.save(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())

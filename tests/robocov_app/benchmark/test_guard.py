@@ -195,7 +195,7 @@ def test_channels_are_reported(tmp_path: Path) -> None:
 
 
 def test_each_process_has_a_copy_of_the_machine_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process that changes a file in its cache changes that of no other process."""
+    """A process that changes its cached code does not change it for other processes."""
     shared = tmp_path / "robocov-1"
     shared.mkdir()
     (shared / "kernel.nbi").write_text("code")

@@ -1,11 +1,12 @@
 """Moving obstacles in the editor: drawing, editing and saving their paths, and showing their motion."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from driven_editor import build_sheet, open_editor
+from driven_editor import EditorDriver, build_sheet, open_editor
 
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -138,37 +139,67 @@ def test_paths_are_saved() -> None:
 # the tool
 
 
-def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
+@pytest.fixture
+def cart_driver(tmp_path: Path) -> Iterator[EditorDriver]:
+    """An editor with a cart and a desk; clicks are not snapped."""
     with open_editor(tmp_path, build_sheet(CART, DESK)) as driver:
-        editor = driver.editor
-        editor.snaps = set()
-        driver.press_key("o")
-        driver.click_all((4.0, 4.0))
-        assert "Click the obstacle" in editor.message
-        driver.click_all((2.0, 2.0), (2.1, 2.1))
-        assert editor.selection == Selection.of(0) and paths.list_moving_obstacles(driver.sketch) == ()
-        driver.click_all((6.0, 2.0), (6.0, 5.0))
-        points = np.array(get_path(driver.sketch).points)
-        np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
-        # A click on a leg inserts a waypoint.
-        driver.click_all((4.0, 2.0))
-        assert len(get_path(driver.sketch).points) == 4
-        np.testing.assert_allclose(get_path(driver.sketch).points[1], (4.0, 2.0), atol=0.03)
-        driver.wait()
-        driver.drag_at((4.0, 2.0), (4.0, 2.5), (4.0, 3.0))
-        np.testing.assert_allclose(get_path(driver.sketch).points[1], (4.0, 3.0), atol=0.03)
-        driver.press_key("backspace")
-        np.testing.assert_allclose(get_path(driver.sketch).points, points, atol=1e-9)
-        driver.type("0.25")
-        driver.press_key("return")
-        assert get_path(driver.sketch).speed == 0.25
-        driver.press_key("shift+o")
-        assert get_path(driver.sketch).repeat == "loop"
-        for _ in range(6):
-            driver.press_key("ctrl+z")
-        assert len(get_path(driver.sketch).points) == 2
-        driver.press_key("ctrl+z")
-        assert paths.list_moving_obstacles(driver.sketch) == ()
+        driver.editor.snaps = set()
+        yield driver
+
+
+def draw_path(driver: EditorDriver) -> None:
+    """Give the cart a path of three waypoints."""
+    driver.press_key("o")
+    driver.click_all((2.0, 2.0), (6.0, 2.0), (6.0, 5.0))
+
+
+def test_an_obstacle_is_chosen_before_its_path_is_drawn(cart_driver: EditorDriver) -> None:
+    cart_driver.press_key("o")
+    cart_driver.click_all((4.0, 4.0))
+    assert "Click the obstacle" in cart_driver.editor.message
+    # The second click is also on the cart, so it adds no waypoint.
+    cart_driver.click_all((2.0, 2.0), (2.1, 2.1))
+    assert cart_driver.editor.selection == Selection.of(0)
+    assert paths.list_moving_obstacles(cart_driver.sketch) == ()
+
+
+def test_clicks_add_waypoints_and_each_is_undone(cart_driver: EditorDriver) -> None:
+    draw_path(cart_driver)
+    points = get_path(cart_driver.sketch).points
+    np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
+    cart_driver.press_key("ctrl+z")
+    assert len(get_path(cart_driver.sketch).points) == 2
+    cart_driver.press_key("ctrl+z")
+    assert paths.list_moving_obstacles(cart_driver.sketch) == ()
+
+
+def test_a_waypoint_is_inserted_dragged_and_deleted(cart_driver: EditorDriver) -> None:
+    draw_path(cart_driver)
+    before = get_path(cart_driver.sketch)
+    # A click on a leg inserts a waypoint.
+    cart_driver.click_all((4.0, 2.0))
+    assert len(get_path(cart_driver.sketch).points) == 4
+    np.testing.assert_allclose(get_path(cart_driver.sketch).points[1], (4.0, 2.0), atol=0.03)
+    cart_driver.wait()
+    cart_driver.drag_at((4.0, 2.0), (4.0, 2.5), (4.0, 3.0))
+    np.testing.assert_allclose(get_path(cart_driver.sketch).points[1], (4.0, 3.0), atol=0.03)
+    cart_driver.press_key("backspace")
+    np.testing.assert_allclose(get_path(cart_driver.sketch).points, before.points, atol=1e-9)
+    # The three edits are undone one by one.
+    cart_driver.press_key("ctrl+z", times=3)
+    assert get_path(cart_driver.sketch) == before
+
+
+def test_speed_and_repetition_are_changed_by_keys(cart_driver: EditorDriver) -> None:
+    draw_path(cart_driver)
+    before = get_path(cart_driver.sketch)
+    cart_driver.type("0.25")
+    cart_driver.press_key("return")
+    assert get_path(cart_driver.sketch).speed == 0.25
+    cart_driver.press_key("shift+o")
+    assert get_path(cart_driver.sketch).repeat == "loop"
+    cart_driver.press_key("ctrl+z", times=2)
+    assert get_path(cart_driver.sketch) == before
 
 
 def test_the_tool_continues_with_another_obstacle(tmp_path: Path) -> None:

@@ -155,22 +155,29 @@ def test_selections_can_be_united_and_toggled(sketch):
     assert not gone.restrict_to(Sketch())
 
 
-def test_selections_are_described(sketch):
-    vertex = frozenset({Vertex(0, 0, 0), Vertex(0, 0, 1)})
-    words = {
-        "nothing": Selection(),
-        "circle “lamp”": Selection.of(1),
-        "polygon": Selection.of(0),
-        "2 obstacles": Selection.of(0, 1),
-        "start “disc”": Selection.of("disc"),
-        "2 starts": Selection.of("disc", "two"),
-        "boundary": Selection(boundary=True),
-        "2 vertices": Selection(vertices=vertex),
-        "vertex": Selection(vertices=frozenset({Vertex(0, 0, 0)})),
-        "3 objects": Selection.of(0, 1, "disc"),
-    }
-    for expected, selection in words.items():
-        assert selection.describe(sketch) == expected
+VERTEX = Vertex(0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("selection", "description"),
+    [
+        pytest.param(Selection(), "nothing", id="nothing"),
+        pytest.param(Selection.of(1), "circle “lamp”", id="named obstacle"),
+        pytest.param(Selection.of(0), "polygon", id="obstacle"),
+        pytest.param(Selection.of(0, 1), "2 obstacles", id="obstacles"),
+        pytest.param(Selection.of("disc"), "start “disc”", id="start"),
+        pytest.param(Selection.of("disc", "two"), "2 starts", id="starts"),
+        pytest.param(Selection(boundary=True), "boundary", id="boundary"),
+        pytest.param(Selection(vertices=frozenset({VERTEX})), "vertex", id="vertex"),
+        pytest.param(Selection(vertices=frozenset({VERTEX, Vertex(0, 0, 1)})), "2 vertices", id="vertices"),
+        pytest.param(Selection.of(0, 1, "disc"), "3 objects", id="objects"),
+    ],
+)
+def test_selections_are_described(sketch, selection, description):
+    assert selection.describe(sketch) == description
+
+
+def test_the_boundary_has_a_name_for_the_user(sketch):
     assert sketch.display_name(BOUNDARY) == "boundary"
 
 

@@ -83,11 +83,17 @@ def test_blocks_fill_the_size_of_their_model_and_turn_about_its_origin(tmp_path:
         table ( pose [5 1 0 90] )
     """
     foreign = read(tmp_path, text, around=0.5)
-    parts = shapely.MultiPolygon([box(0, 0, 3, 1), shapely.Polygon([(0, 1), (0.5, 1), (0, 2)])])
-    table = affinity.translate(affinity.rotate(affinity.translate(parts, -0.5, -1), 90, origin=(0, 0)), 5, 1)
+    # The blocks, which are 6 x 2, fill the size of 3 x 2 m.
+    blocks = shapely.union_all([box(0, 0, 3, 1), shapely.Polygon([(0, 1), (0.5, 1), (0, 2)])])
+    # The middle of the size is at (1.5, 1), and the origin of the model is at [1, 0] from there.
+    about_origin = affinity.translate(blocks, 1 - 1.5, -1)
+    turned = affinity.rotate(about_origin, 90, origin=(0, 0))
+    table = affinity.translate(turned, 5, 1)
     low_x, low_y, high_x, high_y = table.bounds
+    # The free space reaches 0.5 m around the table (option `around`).
     hull = box(low_x - 0.5, low_y - 0.5, high_x + 0.5, high_y + 0.5)
-    assert (hull - foreign.free).symmetric_difference(table.buffer(0)).area == pytest.approx(0, abs=1e-9)
+    solid = hull - foreign.free
+    assert solid.symmetric_difference(table).area == pytest.approx(0, abs=1e-9)
 
 
 def test_units_and_older_syntax_are_accepted(tmp_path: Path) -> None:

@@ -137,32 +137,38 @@ def test_buttons_of_the_panel_run_commands(shared: Driver, commands: list[Comman
             assert button.key in names or button.key.partition(":")[0] in own_keys, button.key
 
 
-def prepare(driver: Driver) -> None:
+def prepare_session(driver: Driver) -> None:
     """Bring a window into a state in which every command changes something."""
     window = driver.window
     viewer = driver.viewer
     session = driver.session
+    # Nothing that the previous command has opened may cover the map.
     window.help_page.close()
     window.dialogs.close()
     window.lesson.end()
+    # A run of two panes, so that one can be closed and the other one selected.
     viewer.attempt(lambda: viewer.files.open_map("square"))
     while len(session.timeline.panes) > 1:
         session.remove_pane(session.timeline.panes[-1])
     viewer.comparison.add_pane("rpf")
     for _ in range(90):
         session.playback.step()
+    # A selected robot, an edit that can be undone, and one that can be redone.
     viewer.inspection.selected = 2
     session.add_robot((8.0, 8.0))
     session.add_robot((8.0, 2.0))
     session.undo()
     session.playback.is_playing = False
+    # A polygon that can be finished or canceled.
     run_command(viewer, "tool:polygon")
     viewer.tool.press(session, build_event((6.0, 6.0)))
     viewer.tool.press(session, build_event((7.0, 6.0)))
     viewer.tool.press(session, build_event((7.0, 7.0)))
     viewer.tool.move(session, build_event((6.5, 7.5)))
+    # A displayed time between the start and the end of the run.
     session.playback.step()
     session.show_time(0.7)
+    # A view that does not show the whole map, so that it can be fitted.
     window.canvas.camera.fit()
     window.canvas.zoom(1.4, (200, 200))
     window.canvas.camera.pan(20, 20)
@@ -210,7 +216,7 @@ def test_every_command_changes_something(shared: Driver) -> None:
     for command in shared.window.commands.commands:
         if command.name in UNTRIED or command.argument is not None:
             continue
-        prepare(shared)
+        prepare_session(shared)
         before = list_state(shared)
         shared.window.run_command(command.name)
         assert list_state(shared) != before, command.name
