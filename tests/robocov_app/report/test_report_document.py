@@ -20,6 +20,7 @@ from robocov_app.report.document import MAX_WORD_CHARS, build_report
 from robocov_app.report.results.result import DamagedRun
 from robocov_app.runs.saved_runs import SavedRun
 
+MAX_PAGE_BYTES = 3_000_000
 SWEEP = [
     build_run(
         name, seed, base + 0.2 * seed + 0.3 * k, gains=(("k_rep", k), ("limit", None if k > 1 else 2.0))
@@ -132,7 +133,7 @@ def test_the_same_results_give_the_same_bytes() -> None:
 
 
 @pytest.mark.slow
-def test_fifty_runs_take_less_than_three_megabytes() -> None:
+def test_fifty_runs_take_less_than_three_megabytes_at_two_frames_per_second() -> None:
     runs = [
         build_run(name, seed, 2.0 + 0.1 * seed, robots=6, map_name=("rooms", "flat")[seed % 2])
         for seed in range(25)
@@ -140,9 +141,11 @@ def test_fifty_runs_take_less_than_three_megabytes() -> None:
     ]
     page = build_report([build_recorded_result(runs, seconds=60.0, hz=60.0)])
     assert page.shown == (50,)
-    assert len(page.html.encode()) < 3_000_000
+    assert len(page.html.encode()) < MAX_PAGE_BYTES
     data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page.html)[1])
     assert len(data["runs"]) == 50
+    # Runs that are too large for a page are embedded at a lower rate. At 2 Hz, robots at their maximum speed
+    # of 1 m/s still move by no more than 0.5 m from frame to frame.
     assert data["rate"] >= 2.0
 
 
@@ -154,7 +157,7 @@ def test_fifty_long_runs_of_large_teams_take_less_than_three_megabytes() -> None
     loaded = {each.folder: SavedRun(each.folder, saved.record, saved.history) for each in runs}
     page = build_report([build_result(runs, loaded=loaded, maps={"rooms": ROOMS})])
     assert page.shown == (50,)
-    assert len(page.html.encode()) < 3_000_000
+    assert len(page.html.encode()) < MAX_PAGE_BYTES
 
 
 @pytest.mark.slow
