@@ -124,16 +124,23 @@ def test_entries_with_failed_runs_are_neither_in_plots_nor_hidden() -> None:
     assert "<td>2,\n1 failed</td>" in row and "<td>50%</td>" in row and "<td>∞</td>" in row
 
 
+def build_unfinished_atlas() -> dict[str, Any]:
+    """Return the result of Atlas with shared maps without its runs on the two last tracks of large plans."""
+    (result,) = copy.deepcopy(select_bundled_results("atlas-shared"))
+    result["rows"] = [row for row in result["rows"] if row["track"] not in ("plans-large", "plans-crowd")]
+    return result
+
+
 @pytest.mark.usefixtures("without_plots")
 def test_unranked_entries_with_the_smallest_gap_are_named() -> None:
     """The oracle has even smaller gaps, but does not compete."""
-    page = build_page(select_bundled_results("atlas-shared", "rapf", "oracle"), "Test")
+    page = build_page([build_unfinished_atlas(), *select_bundled_results("rapf", "oracle")], "Test")
     assert "have no rank: Atlas, shared maps (Plans small, Plans medium)." in page
 
 
 @pytest.mark.usefixtures("without_plots")
 def test_files_do_not_hide_bundled_entries_with_the_smallest_gap() -> None:
-    results = select_bundled_results("atlas-shared", "rapf")
+    results = [build_unfinished_atlas(), *select_bundled_results("rapf")]
     forged = copy.deepcopy(results[1])
     forged["is_bundled"] = False
     for row in forged["rows"]:

@@ -154,7 +154,7 @@ def test_a_comparison_never_refers_to_folders_outside(
         '{"format": "robocov-comparison", "version": 1, "folders": ["on"]}'
     )
     (inner / "on").symlink_to(tmp_path / "run")
-    assert "on: expected a folder inside the folder of the comparison, got a link" in read_error(
+    assert "on: expected a subfolder of the comparison, got a symbolic link" in read_error(
         capsys, "metrics", str(inner)
     )
 

@@ -38,7 +38,7 @@ def test_a_valid_sketch_can_be_loaded(tmp_path):
 def test_an_existing_file_is_not_overwritten_without_permission(tmp_path):
     path = tmp_path / "map.json"
     path.write_text("precious")
-    with pytest.raises(FileChangedError, match="it already exists"):
+    with pytest.raises(FileChangedError, match="this file already exists"):
         write_sketch(SKETCH, path)
     assert path.read_text() == "precious"
     disk = write_sketch(SKETCH, path, overwrites=True)

@@ -36,7 +36,7 @@ def get_texts(texts: Iterable[Text]) -> list[str]:
 
 def test_runs_without_a_limit_are_at_the_right_end() -> None:
     axes = plot_results(GAINS, VALUES)
-    assert get_texts(axes.get_xticklabels()) == ["0.1", "0.3", "1", "3", "none"]
+    assert get_texts(axes.get_xticklabels()) == ["0.1", "0.3", "1", "3", "no limit"]
     points = axes.lines[0].get_xdata()
     assert np.isfinite(points).all()
     assert points.max() == axes.get_xticks()[-1]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 from robocov.environment import CircleObstacle, DiscStart
 from robocov_app.editor.editor import Editor
@@ -195,7 +194,10 @@ def _build_setting_field(word: str, tip: str) -> PanelField:
     def read(editor: Editor) -> str:
         return format_number(getattr(editor, SETTING_ATTRIBUTES[word]))
 
-    return PanelField(read, partial(run_typed_command, word=word), tip)
+    def write(editor: Editor, text: str) -> None:
+        run_typed_command(editor, word, text)
+
+    return PanelField(read, write, tip)
 
 
 def _build_length_field(attribute: str, word: str, tip: str) -> PanelField:

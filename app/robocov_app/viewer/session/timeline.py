@@ -178,15 +178,11 @@ class Timeline:
         """Simulate one step. Controllers may raise any exception."""
         self.is_advancing = True
         try:
-            self._advance()
+            self.head.automatic_events.update(self.run.advance())
         except RobocovError:
             # The error was expected, and nothing has to be restored.
             self.is_advancing = False
             raise
-        self.is_advancing = False
-
-    def _advance(self) -> None:
-        self.head.automatic_events.update(self.run.advance())
         # A branch may have started within a node whose edits lasted several steps, such as a drag.
         self.head.apply_edits(self.run)
         self.head.last_step = max(self.head.last_step, self.step)
@@ -194,6 +190,7 @@ class Timeline:
         self._repeat_followed_edits()
         if self.step % STEPS_BETWEEN_SETTLED_CHECKS == 0:
             self.is_settled = Present(self.head, self.run, self.history).has_settled()
+        self.is_advancing = False
 
     def follow(self, node: Node | None) -> None:
         """Repeat the edits on the path to a node when their step is reached; None to stop this."""
