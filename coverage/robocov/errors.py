@@ -287,7 +287,8 @@ def quote(value: object) -> str:
         text = repr(value)
     except Exception:  # The `__repr__` of a user's class may fail.
         text = f"<{type(value).__name__}>"
-    return _shorten(" ".join(text.split()))
+    # The `repr` of a string is on one line already, and its spaces belong to the value.
+    return _shorten(text if type(value) is str else " ".join(text.split()))
 
 
 def quote_json(value: object) -> str:

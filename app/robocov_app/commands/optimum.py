@@ -138,6 +138,8 @@ def _build_problem(options: Arguments) -> _Problem:
             saved_runs=[],
         )
     saved_runs = load_saved_runs(options.run)
+    for saved in saved_runs:
+        _check_run(saved, saved_runs[0])
     record = saved_runs[0].record
     return _Problem(
         environment=record.environment,
@@ -145,6 +147,20 @@ def _build_problem(options: Arguments) -> _Problem:
         radius=float(record.team.radius.max()),
         saved_runs=saved_runs,
     )
+
+
+def _check_run(saved: SavedRun, first: SavedRun) -> None:
+    """Raise InputError unless one placement is best throughout a run, and for the first run as well."""
+    record = saved.record
+    if record.environment.has_moving_obstacles or not record.is_working.all():
+        raise InputError(
+            f"{saved.folder}: expected a run without moving obstacles, failures and joins, got one with some"
+        )
+    robots = len(first.record.team)
+    if len(record.team) != robots:
+        raise InputError(
+            f"{saved.folder}: expected {robots} robots as in {first.folder}, got {len(record.team)}"
+        )
 
 
 def _search(options: Arguments, problem: _Problem) -> Optimum:
@@ -184,9 +200,6 @@ def _compute_run_gaps(options: Arguments, problem: _Problem, best: Optimum) -> l
     cost = build_cost(problem.environment, options.lattice, radius=problem.radius, quiet=options.json)
     gaps = []
     for saved in problem.saved_runs:
-        if len(saved.record.team) != problem.robots:
-            expected = f"expected {problem.robots} robots as in {problem.saved_runs[0].folder}"
-            raise InputError(f"{saved.folder}: {expected}, got {len(saved.record.team)}")
         result = cost(saved.record.positions[-1])
         gap = None
         if abs(result.uncovered_area - best.uncovered_area) < AREA_TOLERANCE_M2:

@@ -129,7 +129,7 @@ class Recorder:
             label=to_one_line(self.controller.label),
             gains=self._gains,
             start=self.start,
-            seed=self.seed,
+            seed=None if self.seed is None else int(self.seed),
             dt=self.dt,
             time=np.array(self._times),
             positions=arrays["positions"],

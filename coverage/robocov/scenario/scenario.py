@@ -11,6 +11,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from robocov.conditions import PARAMETERS as CONDITION_PARAMETERS
@@ -169,12 +170,13 @@ class Scenario:
             "environment": environment if isinstance(environment, Environment) else load_map(environment),
             "team": _build_team(team, robots, state),
             "start": start,
-            "seed": seed,
+            # JSON has no numbers of NumPy.
+            "seed": None if seed is None else int(seed),
             "given_starts": given_starts,
             "velocities": velocities,
             "steering": steering,
             "duration": require_number("duration", duration, 0.0, MAX_DURATION_S, "s"),
-            "dt": dt,
+            "dt": float(dt),
             "conditions": conditions,
             "source": source,
             **_describe_controller(controller, gains),
@@ -215,7 +217,7 @@ class Scenario:
         return round(self.duration / self.dt)
 
     def check(self) -> None:
-        """Check everything that is otherwise only checked when a run starts.
+        """Check what is otherwise only checked when a run starts, except for given starts.
 
         If the controller is in a file, this runs the code of the file.
 
@@ -419,8 +421,12 @@ class Scenario:
         Raises
         ------
         ParameterError
-            If the controller of the record is neither built in nor in a file.
+            If the controller of the record is neither built in nor in a file, or if the record starts later
+            than at 0 s although obstacles move, or robots fail or join: a scenario always starts at 0 s.
         """
+        has_failures_or_joins = record.conditions is not None and record.conditions.has_team_changes
+        if record.time[0] > 0.0 and (has_failures_or_joins or record.environment.has_moving_obstacles):
+            raise ParameterError(f"record: expected a run that starts at 0 s, got {record.time[0]:g} s")
         velocities = record.velocities[0] if record.velocities[0].any() else None
         steering = None if record.steering is None else record.steering[0]
         return cls(
@@ -666,7 +672,8 @@ def _describe_controller(
             # This checks the name and the gains. A controller in a file ("file:class") is only checked when
             # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
-        return {"controller": controller, "gains": dict(gains or {}), "_controller_object": None}
+        plain_gains = {name: _to_plain_value(value) for name, value in (gains or {}).items()}
+        return {"controller": controller, "gains": plain_gains, "_controller_object": None}
     if gains:
         raise ParameterError("gains: expected none together with a controller object, which has its own")
     team_controller = require_controller(controller)
@@ -675,6 +682,11 @@ def _describe_controller(
         "gains": get_gain_values(unwrap_controller(team_controller)),
         "_controller_object": team_controller,
     }
+
+
+def _to_plain_value(value: Any) -> Any:
+    """Convert a number of NumPy to one of Python, for JSON; return anything else unchanged."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _load_environment(content: str | dict[str, Any], source_name: str, folder: Path | None) -> Environment:

@@ -415,7 +415,7 @@ class SimulationBatch:
         joint_record = recorder.record()
         records = []
         for run, run_bytes in enumerate(np.transpose(sent_bytes)):
-            seed = None if seeds is None else seeds[run]
+            seed = None if seeds is None else int(seeds[run])
             record = self._extract_record(joint_record, run, seed=seed)
             # Records of runs without messages have no sent bytes.
             if run_bytes.any():

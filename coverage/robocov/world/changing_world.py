@@ -154,11 +154,12 @@ class ChangingWorld:
     def _change_team(self, time: float) -> None:
         """Apply the changes of the team up to a time: stop robots that fail, and place robots that join."""
         is_working = self._conditions.find_working_robots(time, len(self.team))
-        failed = self._conditions.find_failed_robots(time, len(self.team))
+        is_present = self.is_working | self._failed
+        # A robot that fails in the step in which it would join never enters.
+        failed = self._conditions.find_failed_robots(time, len(self.team)) & is_present
         if (is_working == self.is_working).all() and (failed == self._failed).all():
             return
-        is_present = self.is_working | self._failed
-        self._failed = failed & is_present
+        self._failed = failed
         for robot in np.flatnonzero(is_working & ~is_present).tolist():
             self.positions[robot] = self._find_joining_position(robot, is_present, time)
             is_present[robot] = True

@@ -50,6 +50,28 @@ def test_a_run_continues_from_its_state() -> None:
     np.testing.assert_array_equal(rest_record.positions, record.positions[10:])
 
 
+def test_numbers_of_numpy_are_saved(tmp_path: Path) -> None:
+    gains = {"neighbors": np.int64(3)}
+    scenario = rc.Scenario(
+        ROOM, "poduri", gains, robots=2, seed=np.int64(4), duration=0.1, dt=np.float32(0.05)
+    )
+    scenario.save(tmp_path / "scenario.json")
+    assert rc.Scenario.load(tmp_path / "scenario.json").to_json() == scenario.to_json()
+    scenario.run().save(tmp_path / "run")
+    assert rc.Record.load(tmp_path / "run").seed == 4
+    batch = rc.SimulationBatch(ROOM, rc.Rapf(), [scenario.starts])
+    batch.run(0.1, seeds=np.arange(1))[0].save(tmp_path / "batch")
+    assert rc.Record.load(tmp_path / "batch").seed == 0
+
+
+def test_a_record_that_starts_after_a_failure_is_no_scenario() -> None:
+    scenario = rc.Scenario(ROOM, robots=2, conditions=Conditions(failures=(Failure(2, 0.1),)))
+    simulation = scenario.build_simulation()
+    simulation.run(0.2)
+    with pytest.raises(ParameterError, match=r"expected a run that starts at 0 s, got 0\.2 s"):
+        rc.Scenario.from_record(simulation.run(0.2))
+
+
 def test_a_record_is_thinned_and_a_run_is_stopped() -> None:
     scenario = rc.Scenario(ROOM, robots=2, duration=0.5)
     steps: list[int] = []

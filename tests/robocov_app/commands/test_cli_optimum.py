@@ -95,6 +95,18 @@ def test_a_comparison_has_a_gap_for_each_controller(
 
 
 @pytest.mark.usefixtures("no_figures")
+@pytest.mark.parametrize("change", ["--fail=2@0.1", "--join=2@9"])
+def test_a_run_in_which_the_team_changes_is_rejected(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str
+) -> None:
+    out = tmp_path / "run"
+    assert main(["run", "trap", *SHORT, "--robots", "4", change, "--out", str(out)]) == 0
+    capsys.readouterr()
+    assert main(["optimum", "--run", str(out), *FAST]) == 2
+    assert "expected a run without moving obstacles, failures and joins" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("no_figures")
 def test_a_run_that_covers_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     halves = Environment(
         "halves",

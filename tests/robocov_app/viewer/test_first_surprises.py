@@ -11,6 +11,7 @@ import pytest
 from driven_window import Driver, build_key_event, open_viewer
 from sample_sessions import HALL, advance_session
 
+from robocov.conditions import Conditions, Failure
 from robocov.environment import WallObstacle
 from robocov.errors import StartError
 from robocov.mapfile import save_map
@@ -126,6 +127,15 @@ def test_a_comparison_says_what_it_does_not_repeat(driver: Driver) -> None:
     )
     driver.press_key("ctrl+z")
     assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed", "robot 1 was moved"]
+
+
+def test_a_comparison_repeats_failures_of_the_conditions(tmp_path: Path) -> None:
+    conditions = Conditions(failures=(Failure(2, 0.1),))
+    with open_viewer(tmp_path, conditions=conditions) as driver:
+        advance_session(driver.session, 12)
+        assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed"]
+        driver.add_pane()
+        assert driver.viewer.message == "Both controllers start again at 0 s."
 
 
 @pytest.mark.parametrize("key", ["f1", "k"])

@@ -95,6 +95,19 @@ def test_drafts_are_not_saved_at_each_frame(tmp_path: Path) -> None:
     workspace.close()
 
 
+def test_a_draft_contains_an_undo_at_the_same_step(tmp_path: Path) -> None:
+    session = advance_session(start_session(), 5)
+    workspace = SessionWorkspace(session, tmp_path)
+    session.fail_robot(2)
+    workspace.save_draft({}, at_once=True)
+    session.undo()
+    crash_after_draft(workspace)
+    (draft,) = find_recoverable_drafts(tmp_path)
+    recovered, _ = recover_draft(draft, (), tmp_path)
+    assert recovered.session.displayed.numbers == (1, 2, 3)
+    recovered.close()
+
+
 def test_a_session_is_saved_and_opened_in_the_window(tmp_path: Path) -> None:
     with open_viewer(tmp_path) as driver:
         advance_session(driver.session, 10).fail_robot(2)

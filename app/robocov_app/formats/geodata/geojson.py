@@ -24,7 +24,15 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import Environment
-from robocov.errors import JsonPath, ParameterError, RobocovError, format_path, quote, to_one_line
+from robocov.errors import (
+    JsonPath,
+    ParameterError,
+    RobocovError,
+    format_count,
+    format_path,
+    quote,
+    to_one_line,
+)
 from robocov.files.writing import replace_file
 from robocov.optional_imports import import_optional
 from robocov.typing import FloatArray
@@ -359,7 +367,8 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     if written.crosses_antimeridian:
         notes.append("longitudes continue beyond 180 degrees: shapes are not cut at the antimeridian")
     if written.lost:
-        notes.append(f"{written.lost} shapes vanish with {digits} decimals")
+        verb = "vanishes" if written.lost == 1 else "vanish"
+        notes.append(f"{format_count(written.lost, 'shape')} {verb} with {digits} decimals")
     members = json.dumps(header, ensure_ascii=False, indent=1).removesuffix("\n}")
     lines = ",\n".join(written.features)
     with replace_file(path) as temporary:

@@ -10,6 +10,7 @@ from robocov_app.viewer.panel.parameters import (
     replace_limit,
 )
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
+from robocov_app.viewer.session.timeline import Timeline
 
 _KINDS_NOT_REPEATED = frozenset({"hand", "robot", "failure"})
 """Kinds of events that are lost when a run restarts; edited maps, controllers and limits are kept."""
@@ -45,8 +46,7 @@ class ComparisonActions:
         """
         viewer = self._viewer
         session = viewer.session
-        events = session.timeline.events
-        dropped = [event.text for event in events if event.kind in _KINDS_NOT_REPEATED]
+        dropped = _list_dropped_events(session.timeline)
         session.add_pane(ControllerChoice(name))
         viewer.inspection.active_pane = len(session.timeline.panes) - 1
         pane_count = len(session.timeline.panes)
@@ -107,6 +107,19 @@ class ComparisonActions:
             viewer.session.set_properties(replace_limit(setup.properties, name, value))
         else:
             viewer.session.set_controller(viewer.pane, setup.controller.with_gain(name, value))
+
+
+def _list_dropped_events(timeline: Timeline) -> list[str]:
+    """Return the texts of the events that a restart does not repeat."""
+    # Failures and joins that the conditions cause happen again; drags of a replayed record do not.
+    repeated = set()
+    for node in timeline.document.get_path(timeline.head):
+        repeated |= {(event.kind, event.text) for event in node.automatic_events if event.kind != "hand"}
+    return [
+        event.text
+        for event in timeline.events
+        if event.kind in _KINDS_NOT_REPEATED and (event.kind, event.text) not in repeated
+    ]
 
 
 def _list_edits(edits: list[str]) -> str:

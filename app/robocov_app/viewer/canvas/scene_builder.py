@@ -13,6 +13,7 @@ from robocov_app.viewer.canvas.contacts import ContactFinder
 from robocov_app.viewer.costs.costs import KnownCost
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.past.decision_replay import get_sensor
 from robocov_app.viewer.session.past.states import PaneSetup
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.view import FADE_S
@@ -116,7 +117,12 @@ class SceneBuilder:
             return []
         ranges = setup.team.sensing_range
         reach = np.where(np.isfinite(ranges), ranges, UNLIMITED_SCAN_RANGE_M).tolist()
+        session = self._viewer.session
         sensor = pane.simulation.sensor
+        if not session.timeline.is_live:
+            # The sensor of the simulation senses the obstacles of the present.
+            sensor = get_sensor(setup.sensed_environment)
+            sensor.set_time(session.displayed.time)
         return [(positions[row], sensor.scan_from(positions[row], rays, reach[row])[1]) for row in rows]
 
     def _describe_cost(self, pane: Pane) -> str:

@@ -109,7 +109,7 @@ def write(environment: Environment, path: Path, options: WriteOptions) -> Export
     width, height = ((high - low) / scale).tolist()
     notes = [f"1 mm in the drawing is {scale:g} m; the drawing measures {width:.6g} x {height:.6g} mm"]
     if options.scale is not None:
-        notes.append(f"import it again with --scale {scale:g}")
+        notes.append(f"import it again with --scale {scale!r}")
     return _build_report(environment, path, writer, notes)
 
 

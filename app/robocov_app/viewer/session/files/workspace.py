@@ -51,7 +51,7 @@ class SessionWorkspace:
         self.session = session
         self.path = path
         self._saved_revision = session.timeline.document.revision if resumed is None else _NEVER_SAVED
-        self._drafted_state = (_NEVER_SAVED, _NEVER_SAVED)  # revision and step
+        self._drafted_state = (_NEVER_SAVED, _NEVER_SAVED, _NEVER_SAVED)  # revision, node and step
         self._draft_time = -DRAFT_PAUSE_S
         self._autosaver = autosave.Autosaver(folder, DRAFT_KIND, path, resumed)
 
@@ -72,7 +72,8 @@ class SessionWorkspace:
         """
         timeline = self.session.timeline
         head, step = timeline.destination
-        state = (timeline.document.revision, step)
+        # An undo changes neither the revision nor, if nothing was simulated since the edit, the step.
+        state = (timeline.document.revision, head.number, step)
         is_needed = self.has_unsaved_edits and state != self._drafted_state and timeline.is_reproducible
         is_recent = monotonic() - self._draft_time < DRAFT_PAUSE_S
         if not is_needed or (is_recent and not at_once):
