@@ -12,12 +12,13 @@ from driven_window import Driver, build_key_event, open_viewer
 from sample_sessions import HALL, advance_session
 
 from robocov.conditions import Conditions, Failure
-from robocov.environment import WallObstacle
+from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import StartError
 from robocov.mapfile import save_map
 from robocov_app.commands import demo
 from robocov_app.toolkit.window.input import drop_late_repeats
 from robocov_app.viewer.panel.parameters import list_limit_parameters
+from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import MAX_FILE_SAMPLES
 from robocov_app.viewer.session.past.curves import Curve
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
@@ -136,6 +137,25 @@ def test_a_comparison_repeats_failures_of_the_conditions(tmp_path: Path) -> None
         assert [event.text for event in driver.session.timeline.events] == ["robot 2 failed"]
         driver.add_pane()
         assert driver.viewer.message == "Both controllers start again at 0 s."
+
+
+def test_scans_of_the_past_do_not_end_at_obstacles_that_were_added_later(tmp_path: Path) -> None:
+    with open_viewer(tmp_path, shown={"robots", "scan"}) as driver:
+        session = advance_session(driver.session, 12)
+
+        def list_rays() -> list[np.ndarray]:
+            session.show_time(0.1)
+            driver.run_frames(1)
+            return [ends for _, ends in driver.window.canvas.scenes[0].scans]
+
+        rays = list_rays()
+        session.show_time(session.timeline.end_time)
+        x, y = session.timeline.panes[0].simulation.positions[0].tolist()
+        session.edit_map(add_obstacle(HALL, CircleObstacle((x + 1.0, y + 1.0), 0.3)), "circle drawn")
+        advance_session(session, 1)
+        assert len(rays) == 3
+        for later_ends, ends in zip(list_rays(), rays, strict=True):
+            np.testing.assert_array_equal(later_ends, ends)
 
 
 @pytest.mark.parametrize("key", ["f1", "k"])
