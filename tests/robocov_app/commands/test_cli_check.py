@@ -164,7 +164,7 @@ def test_a_replaced_file_is_checked_until_ctrl_c(map_file: Path, terminal: bool)
     )
     os.close(writer)
     try:
-        first = read_until(reader, b"Ctrl+C ends" if terminal else b"narrowest passage")
+        first = read_until(reader, b"Press Ctrl+C to stop" if terminal else b"narrowest passage")
         assert (b"\x1b[2J" in first) == terminal
         start = time.monotonic()
         replacement = map_file.with_suffix(".new")
