@@ -49,7 +49,7 @@ PLAN_CONTROLLERS = {
     "plans-small": ("learned", "frontier-median", "greedy-submodular", "local-search"),
     "plans-medium": ("frontier-median", "greedy-submodular", "local-search", "exemplar"),
     "plans-large": ("voronoi-graph", "local-search", "exemplar"),
-    "plans-crowd": (),
+    "plans-crowd": ("exemplar",),
 }
 """Controllers on each track of large plans, in addition to those on all of these tracks."""
 PLAN_ROWS = [
