@@ -23,7 +23,7 @@ from robocov.typing import FloatArray
 from robocov_app.commands.options import FigureOptions
 from robocov_app.render.density_text import get_cost_name, get_density_kind, list_density_lines
 from robocov_app.runs.cost import AREA_TOLERANCE_M2, MIN_FIGURE_LATTICE, build_cost, save_distance_figure
-from robocov_app.runs.saved_runs import SavedRun, load_saved_runs
+from robocov_app.runs.saved_runs import SavedRun, has_constant_setting, load_saved_runs
 from robocov_app.runs.settings import MAX_LATTICE, MIN_LATTICE
 from robocov_app.terminal.output import check_output_file, print_answer
 from robocov_app.terminal.progress import show_late_progress
@@ -152,7 +152,7 @@ def _build_problem(options: Arguments) -> _Problem:
 def _check_run(saved: SavedRun, first: SavedRun) -> None:
     """Raise InputError unless one placement is best throughout a run, and for the first run as well."""
     record = saved.record
-    if record.environment.has_moving_obstacles or not record.is_working.all():
+    if not has_constant_setting(record):
         raise InputError(
             f"{saved.folder}: expected a run without moving obstacles, failures and joins, got one with some"
         )

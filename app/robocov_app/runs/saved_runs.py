@@ -125,6 +125,20 @@ def _have_same_map(first: Environment, second: Environment) -> bool:
     return first.boundary == second.boundary and first.obstacles == second.obstacles
 
 
+def has_constant_setting(record: Record) -> bool:
+    """Return whether neither the team nor the map of a run changes, so that one placement is always best.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    bool
+    """
+    return bool(record.is_working.all()) and not record.environment.has_moving_obstacles
+
+
 def build_roster(record: Record) -> Roster:
     """Determine the numbers of the robots in a record, and the robots that failed.
 

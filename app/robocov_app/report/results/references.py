@@ -13,6 +13,7 @@ from robocov.mapfile import to_json
 from robocov.optimum import find_optimum
 from robocov.record import Record
 from robocov_app.report.results.result import Reference, ReportedResult
+from robocov_app.runs.saved_runs import has_constant_setting
 
 RESTARTS = 24
 """Number of searches for the best placement; the best result is used."""
@@ -43,18 +44,12 @@ def add_references(
     references = {}
     for count, (setting, run) in enumerate(first_runs.items(), start=1):
         record = result.read_record(run)
-        if isinstance(lattice, int) and _is_static(record):
+        if isinstance(lattice, int) and has_constant_setting(record):
             reference = _find_reference(record, lattice, search=search)
             if reference is not None:
                 references[setting] = reference
         report_progress(count)
     return replace(result, references=references)
-
-
-def _is_static(record: Record) -> bool:
-    """Return whether neither the team nor the map of a run changes."""
-    is_team_complete = bool(record.is_present.all() and record.is_working.all())
-    return is_team_complete and not record.environment.has_moving_obstacles
 
 
 def _find_reference(record: Record, lattice: int, *, search: bool) -> Reference | None:
