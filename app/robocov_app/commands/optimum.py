@@ -150,11 +150,12 @@ def _build_problem(options: Arguments) -> _Problem:
 
 
 def _check_run(saved: SavedRun, first: SavedRun) -> None:
-    """Raise InputError unless one placement is best throughout a run, and for the first run as well."""
+    """Raise InputError if the team or the map changes in a run, or its team size differs from the first."""
     record = saved.record
     if not has_constant_setting(record):
         raise InputError(
-            f"{saved.folder}: expected a run without moving obstacles, failures and joins, got one with some"
+            f"{saved.folder}: expected a run without moving obstacles, failures or joins, "
+            "because these change the best placement"
         )
     robots = len(first.record.team)
     if len(record.team) != robots:

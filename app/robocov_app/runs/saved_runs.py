@@ -115,14 +115,9 @@ def _load_comparison(path: Path) -> list[SavedRun]:
     first_environment = build_roster(saved[0].record).environment
     for run in saved[1:]:
         environment = build_roster(run.record).environment
-        if not _have_same_map(environment, first_environment):
+        if not environment.has_same_geometry(first_environment):
             raise InputError(f"{run.folder / RUN_FILE}: expected the same map as in {saved[0].folder}")
     return saved
-
-
-def _have_same_map(first: Environment, second: Environment) -> bool:
-    """Return whether two environments have the same boundary and obstacles."""
-    return first.boundary == second.boundary and first.obstacles == second.obstacles
 
 
 def has_constant_setting(record: Record) -> bool:

@@ -252,7 +252,7 @@ def halve_triangles(triangles: FloatArray) -> FloatArray:
     Parameters
     ----------
     triangles : (t, 3, 2) array
-        Vertices of the triangles, which must lie in the free space: across a wall, the bound would not hold.
+        Vertices of the triangles.
 
     Returns
     -------

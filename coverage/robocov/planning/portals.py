@@ -111,7 +111,7 @@ def _find_shortest_paths(
 
     The search starts from all source nodes at once. Costs are integers, so that equal ones are exactly equal,
     and the front is a bucket of cells for each cost (Dial's algorithm). The costs in the front differ by at
-    most that of a step, so that few buckets are needed, and each of them serves for many costs in turn.
+    most that of a step, so `_CORNER_COST + 1` buckets are enough and are reused cyclically.
     """
     height, width = is_passable.shape
     nodes = np.full((height, width), _NONE)

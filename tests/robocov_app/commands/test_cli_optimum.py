@@ -103,7 +103,7 @@ def test_a_run_in_which_the_team_changes_is_rejected(
     assert main(["run", "trap", *SHORT, "--robots", "4", change, "--out", str(out)]) == 0
     capsys.readouterr()
     assert main(["optimum", "--run", str(out), *FAST]) == 2
-    assert "expected a run without moving obstacles, failures and joins" in capsys.readouterr().err
+    assert "expected a run without moving obstacles, failures or joins" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("no_figures")

@@ -384,7 +384,7 @@ def test_a_record_is_displayed_without_its_controller(counting: ControllerChoice
 
 def test_the_package_of_a_missing_controller_without_a_file_is_suggested(counting: ControllerChoice) -> None:
     choice = find_controller(replace(record_run(counting), controller="learner"))
-    with pytest.raises(ParameterError, match="install the package that offers 'learner', or open it with"):
+    with pytest.raises(ParameterError, match="install the package that provides 'learner', or open it with"):
         choice.build()
 
 

@@ -61,8 +61,8 @@ class Outline:
         """Space for the name of the obstacle; all 0 for an empty geometry.
 
         The candidates are at the middles of two horizontal cuts: through the centroid, and through a point
-        inside. Each is moved up or down to the middle of the obstacle there. A later candidate must be wider
-        by `MIN_NAME_GAIN`.
+        inside. Each is then centered vertically in the obstacle. A later candidate replaces an earlier one
+        only if it is wider by the factor `MIN_NAME_GAIN`.
         """
         best = NameSpace()
         if self.geometry.is_empty:

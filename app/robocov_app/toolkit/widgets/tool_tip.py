@@ -120,8 +120,8 @@ def draw_tool_tip(
     page : pygame.Rect
         Position of the panel, bar or menu with the widget, px.
     side : TipSide
-        "below" the widget, or to the "left" or "right" of its page. If there is no space beside the page, the
-        tooltip is below it, and if there is no space below, above.
+        "below" the widget, or to the "left" or "right" of its page. If there is no space next to the page,
+        the tooltip is below it; if there is none below either, it is above.
     drawing : TipDrawing, optional
         Drawing below the text.
     """

@@ -118,8 +118,9 @@ class SceneBuilder:
         ranges = setup.team.sensing_range
         reach = np.where(np.isfinite(ranges), ranges, UNLIMITED_SCAN_RANGE_M).tolist()
         session = self._viewer.session
-        sensor = pane.simulation.sensor
-        if not session.timeline.is_live:
+        if session.timeline.is_live:
+            sensor = pane.simulation.sensor
+        else:
             # The sensor of the simulation senses the obstacles of the present.
             sensor = get_sensor(setup.sensed_environment)
             sensor.set_time(session.displayed.time)

@@ -78,6 +78,7 @@ class Timeline:
         self.is_record_reproducible = is_record_reproducible
         self.past_version = 0
         self.pending_seek: Seek | None = None
+        # Whether a step was started, but not completed.
         self.is_advancing = False
         self._followed_path: list[Node] = []
         self.replace_present(present or Present.start(document.nodes[0]))

@@ -119,7 +119,8 @@ class FrontierMedian(SharedMapController):
         map_window = situation.planner.map_window
         state = map_window.window.crop(situation.known_map.state, np.uint8(FREE))
         is_unknown = (state == UNKNOWN) & ~map_window.is_outside
-        # Gaps between neighboring rays are not worth a visit: only blocks of 3 x 3 unknown cells count.
+        # Gaps between neighboring rays are not worth a visit: only blocks of 3 x 3 unknown cells count. For
+        # this morphological opening, `dilate` takes less time than `scipy.ndimage`.
         is_block_center = ~dilate(~is_unknown, _DIAGONAL)
         is_in_block = dilate(is_block_center, _DIAGONAL, is_outside_marked=False)
         is_beside_area = dilate(is_in_block & ~map_window.is_near_wall, 1.0, is_outside_marked=False)

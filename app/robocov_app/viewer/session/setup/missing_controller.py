@@ -83,11 +83,10 @@ def find_controller(record: Record, controllers: Sequence[str] = ()) -> Controll
         # The user's file may have moved since the run, so that a class of the same name is enough.
         choice = ControllerChoice(same_class[0], gains)
     else:
-        advice = f"to resume the run, open it with --controller FILE.py:{class_name}"
+        advice = f"open it with --controller FILE.py:{class_name}"
         if class_name == name:
-            advice = f"to resume the run, install the package that offers {name!r}, or open it with "
-            advice += "--controller FILE.py:CLASS"
-        reason = f"{record.label} is not one of robocov's controllers; {advice}"
+            advice = f"install the package that provides {name!r}, or open it with --controller FILE.py:CLASS"
+        reason = f"{record.label} is not one of robocov's controllers; to resume the run, {advice}"
         return MissingController(name, gains, record.label, reason)
     try:
         choice.build()
