@@ -103,10 +103,10 @@ def test_panes_on_the_same_map_share_a_sensor(monkeypatch):
         return build_sensor(pieces, moving_obstacles)
 
     monkeypatch.setattr(module, "RangeSensor", count_sensor)
-    module.get_sensor.cache_clear()
+    module._build_sensor.cache_clear()
     session.show_time(0.0)
     for _ in range(5):
         for pane in session.timeline.panes:
             session.displayed.get_snapshot(pane)
     assert len(sensors) == 1
-    module.get_sensor.cache_clear()
+    module._build_sensor.cache_clear()

@@ -72,9 +72,9 @@ def sensor_calls(monkeypatch: pytest.MonkeyPatch) -> list[Environment]:
     calls: list[Environment] = []
     get_sensor = present.get_sensor
 
-    def record_call(environment):
+    def record_call(environment, time):
         calls.append(environment)
-        return get_sensor(environment)
+        return get_sensor(environment, time)
 
     monkeypatch.setattr(present, "get_sensor", record_call)
     return calls

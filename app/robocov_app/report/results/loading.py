@@ -131,10 +131,9 @@ def _check_same_map(saved_run: SavedRun, first_run: SavedRun) -> None:
     """Raise InputError if a run does not have the same map as the first run of its comparison."""
     environment = build_roster(saved_run.record).environment
     first_environment = build_roster(first_run.record).environment
-    is_same_boundary = environment.boundary == first_environment.boundary
-    if not is_same_boundary or environment.obstacles != first_environment.obstacles:
+    if not environment.has_same_geometry(first_environment):
         path = saved_run.folder / RUN_FILE
-        raise InputError(f"{path}: expected the map of {first_run.folder.name}, got a different map")
+        raise InputError(f"{path}: expected the same map as in {first_run.folder.name}")
 
 
 def _build_run(saved_run: SavedRun, content: Mapping[str, Any]) -> ReportedRun:

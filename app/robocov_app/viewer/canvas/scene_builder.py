@@ -122,8 +122,7 @@ class SceneBuilder:
             sensor = pane.simulation.sensor
         else:
             # The sensor of the simulation senses the obstacles of the present.
-            sensor = get_sensor(setup.sensed_environment)
-            sensor.set_time(session.displayed.time)
+            sensor = get_sensor(setup.sensed_environment, session.displayed.time)
         return [(positions[row], sensor.scan_from(positions[row], rays, reach[row])[1]) for row in rows]
 
     def _describe_cost(self, pane: Pane) -> str:

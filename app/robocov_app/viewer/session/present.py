@@ -290,8 +290,7 @@ def _rebuild_sensed_points(history: RunHistory, pane: Pane) -> Iterator[None]:
         time = history.get_time(index)
         state = history[index].states[pane.number]
         setup = state.setup
-        sensor = get_sensor(setup.sensed_environment)
-        sensor.set_time(time)
+        sensor = get_sensor(setup.sensed_environment, time)
         points = sensor.find_nearest_points(state.positions, setup.team.sensing_range)
         sensed.add(time, setup.numbers, points)
         yield

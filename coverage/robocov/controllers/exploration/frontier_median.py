@@ -27,7 +27,7 @@ _MIN_PROGRESS_M = 0.05
 """A robot with a goal that moves less than this between two plans is stuck."""
 _BLOCK = np.ones((3, 3), dtype=bool)
 """A cell and its eight neighbors."""
-_DIAGONAL = 1.5
+_BLOCK_RADIUS = 1.5
 """Distance to all eight neighbors of a cell, rounded up, in cells."""
 
 
@@ -121,8 +121,8 @@ class FrontierMedian(SharedMapController):
         is_unknown = (state == UNKNOWN) & ~map_window.is_outside
         # Gaps between neighboring rays are not worth a visit: only blocks of 3 x 3 unknown cells count. For
         # this morphological opening, `dilate` takes less time than `scipy.ndimage`.
-        is_block_center = ~dilate(~is_unknown, _DIAGONAL)
-        is_in_block = dilate(is_block_center, _DIAGONAL, is_outside_marked=False)
+        is_block_center = ~dilate(~is_unknown, _BLOCK_RADIUS)
+        is_in_block = dilate(is_block_center, _BLOCK_RADIUS, is_outside_marked=False)
         is_beside_area = dilate(is_in_block & ~map_window.is_near_wall, 1.0, is_outside_marked=False)
         is_frontier = (state == FREE) & ~map_window.is_near_wall & is_beside_area
         labels, _ = ndimage.label(is_frontier, _BLOCK)

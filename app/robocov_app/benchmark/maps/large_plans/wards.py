@@ -31,7 +31,7 @@ _STORAGE_DOOR_M = 2.6
 _STORAGE_SHELF_DEPTH_M = 0.7
 _HUB_CORNER_M = 4.0
 """Side of the square corners of the hub. The elevators in one of them are this deep, but wider."""
-_ELEVATORS = 2
+_ELEVATOR_COUNT = 2
 _ELEVATOR_WIDTH_M = 2.2
 _ELEVATOR_DOOR_M = 1.2
 _ELEVATOR_NICHE_M = 0.4
@@ -149,12 +149,12 @@ def _outline_elevators(half_hub: float, front: float) -> list[tuple[float, float
     """Return the outline of two elevators in the upper left corner of the hub, with recessed doors."""
     points = [(-half_hub, half_hub), (-half_hub, front)]
     door_y = front + _ELEVATOR_NICHE_M
-    for number in range(_ELEVATORS):
+    for number in range(_ELEVATOR_COUNT):
         middle = -half_hub + (number + 0.5) * _ELEVATOR_WIDTH_M
         left = middle - _ELEVATOR_DOOR_M / 2.0
         right = middle + _ELEVATOR_DOOR_M / 2.0
         points += [(left, front), (left, door_y), (right, door_y), (right, front)]
-    right_end = -half_hub + _ELEVATORS * _ELEVATOR_WIDTH_M
+    right_end = -half_hub + _ELEVATOR_COUNT * _ELEVATOR_WIDTH_M
     return [*points, (right_end, front), (right_end, half_hub)]
 
 

@@ -65,8 +65,7 @@ def _observe(state: PaneState, time: float) -> Observations:
     """Return the ideal observations of the robots, without noise and message loss."""
     team = state.setup.team
     environment = state.setup.sensed_environment
-    sensor = get_sensor(environment)
-    sensor.set_time(time)
+    sensor = get_sensor(environment, time)
     points = sensor.find_nearest_points(state.positions, team.sensing_range)
     neighbors = Neighbors.from_ranges(state.positions, team.communication_range)
     seen = Observations(
@@ -145,7 +144,13 @@ def _build_radio(setup: PaneSetup, dt: float) -> Radio:
     return Radio(setup.conditions or Conditions(), setup.team.communication_range, dt)
 
 
+def get_sensor(environment: Environment, time: float) -> RangeSensor:
+    """Return the range sensor on a map, with moving obstacles at their places at a time, in s."""
+    sensor = _build_sensor(environment)
+    sensor.set_time(time)
+    return sensor
+
+
 @lru_cache(maxsize=4)
-def get_sensor(environment: Environment) -> RangeSensor:
-    """Return the range sensor on a map, which is cached."""
+def _build_sensor(environment: Environment) -> RangeSensor:
     return RangeSensor(build_solid_pieces(environment), build_moving_obstacles(environment))
