@@ -147,7 +147,7 @@ def run_lloyd(
     Returns
     -------
     (k,) int array
-        The sources after the last step that lowers the cost.
+        The sources after the last step that saves at least a small fraction of the cost.
     """
     if is_fixed is None:
         is_fixed = np.zeros(len(sources), dtype=bool)

@@ -58,7 +58,7 @@ def compute_driving_forces(
     Notes
     -----
     For a desired velocity u, the force is ``F = ν u + m (u - q') / τ``, where q' is the current velocity, and
-    τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates the viscous drag in equation (28) of the
+    τ is `VELOCITY_TIME_CONSTANT_S`. The first term compensates for the viscous drag in equation (28) of the
     paper; the second accelerates the robot toward u.
     """
     if action == "force":

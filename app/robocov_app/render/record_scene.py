@@ -85,7 +85,7 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
     Returns
     -------
     Snapshot
-        Its cells are still those of all robots. Scans are dropped.
+        Its cells are not selected. Scans are dropped.
     """
     seen = snapshot.seen
     decision = snapshot.decision

@@ -31,6 +31,8 @@ _SQUARES_PER_SIDE = 20
 """Number of squares along a side; one measurement is stored for each square."""
 _BASIS_WIDTH = 0.8
 """Standard deviation of a basis function, relative to the distance to the next one."""
+_TIME_DIGITS = 9
+"""Number of decimal places to which the time between two plans, s, is rounded."""
 _NOISE_VARIANCE = 1e-3
 """Variance of a measurement, relative to that of the prior."""
 
@@ -212,7 +214,7 @@ class Adaptive(BaseController):
         """
         lattice = memory.lattice
         exchange = memory.parameter_exchange.forget_silent_robots(seen.neighbors)
-        dt = self.period
+        dt = self._compute_elapsed_time(seen.time, memory.plan_time)
         functions = lattice.evaluate_basis(seen.positions)
         # These are Λ and λ, after one step of the first two equations.
         matrices = memory.information_matrices + dt * functions[:, :, None] * functions[:, None]
@@ -241,6 +243,14 @@ class Adaptive(BaseController):
             information_vectors=vectors,
             parameter_exchange=exchange.start_period(),
         )
+
+    def _compute_elapsed_time(self, time: float, plan_time: float) -> float:
+        """Return the time since the last plan, s; `period` if there is none, or if the run was rewound."""
+        elapsed = time - plan_time
+        if not 0.0 < elapsed < np.inf:
+            return self.period
+        # Rounding errors of the times must not matter.
+        return round(elapsed, _TIME_DIGITS)
 
     def _learn_by_gaussian_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory after each robot has measured, with estimates from all known measurements."""

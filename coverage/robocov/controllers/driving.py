@@ -122,7 +122,7 @@ def compute_drive_forces(
     (n, 2) array, N
     """
     accelerating_forces = (velocities - seen.velocities) * (team.mass / response_time)[:, None]
-    # The second term compensates the viscosity.
+    # The second term compensates for the viscosity.
     return np.asarray(accelerating_forces + seen.velocities * team.viscosity[:, None])
 
 

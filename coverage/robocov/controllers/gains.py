@@ -290,8 +290,10 @@ def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
     """Return the gain that a dataclass field declares; None if it is not a gain.
 
     A field declares a gain by `gain` or `choice`, or by a plain number as its default. A plain number has no
-    unit and no description.
+    unit and no description. A field that cannot be set when the controller is created is not a gain.
     """
+    if not dataclass_field.init:
+        return None
     declared = dataclass_field.metadata.get(_METADATA_KEY)
     default = None if dataclass_field.default is MISSING else dataclass_field.default
     if declared is None:

@@ -23,7 +23,7 @@ class Lloyd(BaseController):
 
     Each robot moves to the centroid of its Voronoi cell at full speed, and slows down when it gets close. By
     default, its deceleration is then at most the maximum acceleration. The drive tracks this velocity and
-    compensates the viscosity. Obstacles are ignored: robots slide along them.
+    compensates for the viscosity. Obstacles are ignored: robots slide along them.
 
     A `target` other than the centroid is the optimum of the cell for another performance function f of the
     locational cost (4). With `cells` divided by time, and unequal maximum speeds, the target may lie outside

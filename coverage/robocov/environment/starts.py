@@ -322,7 +322,8 @@ def _sample_apart(rng: np.random.Generator, area: BaseGeometry, n: int, spacing:
     """Return n random points that are at least `spacing` apart, or fewer if no more are found.
 
     Three methods are tried in turn: a random packing, a random lattice, and the dense packing that
-    `Start.estimate_capacity` counts. Each finds more points than the one before, but less random ones.
+    `Start.estimate_capacity` counts. Each usually finds more points than the one before, but
+    they are less random.
     """
     if n > bound_point_count(area, spacing):
         return np.empty((0, 2))

@@ -7,6 +7,7 @@ import io
 import os
 import struct
 import time
+import tokenize
 import zipfile
 import zlib
 from collections import Counter
@@ -35,16 +36,19 @@ _MAX_READ_BYTES = 1 << 20
 entries."""
 _DAMAGE_ERRORS = (
     ValueError,
+    TypeError,
+    OverflowError,
     EOFError,
     OSError,
     MemoryError,
     NotImplementedError,
     RuntimeError,
+    struct.error,
+    tokenize.TokenError,
     zipfile.BadZipFile,
     zlib.error,
-    struct.error,
 )
-"""Errors that zipfile, zlib and numpy raise for damaged files."""
+"""Errors that zipfile, its decompressors and numpy raise for damaged files."""
 _SUFFIX = ".robocov"
 """Suffix of the files of the cache."""
 _FORMAT = b"robocov arrays 1\n"
@@ -94,7 +98,7 @@ def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) ->
 
 
 def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:
-    """Raise ValueError if entries are too large, or have the same name."""
+    """Raise ValueError if entries are too large, have the same name, or use an unusual compression."""
     # The sizes in the entries can be trusted: `zipfile` never decompresses more than the size in an entry.
     total_size = sum(entry.file_size for entry in entries)
     max_size = min(max_bytes, max(_RATIO_EXEMPT_BYTES, _MAX_COMPRESSION_RATIO * file_size))
@@ -102,7 +106,10 @@ def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, 
         raise ValueError(
             f"arrays too large: {total_size / 1e6:,.0f} MB, from a file of {file_size / 1e6:,.1f} MB"
         )
-    for name, count in Counter(entry.filename for entry in entries).items():
+    for entry in entries:
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"entry {entry.filename!r} has an unsupported compression")
+    for name, count in Counter(entry.filename.removesuffix(".npy") for entry in entries).items():
         if count > 1:
             raise ValueError(f"duplicate entry {name!r}")
 

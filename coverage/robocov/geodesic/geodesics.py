@@ -276,6 +276,8 @@ class Geodesics:
         coordinates = f"[{point[0]:.12g}, {point[1]:.12g}]"
         if not np.isfinite(point).all():
             raise InputError(f"{name}: expected finite numbers, got {coordinates}")
+        if self.free.is_empty:
+            raise InputError(f"{name}: map {self._name!r} has no free space")
         grid_position = self.grid.snap(point)
         nearest = self._find_nearest_free(grid_position)
         depth = float(np.hypot(*(nearest - grid_position))) * self.grid.spacing

@@ -14,7 +14,7 @@ import numpy as np
 from robocov.cost import CoverageCost, TimeVaryingCost
 from robocov.drawing import Drawable
 from robocov.errors import format_count, require_type
-from robocov.record import Record, select_nearest_steps
+from robocov.record import Record, require_rate, select_nearest_steps
 from robocov.typing import FloatArray
 
 DEFAULT_RATE_HZ = 10.0
@@ -142,7 +142,7 @@ def compute_cost_history(
 
 
 def select_sampled_steps(record: Record, rate: float) -> list[int]:
-    """Select the time steps nearest to multiples of 1/rate, and the last time step.
+    """Select the time steps nearest to multiples of 1/rate, and the first and last ones.
 
     Parameters
     ----------
@@ -162,6 +162,7 @@ def select_sampled_steps(record: Record, rate: float) -> list[int]:
     ParameterError
         If the rate is negative or not finite.
     """
+    require_rate(rate)
     if record.environment.has_moving_obstacles:
         rate = min(rate, MAX_RATE_WITH_MOVING_OBSTACLES_HZ)
     return [int(step) for step in select_nearest_steps(record.time, rate)]

@@ -238,13 +238,22 @@ class Results:
         if isinstance(run, str):
             return run
         if not isinstance(run, int | np.integer):
-            return str(run["run"])
+            return self._get_name_in_row(run)
         index = int(run)
         row_count = len(self)
         if not -row_count <= index < row_count:
             raise InputError(f"{self.folder}: there is no row {index} (of {format_count(row_count, 'row')})")
         row = next(islice(self.rows(["run"]), index % row_count, None))
         return str(row["run"])
+
+    def _get_name_in_row(self, row: Mapping[str, Any]) -> str:
+        try:
+            return str(row["run"])
+        except (KeyError, TypeError):
+            raise InputError(
+                f"{self.folder}: run: expected the name of a run, the index of its row, or a row with the "
+                f"column 'run', got {quote(row)}"
+            ) from None
 
     def _repr_html_(self) -> str:
         """Return the first rows as HTML, for notebooks."""

@@ -60,7 +60,7 @@ def count_starts(point_count: int) -> int:
         At least two more than the largest possible number of bins.
     """
     # The bounding box of n points has w x h bins, apart from the last row and column, with w * h <= n and
-    # max(w, h) <= n (see `sort_into_bins`). Therefore w + h <= n + 1, and (w + 1) * (h + 1) <= 2 n + 2.
+    # max(w, h) <= n (see `_fit_bins`). Therefore w + h <= n + 1, and (w + 1) * (h + 1) <= 2 n + 2.
     return 2 * point_count + 8
 
 

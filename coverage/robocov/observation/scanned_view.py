@@ -158,8 +158,9 @@ def integrate_over_edges(
 def _predict_depth(view: View, max_distances: FloatArray, rotation: int) -> FloatArray:
     """Predict the depth of each ray, (n, rays) m, on the line through the end points of the two before it.
 
-    The rays are in counter-clockwise order if `rotation` is 1, and in clockwise order if it is -1. If the
-    second ray before hits nothing, the depth of the previous ray is used.
+    The rays are in counter-clockwise order if `rotation` is 1, and in clockwise order if it is -1. The
+    prediction is never below the depth of the previous ray, which is also used if the second ray before hits
+    nothing.
     """
     inverse_distances = 1.0 / np.maximum(view.distances, _MIN_DISTANCE_M)
     # A sinusoid f satisfies f(a + b) = 2 cos(b) f(a) - f(a - b); here b is the angle between two rays.

@@ -181,7 +181,8 @@ def _compute_curvature(result: CoverageResult, min_distance: float) -> FloatArra
     """Return the curvature of the cost for each robot, (n,) 1/m, as in Weiszfeld's iteration.
 
     It is the sum of the weights of the robot's sites, each divided by the distance from the robot to its
-    first waypoint, divided by the sum of the weights of all sites. For a robot without sites, it is 1.
+    first waypoint, divided by the sum of the weights of all sites with an owner. For a robot without sites,
+    it is 1.
     """
     sites = np.flatnonzero(result.owners >= 0)
     owners = result.owners[sites]

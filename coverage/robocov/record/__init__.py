@@ -12,6 +12,14 @@ from robocov.record.package_versions import list_versions
 from robocov.record.record import Record
 from robocov.record.record_arrays import ARRAYS
 from robocov.record.recorder import Recorder
-from robocov.record.sampling import TIME_ROUNDING_S, select_nearest_steps
+from robocov.record.sampling import TIME_ROUNDING_S, require_rate, select_nearest_steps
 
-__all__ = ["ARRAYS", "TIME_ROUNDING_S", "Record", "Recorder", "list_versions", "select_nearest_steps"]
+__all__ = [
+    "ARRAYS",
+    "TIME_ROUNDING_S",
+    "Record",
+    "Recorder",
+    "list_versions",
+    "require_rate",
+    "select_nearest_steps",
+]

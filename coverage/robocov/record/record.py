@@ -196,7 +196,8 @@ class Record(Drawable):
         Returns
         -------
         VoronoiPartition or WeightedCells
-            One cell for each working robot. `WeightedCells` if `has_travel_time_cells`.
+            One cell for each working robot. `WeightedCells` if `has_travel_time_cells` and not all working
+            robots are equally fast.
         """
         is_working = self.is_working[step]
         positions = self.positions[step][is_working]
@@ -222,7 +223,8 @@ class Record(Drawable):
         Notes
         -----
         The observations contain only what is recorded: true positions instead of noisy ones, the density even
-        if the robots had to measure it, and no scans or messages. The decision has no force terms.
+        if the robots had to measure it, and no scans or messages. The decision has no force terms, and its
+        cells, if any, are those of the working robots only.
         """
         neighbors = Neighbors.from_ranges(self.positions[k], self.team.communication_range)
         is_working = None

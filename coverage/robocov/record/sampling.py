@@ -13,6 +13,22 @@ _TIE_DECIMALS = 6
 """Number of decimals, in periods, to which distances are compared; further decimals are rounding errors."""
 
 
+def require_rate(rate: float) -> None:
+    """Raise a ParameterError unless a rate in Hz is a finite number of at least 0.
+
+    Parameters
+    ----------
+    rate : float, Hz
+
+    Raises
+    ------
+    ParameterError
+        If the rate is negative or not finite.
+    """
+    if not is_number(rate) or not 0.0 <= rate < np.inf:
+        raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
+
+
 def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     """Select the time steps nearest to multiples of 1/rate, and the first and last ones.
 
@@ -39,8 +55,7 @@ def select_nearest_steps(time: FloatArray, rate: float) -> IntArray:
     >>> select_nearest_steps(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]), rate=1.0)
     array([0, 2, 5])
     """
-    if not is_number(rate) or not 0.0 <= rate < np.inf:
-        raise ParameterError(f"rate: expected a finite number of at least 0 Hz, got {quote(rate)}")
+    require_rate(rate)
     last = len(time) - 1
     min_step = float(np.diff(time).min(initial=np.inf))
     if min_step * rate >= 1.0:

@@ -133,7 +133,14 @@ class SimulationBatch:
         if np.isinf(self.team.communication_range).all():
             self._complete_graphs = [Neighbors(robot_count)] * run_count
             self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
-        self._decides_jointly = robot_count <= MAX_JOINT_TEAM_SIZE and not has_memory(self.controller)
+        # Step in which each run started, or was restarted.
+        self._first_steps = [0] * run_count
+        # Runs that were restarted scan in other steps than the others.
+        self._decides_jointly = (
+            robot_count <= MAX_JOINT_TEAM_SIZE
+            and not has_memory(self.controller)
+            and self._controller_caller.scanning is None
+        )
         # There is one memory for all runs, or one for each.
         if self._decides_jointly:
             memories = [self._controller_caller.begin(environment.region, self._joint_team, self.time)]
@@ -230,19 +237,24 @@ class SimulationBatch:
         Returns
         -------
         Observations
-            Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run.
+            Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run. There
+            are scans of all robots if those of any run are due.
         """
         if self._observations is None:
-            scanning = self._controller_caller.scanning
+            is_any_scan_due = any(self._is_scan_due(run) for run in range(len(self)))
             self._observations = build_observations(
                 world=self._world,
                 sensor=self.sensor,
                 environment=self.environment,
                 neighbors=self._get_joint_graph(),
                 time=self.time,
-                scanning=scanning if is_scan_due(scanning, self._steps, self.dt) else None,
+                scanning=self._controller_caller.scanning if is_any_scan_due else None,
             )
         return self._observations
+
+    def _is_scan_due(self, run: int) -> bool:
+        """Return whether the robots of a run scan in this step."""
+        return is_scan_due(self._controller_caller.scanning, self._steps - self._first_steps[run], self.dt)
 
     def observe_run(self, run: int) -> Observations:
         """Return the current observations of the robots of one run, as `Simulation.observe` does.
@@ -264,7 +276,7 @@ class SimulationBatch:
         run = self._require_run(run)
         observations = self.observe()
         rows = self._rows[run]
-        scans = observations.scans
+        scans = observations.scans if self._is_scan_due(run) else None
         if scans is not None:
             scans = Scans(scans.distances[rows], scans.is_hit[rows])
         return replace(
@@ -372,6 +384,7 @@ class SimulationBatch:
             )
         require_free_starts(self.environment, positions, self.team, MAX_START_OVERLAP_M)
         self._world.place(run, positions)
+        self._first_steps[run] = self._steps
         if not self._decides_jointly:
             self._memories = [*self._memories[:run], self._begin_run(), *self._memories[run + 1 :]]
             self._inboxes = [*self._inboxes[:run], None, *self._inboxes[run + 1 :]]

@@ -522,7 +522,8 @@ class Simulation:
         environment, controller, team, conditions
             See `Simulation`. By default they do not change.
         positions, velocities, steering : (n, 2) arrays or None
-            See `TeamState`. By default they do not change.
+            See `TeamState`. By default they do not change. If the number of robots changes, positions and
+            velocities have no default.
 
         Returns
         -------
@@ -531,7 +532,8 @@ class Simulation:
         Raises
         ------
         StartError
-            If a robot overlaps a wall or another robot by more than contacts allow.
+            If a robot overlaps a wall or another robot by more than contacts allow, or positions, velocities
+            and steering differ in size.
         ParameterError
             If team and positions differ in size.
         """

@@ -15,7 +15,7 @@ from robocov.compiled import kernel
 from robocov.density.base import Density
 from robocov.density.cell_edges import CellEdges
 from robocov.errors import InputError, quote
-from robocov.observation import Cells
+from robocov.observation import Cells, to_numbers
 from robocov.observation.neighbors import NeighborPositions, Neighbors
 from robocov.observation.region import Region
 from robocov.typing import FloatArray, IntArray
@@ -196,10 +196,10 @@ def to_generators(values: object) -> FloatArray:
     InputError
         If the values are not numbers, or their shape is not (n, 2).
     """
-    try:
-        points = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError(f"generators: expected numbers of shape (n, 2), got {quote(values)}") from None
+    numbers = to_numbers(values)
+    if numbers is None:
+        raise InputError(f"generators: expected numbers of shape (n, 2), got {quote(values)}")
+    points = np.array(numbers, order="C")
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"generators: expected an array of shape (n, 2), got shape {points.shape}")
     return points

@@ -24,7 +24,7 @@ import numpy as np
 from robocov.density.base import Density
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
 from robocov.errors import InputError, quote
-from robocov.observation import Cells
+from robocov.observation import Cells, to_numbers
 from robocov.observation.neighbors import Neighbors
 from robocov.observation.region import Region
 from robocov.typing import FloatArray, IntArray
@@ -272,14 +272,10 @@ def _compute_weighted_cells(
 
 def _convert_speeds(values: object, robot_count: int) -> FloatArray:
     """Convert speeds to a new array, (n,); raise InputError if they are not positive, finite numbers."""
-    try:
-        speeds = np.array(values, dtype=np.float64)
-        is_valid = speeds.shape == (robot_count,) and bool(((speeds > 0.0) & (speeds < np.inf)).all())
-    except (TypeError, ValueError):
-        is_valid = False
-    if not is_valid:
+    speeds = to_numbers(values)
+    if speeds is None or speeds.shape != (robot_count,) or not ((speeds > 0.0) & (speeds < np.inf)).all():
         raise InputError(f"speeds: expected {robot_count} positive numbers, got {quote(_to_list(values))}")
-    return speeds
+    return speeds.copy()
 
 
 def _to_list(values: object) -> object:

@@ -123,6 +123,16 @@ def test_parameters_converge_on_rich_trajectories() -> None:
     np.testing.assert_allclose(memory.parameters, np.broadcast_to(truth, (5, 16)), atol=0.05)
 
 
+@pytest.mark.parametrize("period", [0.01, 0.05, 0.08])
+def test_measurements_count_for_the_time_since_the_last_plan(period: float) -> None:
+    """The sum of the entries of Λ is the integral of 1 over time, because the basis functions add up to 1."""
+    simulation = Simulation(SQUARE, Adaptive(basis=2.0, period=period), [[1.0, 1.0]], dt=0.05)
+    for _ in range(13):
+        simulation.step()
+    memory = simulation.memory
+    assert memory.information_matrices.sum() == pytest.approx(memory.plan_time + period)
+
+
 def test_robots_without_neighbors_learn_alone() -> None:
     controller = Adaptive(coupling=0.0)
     connected = learn_everywhere(controller, HOT, 40, np.inf)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import pytest
 from hypothesis import given
@@ -127,6 +127,7 @@ def test_plain_numbers_of_a_dataclass_are_gains_and_other_fields_are_not() -> No
         bias: float = -3.5
         note: str = "text"
         flag: bool = True
+        gear: float = field(default=2.0, init=False)
 
     gains = get_gains(Mixed)
     assert list(gains) == ["pull", "bias"]

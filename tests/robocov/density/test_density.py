@@ -48,6 +48,35 @@ def test_mass_centroid_and_polar_moment_agree_with_quadrature(density):
         assert cells.polar_moments[k] == pytest.approx(polar, rel=2 * tolerance)
 
 
+@pytest.mark.parametrize("side", [0.01, 0.5, 2.0, 8.0])
+def test_moments_are_accurate_on_cells_much_smaller_than_a_gaussian(side):
+    """The cell is a square on which the density is nearly constant, and the generator its center."""
+    density = Gaussians((Gaussian((0.0, 0.0), 3.0, sigma=1e4),))
+    corners = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]
+    cell = build_cells(density, [[0.5 * side, 0.5 * side]], Region(np.array(corners)))
+    assert cell.masses[0] == pytest.approx(3.0 * side**2, rel=1e-6)
+    assert cell.polar_moments[0] == pytest.approx(3.0 * side**4 / 6.0, rel=1e-6)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=count_examples(10), deadline=None)
+def test_closed_form_and_quadrature_agree_on_small_cells(seed):
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(-20.0, 28.0, 2)
+    density = Gaussians((Gaussian((x, y), 2.0, covariance=((400.0, 100.0), (100.0, 300.0))),))
+    points = rng.uniform(1.0, 7.0, (6, 2))
+    exact = build_cells(density, points, SQUARE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robocov.density.gaussians._SMALL_CELL_SIZE", np.inf)
+        numeric = build_cells(density, points, SQUARE)
+        # The moments are computed only when they are needed.
+        polar_moments = numeric.polar_moments
+    assert_allclose(numeric.masses, exact.masses, rtol=1e-11)
+    assert_allclose(numeric.centroids, exact.centroids, rtol=1e-10)
+    assert_allclose(polar_moments, exact.polar_moments, rtol=1e-8)
+    assert not np.array_equal(polar_moments, exact.polar_moments)
+
+
 @pytest.mark.parametrize("density", KINDS.values(), ids=KINDS)
 @given(seed=st.integers(0, 10_000), count=st.integers(1, 12))
 @settings(max_examples=count_examples(5), deadline=None)
@@ -280,7 +309,9 @@ def test_densities_are_immutable_and_compare_by_value():
         (lambda: Uniform(float("nan")), "weight: expected .* got nan"),
         (lambda: Gaussian((0.0, 0.0), -1.0, sigma=1.0), "weight: expected .* got -1.0"),
         (lambda: Gaussian((0.0, 0.0), 1.0), "sigma, covariance: expected one of them, got neither"),
-        (lambda: Gaussian((0.0, 0.0), 1.0, sigma=0.0), "sigma: expected a number above 0, got 0.0 m"),
+        (lambda: Gaussian((0.0, 0.0), 1.0, sigma=0.0), r"sigma: expected a number from 1e-100 to 1e\+100"),
+        (lambda: Gaussian((0.0, 0.0), 1.0, sigma=1e155), r"1e\+100, got 1e\+155 m"),
+        (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1e-300, 0.0), (0.0, 1e-300))), "positive definite"),
         (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1.0, 2.0), (2.0, 1.0))), "positive definite"),
         (lambda: Gaussian((0.0, 0.0), 1.0, covariance=((1.0, 0.2), (0.1, 1.0))), "symmetric"),
         (lambda: Gaussians(()), "floor: expected a number above 0 or a peak"),

@@ -101,8 +101,14 @@ def test_an_archive_is_read_after_its_directory_is_rewritten() -> None:
         (save_arrays(a=np.array([print], dtype=object)), "Object arrays cannot be loaded"),
         (patch_directory(TWO, file_size=CLAIMED_BYTES), "arrays too large"),
         (patch_directory(TWO, file_size=150_000), "'b.npy'"),
-        (patch_directory(TWO, header_offset=0, filename="a.npy"), "duplicate entry 'a.npy'"),
+        (patch_directory(TWO, header_offset=0, filename="a.npy"), "duplicate entry 'a'"),
         (patch_directory(TWO, compress_type=99), "compression"),
+        (
+            patch_directory(TWO, compress_type=zipfile.ZIP_LZMA),
+            "entry 'b.npy' has an unsupported compression",
+        ),
+        (patch_directory(TWO, filename="a"), "duplicate entry 'a'"),
+        (TWO.replace(b", }", b", y", 1), "EOF in multi-line statement"),
         (patch_directory(TWO, flag_bits=1), "encrypted"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
@@ -115,7 +121,15 @@ def test_damaged_files_are_rejected_in_one_line(content: bytes, message: str) ->
 
 @pytest.mark.parametrize(
     "header",
-    ["{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -4)}", "{" * 60_000, "[]", "print(1)"],
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -4)}",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999,)}",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (True,)}",
+        "{[]: 1}",
+        "{" * 60_000,
+        "[]",
+        "print(1)",
+    ],
 )
 def test_invalid_headers_are_rejected(header: str) -> None:
     buffer = io.BytesIO()

@@ -233,6 +233,13 @@ def test_errors_name_points_outside_the_free_space(point):
         Geodesics(SLANTED).snap_to_free_space([[0.1, 0.1], point])
 
 
+def test_a_map_without_free_space_contains_no_point():
+    square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+    full = Environment("full", square, (PolygonObstacle(square),))
+    with pytest.raises(InputError, match=r"positions\[0\]: map 'full' has no free space"):
+        Geodesics(full).snap_to_free_space([[0.5, 0.5]])
+
+
 def test_errors_name_points_that_are_not_finite():
     with pytest.raises(InputError, match=r"positions\[0\]: expected finite numbers, got \[nan, 1\]"):
         Geodesics(SLANTED).snap_to_free_space([[np.nan, 1.0]])

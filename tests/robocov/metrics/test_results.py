@@ -128,6 +128,8 @@ def test_runs_are_found_by_name_by_number_and_by_row(folder: Path) -> None:
         (-3, "there is no row -3 (of 2 rows)"),
         (1, "a-failure: the run failed: no room"),
         ("a-failure", "a-failure: the run failed: no room"),
+        ({"controller": "rapf"}, "run: expected the name of a run, the index of its row, or a row with"),
+        (None, "run: expected the name of a run, the index of its row, or a row with"),
     ],
 )
 def test_errors_name_missing_runs(folder: Path, run: Any, message: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from property_examples import count_examples
 from robocov.controllers import Rapf
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
-from robocov.metrics import CostHistory
+from robocov.mapfile import load_map
+from robocov.metrics import CostHistory, select_sampled_steps
 from robocov.metrics.run_metrics import (
     COLUMNS,
     compute_final_metrics,
@@ -147,7 +149,10 @@ def test_final_metrics_have_a_figure_for_each_column(record: Record) -> None:
     assert set(metrics) == {*COLUMNS.values(), "near_final_s", "sent_bytes_per_s"} - {"time_s"}
 
 
-@pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])
-def test_invalid_rates_are_rejected(record: Record, rate: float) -> None:
+@pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf"), "5", None])
+def test_invalid_rates_are_rejected(record: Record, rate: Any) -> None:
     with pytest.raises(ParameterError, match="rate: "):
         compute_run_metrics(record, rate)
+    forklifts = load_map("forklifts")
+    with pytest.raises(ParameterError, match="rate: "):
+        select_sampled_steps(replace(record, environment=forklifts), rate)

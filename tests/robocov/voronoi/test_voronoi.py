@@ -283,6 +283,12 @@ def test_generators_that_are_not_finite_are_named(n: int, bad: float) -> None:
         partition(points, SQUARE)
 
 
+@pytest.mark.parametrize("values", [[["1", "2"]], [[10**400, 1]], np.ones((1, 2), complex), [[1, 2], [3]]])
+def test_generators_that_are_not_real_numbers_are_rejected(values: object) -> None:
+    with pytest.raises(InputError, match=r"^generators: expected numbers of shape \(n, 2\), got "):
+        partition(values, SQUARE)  # type: ignore[arg-type]
+
+
 def test_generators_of_the_wrong_shape_are_rejected() -> None:
     with pytest.raises(InputError, match=r"shape \(n, 2\), got shape \(3,\)"):
         partition(np.zeros(3), SQUARE)

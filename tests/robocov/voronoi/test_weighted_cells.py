@@ -267,6 +267,7 @@ def test_reported_positions_replace_the_true_ones() -> None:
     [
         ([[1.0, 2.0, 3.0]], [1.0], "generators: expected an array of shape"),
         ([[1.0, 2.0]], [0.0], r"speeds: expected 1 positive numbers, got \[0.0\]"),
+        ([[1.0, 2.0]], [10**400], r"speeds: expected 1 positive numbers, got "),
         ([[1.0, 2.0]], [1.0, 2.0], "expected 1 positive numbers"),
         ([[1.0, 2.0]], ["fast"], "expected 1 positive numbers"),
         ([["east", 2.0]], [1.0], "generators: expected numbers"),

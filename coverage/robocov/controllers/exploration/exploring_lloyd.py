@@ -153,20 +153,24 @@ class ExploringLloyd(BaseController):
     def _plan(self, seen: Observations, memory: ExploringMemory) -> ExploringMemory:
         """Return the memory with new measurements and new goals."""
         grid = memory.grid
-        measurements = np.ones_like(memory.measurements)
+        measurements = memory.measurements
         measurement_exchange = memory.measurement_exchange
-        # If the density is known to be uniform, φ is 1 everywhere: a factor changes no centroid.
-        if not seen.has_known_uniform_density:
+        if seen.has_known_uniform_density:
+            # φ is 1 everywhere, since a factor changes no centroid. The density may change later, so this is
+            # not remembered.
+            known_values = np.ones_like(measurements)
+        else:
             measurements = _measure(seen, memory)
             measurement_exchange = measurement_exchange.start_period(measurements)
+            known_values = measurements
         sightings = memory.sightings.update(seen, memory.team)
         robots, other_positions = sightings.list_pairs()
         is_own = find_own_samples(grid.centers, seen.positions, robots, other_positions) & grid.is_inside
         goals = np.empty_like(seen.positions)
         viewpoints = np.empty_like(memory.viewpoints)
         for robot in range(len(goals)):
-            is_unknown = is_own[robot] & np.isnan(measurements[robot])
-            masses = self._estimate_masses(measurements[robot])
+            is_unknown = is_own[robot] & np.isnan(known_values[robot])
+            masses = self._estimate_masses(known_values[robot])
             viewpoints[robot] = NO_SQUARE
             if masses[is_unknown].sum() > self.exploration * masses[is_own[robot]].sum():
                 viewpoints[robot] = _choose_viewpoint(

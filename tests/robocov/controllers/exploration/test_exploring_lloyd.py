@@ -144,9 +144,18 @@ def test_measurements_of_zero_do_not_end_the_exploration() -> None:
 def test_a_known_uniform_density_needs_no_measurements_and_no_messages() -> None:
     simulation = run(ExploringLloyd(), SQUARE, duration=2.0)
     memory: ExploringMemory = simulation.memory
-    np.testing.assert_array_equal(memory.measurements, 1.0)
+    assert np.isnan(memory.measurements).all()
     assert not memory.measurement_exchange.allowances.any()
     assert (memory.viewpoints == -1).all()
+
+
+def test_robots_measure_a_density_that_replaces_a_uniform_one() -> None:
+    uniform = run(ExploringLloyd(), SQUARE)
+    simulation = uniform.with_density(SQUARE.with_density(PEAK))
+    simulation.run(40.0)
+    # A robot has found the peak.
+    assert np.nanmax(simulation.memory.measurements) > 8.0
+    assert compute_peak_cost(simulation.positions) < 0.8 * compute_peak_cost(uniform.positions)
 
 
 def test_robots_know_in_time_of_others_that_were_never_in_range() -> None:
