@@ -478,7 +478,9 @@ def to_floats(
 
     try:
         return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:
+        # The values may be of any class, such as a tensor of another library, and their conversion may fail
+        # with any error.
         raise error_type(_describe_mismatch(name, values, expected)) from None
 
 

@@ -379,6 +379,8 @@ def instantiate_controller(kind: type[Any], values: Mapping[str, object]) -> Any
     controller_name = getattr(kind, "name", kind.__name__)
     checked_values = {}
     for given_name, value in values.items():
+        if not isinstance(given_name, str):
+            raise ParameterError(f"gains: expected names as keys, got {quote(given_name)}")
         if not gains:
             path = f"{controller_name}.{given_name}"
             raise ParameterError(f"{path}: controller {controller_name!r} has no gains")

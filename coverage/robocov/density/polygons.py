@@ -23,7 +23,7 @@ import shapely
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import Density, require_weight
 from robocov.density.cell_edges import MASS, MOMENT_X, MOMENT_Y, POLAR_MOMENT, CellEdges
-from robocov.errors import ParameterError
+from robocov.errors import ParameterError, quote
 from robocov.typing import FloatArray, IntArray, Ring
 
 _LOW_X = 0
@@ -85,7 +85,18 @@ class WeightedArea:
 
     @cached_property
     def polygon(self) -> shapely.Polygon:
-        """The area as a shapely polygon."""
+        """The area as a shapely polygon.
+
+        Raises
+        ------
+        ParameterError
+            If a ring has fewer than three vertices, or a coordinate is not finite.
+        """
+        for ring in (self.vertices, *self.holes):
+            if len(ring) < 3 or not np.isfinite(ring).all():
+                raise ParameterError(
+                    f"vertices: expected at least 3 points with finite coordinates, got {quote(ring)}"
+                )
         return shapely.Polygon(self.vertices, self.holes)
 
 
@@ -150,7 +161,16 @@ class WeightedPolygons(Density):
 
         For the columns, see `_LOW_X` and the following constants. Horizontal edges are left out, because
         their strips have no height.
+
+        Raises
+        ------
+        ParameterError
+            If the edges of an area cross each other.
         """
+        for number, area in enumerate(self.areas):
+            if not area.polygon.is_valid:
+                reason = shapely.is_valid_reason(area.polygon)
+                raise ParameterError(f"areas[{number}]: expected edges that do not cross, got {reason}")
         jumps_by_ring = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()
         # The last area is on top, and covers the others.

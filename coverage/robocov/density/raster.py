@@ -13,7 +13,7 @@ from robocov.arrays import copy_read_only
 from robocov.compiled import inlined_kernel, kernel
 from robocov.density.base import MAX_WEIGHT, Density
 from robocov.density.cell_edges import CellEdges
-from robocov.errors import ParameterError, quote
+from robocov.errors import ParameterError, quote, to_floats
 from robocov.typing import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -120,7 +120,10 @@ class Raster(Density):
             )
         if not values.max() > 0.0:
             raise ParameterError("values: expected at least one number above 0, got only 0")
-        x_min, y_min, x_max, y_max = self.extent
+        extent = to_floats("extent", self.extent, "[x_min, y_min, x_max, y_max]")
+        if extent.shape != (4,):
+            raise ParameterError(f"extent: expected [x_min, y_min, x_max, y_max], got {quote(self.extent)}")
+        x_min, y_min, x_max, y_max = extent.tolist()
         has_width = -math.inf < x_min < x_max < math.inf
         has_height = -math.inf < y_min < y_max < math.inf
         if not (has_width and has_height):
@@ -133,6 +136,7 @@ class Raster(Density):
                 f"interpolation: expected bilinear or cells, got {quote(self.interpolation)}"
             )
         object.__setattr__(self, "values", values)
+        object.__setattr__(self, "extent", (x_min, y_min, x_max, y_max))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Raster):

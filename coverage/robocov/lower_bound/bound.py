@@ -599,8 +599,8 @@ def _compute_initial_prices(
     distances = np.sort(np.concatenate([distances, missing_distances]), axis=0)
     nearest = distances[0]
     second = distances[1]
-    # An initial price is halfway between the distances of the nearest and the second-nearest robot. If there
-    # is only one robot, the price is larger than the distances of all sites.
+    # An initial price is halfway between the distances of the nearest and the second-nearest robot. If only
+    # one robot can reach a site, the price is larger than the distance of every site from its nearest robot.
     single_robot_prices = nearest + nearest.max()
     initial_prices = np.where(np.isinf(second), single_robot_prices, (nearest + second) / 2.0)
     return distances[_MAX_PRICE_RANK - 1], initial_prices

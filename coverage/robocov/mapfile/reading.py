@@ -199,7 +199,7 @@ def parse_density(
     Parameters
     ----------
     value : object
-        Value of the key ``density`` of a map.
+        Value of the key ``density`` of a map, not None.
     boundary : (k, 2) sequence, m
         Boundary of the map.
     source_name : str
@@ -261,10 +261,20 @@ def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, sou
         values[values < MIN_WEIGHT] = 0.0
     else:
         values = _read_weights(model, folder, source_name)
-    x, y = zip(*boundary, strict=True)
-    x_min, y_min, x_max, y_max = model.extent or (min(x), min(y), max(x), max(y))
+    extent = model.extent or _find_extent(boundary, source_name)
     # A map lists the top row first, a `Raster` the lowest one.
-    return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
+    return Raster(values[::-1], extent, model.interpolation)
+
+
+def _find_extent(boundary: Ring, source_name: str) -> tuple[float, float, float, float]:
+    """Return the bounding box of a boundary; raise MapError if it has no width or no height."""
+    x, y = zip(*boundary, strict=True)
+    extent = (min(x), min(y), max(x), max(y))
+    x_min, y_min, x_max, y_max = extent
+    if not (x_min < x_max and y_min < y_max):
+        message = f"expected a width and a height above 0, got {x_max - x_min:g} m x {y_max - y_min:g} m"
+        raise MapError.from_issues(source_name, [Issue.at_path(("boundary",), message)])
+    return extent
 
 
 def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> FloatArray:

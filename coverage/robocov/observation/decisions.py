@@ -198,7 +198,9 @@ def to_numbers(values: object) -> FloatArray | None:
     try:
         array = np.asarray(values)
         return array.astype(np.float64) if array.dtype.kind in "biuf" else None
-    except (TypeError, ValueError, OverflowError):
+    except Exception:
+        # The values may be of any class, such as a tensor of another library, and their conversion may fail
+        # with any error.
         return None
 
 

@@ -359,7 +359,7 @@ class World:
         The spaces are built by the first call. Each contains the teams of up to `MAX_TEAMS_PER_SPACE` runs.
         """
         if self._spaces is None:
-            self._spaces = []
+            spaces = []
             robots_per_space = MAX_TEAMS_PER_SPACE * self._team_size
             for start in range(0, len(self.team), robots_per_space):
                 rows = slice(start, min(start + robots_per_space, len(self.team)))
@@ -371,7 +371,9 @@ class World:
                     team_count=(rows.stop - rows.start) // self._team_size,
                 )
                 space.set_moving_obstacles(self._obstacle_states)
-                self._spaces.append((rows, space))
+                spaces.append((rows, space))
+            # Assigned only now, so that an interruption leaves no incomplete list.
+            self._spaces = spaces
         return self._spaces
 
     def _update_spaces(self) -> None:

@@ -34,7 +34,8 @@ FILES = {
     "tree_a/unused.py": "",
     "tree_a/inner/__init__.py": "from tree_a.inner.core import deep\n",
     "tree_a/inner/core.py": "import plain_b.part\ndeep = 1\n",
-    "plain_b/part.py": "# no __init__.py\n",
+    "plain_b/part.py": "import plain_b.nested.deep  # no __init__.py in either folder\n",
+    "plain_b/nested/deep.py": "",
     "late_one.py": "import unreadable_one\n",
     "unreadable_one.py": "this is no Python\n",
 }
@@ -55,7 +56,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_all_modules_of_the_author_are_found_without_running_them(folder: Path) -> None:
     modules = find_own_modules(CONTROLLER)
     assert list(modules) == [
-        *("late_one", "plain_b", "plain_b.part"),
+        *("late_one", "plain_b", "plain_b.nested", "plain_b.nested.deep", "plain_b.part"),
         *("tree_a", "tree_a.branch", "tree_a.inner", "tree_a.inner.core", "tree_a.leaf", "tree_a.twig"),
         "unreadable_one",
     ]

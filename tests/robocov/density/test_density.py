@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
@@ -323,6 +325,8 @@ def test_densities_are_immutable_and_compare_by_value():
         (lambda: Raster(np.ones(3), (0.0, 0.0, 1.0, 1.0)), "shape"),
         (lambda: Raster(np.ones((1, MAX_RASTER_SIZE + 1)), (0.0, 0.0, 1.0, 1.0)), "shape"),
         (lambda: Raster(-np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0)), "from 0 to"),
+        (lambda: Raster(np.ones((2, 2)), None), "extent: expected"),  # type: ignore[arg-type]
+        (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 1.0)), "extent: expected"),  # type: ignore[arg-type]
         (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 0.0, 1.0)), "a width and a height"),
         (lambda: Raster(np.ones((2, 2)), (0.0, 0.0, 1.0, 1.0), "cubic"), "bilinear or cells"),  # type: ignore[arg-type]
     ],
@@ -330,3 +334,24 @@ def test_densities_are_immutable_and_compare_by_value():
 def test_invalid_densities_are_rejected(build, message):
     with pytest.raises(ParameterError, match=message):
         build()
+
+
+@pytest.mark.parametrize(
+    ("vertices", "message"),
+    [
+        (((0.0, 0.0), (1.0, 1.0)), "vertices: expected at least 3 points with finite coordinates"),
+        (((0.0, 0.0), (1.0, 1.0), (0.0, np.nan)), "vertices: expected at least 3 points with finite"),
+        (((0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0)), r"areas\[0\]: expected edges that do not cross"),
+    ],
+)
+def test_invalid_areas_are_rejected_before_they_are_integrated(vertices, message):
+    density = WeightedPolygons((WeightedArea(vertices, 3.0),))
+    with pytest.raises(ParameterError, match=message):
+        build_cells(density)
+
+
+def test_the_extent_of_a_raster_may_be_a_list():
+    extent: Any = [0, 0, 8, 8]
+    raster = Raster(np.array([[1.0, 2.0]]), extent)
+    assert raster == Raster(np.array([[1.0, 2.0]]), (0.0, 0.0, 8.0, 8.0))
+    assert build_cells(raster).masses.sum() > 0.0

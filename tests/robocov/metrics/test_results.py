@@ -124,6 +124,7 @@ def test_runs_are_found_by_name_by_number_and_by_row(folder: Path) -> None:
         ("another", "there is no run 'another'"),
         ("../runs/a-run", "there is no run '../runs/a-run'"),
         ("", "there is no run ''"),
+        ("..", "there is no run '..'"),
         (2, "there is no row 2 (of 2 rows)"),
         (-3, "there is no row -3 (of 2 rows)"),
         (1, "a-failure: the run failed: no room"),

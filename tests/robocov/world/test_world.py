@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -127,6 +128,20 @@ def test_masses_whose_contacts_cannot_be_resolved_are_rejected(empty: Environmen
     message = r"team.mass: expected .* 1000 times as heavy .* got 0.5 to 501 kg"
     with pytest.raises(ParameterError, match=message):
         World(build_obstacles(empty), team, np.array([[2.0, 2.0], [2.0, 6.0]]))
+
+
+def test_a_step_can_be_repeated_after_an_interruption(
+    cluttered: Environment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = build_world(cluttered)
+    forces = np.ones((6, 2))
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("robocov.world.world.ContactDetector", Mock(side_effect=KeyboardInterrupt))
+        world.step(forces, DT)
+    uninterrupted = build_world(cluttered)
+    for repeated in (world, uninterrupted):
+        repeated.step(forces, DT)
+    assert world.positions.tobytes() == uninterrupted.positions.tobytes()
 
 
 def test_energy_never_grows_without_forces(cluttered: Environment) -> None:

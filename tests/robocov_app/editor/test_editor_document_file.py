@@ -1,5 +1,6 @@
 """The open document: saving it, changes of its file by other programs, and drafts."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ from driven_editor import build_sheet, rewrite_file
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
-from robocov.mapfile import list_bundled_maps, load_map
+from robocov.mapfile import dump_map, list_bundled_maps, load_map
 from robocov_app.editor.edits import create, properties
 from robocov_app.editor.model.document import DEFAULT_BOUNDARY, Document
 from robocov_app.editor.model.map_draft import find_recoverable
@@ -29,6 +30,17 @@ def test_a_new_document_has_a_boundary_and_no_changes(tmp_path: Path) -> None:
     assert document.suggest_path(tmp_path) == tmp_path / "untitled.json"
     (tmp_path / "untitled.json").write_text("")
     assert document.suggest_path(tmp_path) == tmp_path / "untitled-1.json"
+
+
+def test_a_map_with_a_raster_and_a_flat_boundary_can_be_opened(tmp_path: Path) -> None:
+    path = tmp_path / "flat.json"
+    content = json.loads(dump_map(load_map("rooms")))
+    content["boundary"] = [[0, 0], [0, 4], [0, 8]]
+    content["density"] = {"kind": "raster", "rows": [[1, 2], [3, 4]]}
+    path.write_text(json.dumps(content))
+    document = Document.open_file(path, None)
+    assert document.history.sketch.boundary == ((0.0, 0.0), (0.0, 4.0), (0.0, 8.0))
+    assert not document.would_replace_valid_map(path)
 
 
 def test_a_saved_document_can_be_opened(tmp_path: Path) -> None:

@@ -38,7 +38,8 @@ _START_CLASSES: dict[str, Any] = {
     "points": env.PointsStart,
 }
 _EXTENT_WITHOUT_BOUNDARY: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""Extent of a density image on a map without a boundary, m, unless the image has its own extent."""
+"""Extent of a density image on a map without a boundary, or with one that has no width or height, m; unless
+the image has its own extent."""
 _REQUIRED_VALUES = {
     "center": "a point [x, y] in meters",
     "points": "a list of points [x, y]",
@@ -117,7 +118,7 @@ def build_sketch(document: Any, source_name: str = "map", folder: Path | None = 
         schema = reader.read_text(members["$schema"], ("$schema",))
     density = None
     if members.get("density") is not None:
-        extent = boundary or _EXTENT_WITHOUT_BOUNDARY
+        extent = boundary if boundary is not None and _has_extent(boundary) else _EXTENT_WITHOUT_BOUNDARY
         density = parse_density(members["density"], extent, source_name, folder)
     return Sketch(
         name=reader.read_text(members.get("name", ""), ("name",)),
@@ -138,6 +139,12 @@ def _read_obstacles(reader: _Reader, value: Any) -> list[Obstacle]:
         reader.read_variant(_OBSTACLE_CLASSES, obstacle, ("obstacles", k))
         for k, obstacle in enumerate(obstacles)
     ]
+
+
+def _has_extent(ring: Ring) -> bool:
+    """Return whether a ring has a width and a height above 0."""
+    x, y = zip(*ring, strict=True)
+    return min(x) < max(x) and min(y) < max(y)
 
 
 def _read_starts(reader: _Reader, value: Any) -> tuple[tuple[str, Any], ...]:

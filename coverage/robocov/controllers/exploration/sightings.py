@@ -71,6 +71,8 @@ class Sightings:
         pairs = seen.find_neighbors()
         positions[pairs.robots, pairs.neighbors] = seen.positions[pairs.robots] - pairs.offsets
         times[pairs.robots, pairs.neighbors] = seen.time
+        if seen.report_ages is not None:
+            times[pairs.robots, pairs.neighbors] -= seen.report_ages
         distances = np.sqrt(((positions - seen.positions[:, None]) ** 2).sum(axis=2))
         is_silent = seen.time - times > MAX_SILENCE_S
         certain_ranges = CERTAIN_RANGE_FRACTION * team.communication_range

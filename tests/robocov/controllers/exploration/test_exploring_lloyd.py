@@ -169,6 +169,14 @@ def test_robots_know_in_time_of_others_that_were_never_in_range() -> None:
     assert simulation.observe().neighbors.list_neighbors(0).tolist() == [1]
 
 
+def test_sightings_have_the_time_at_which_a_position_was_sent() -> None:
+    starts = np.array([[2.0, 10.0], [4.0, 10.0]])
+    simulation = Simulation(SQUARE, ExploringLloyd(), starts, conditions=Conditions(delay=2.0))
+    simulation.run(4.0)
+    memory: ExploringMemory = simulation.memory
+    assert memory.sightings.times[0, 1] == pytest.approx(memory.plan_time - 2.0)
+
+
 def test_a_failed_robot_is_lost_and_its_cell_is_divided_among_the_others() -> None:
     starts = np.array([[2.0, 10.0], [6.0, 10.0], [10.0, 2.0]])
     conditions = Conditions(failures=(Failure(3, 1.0),))
