@@ -366,7 +366,9 @@ def _compute_installation_digest(package: Path = Path(__file__).parent) -> str:
     """
     numba_version = importlib.metadata.version("numba")
     digest = hashlib.blake2b(digest_size=10)
-    digest.update(f"{package.resolve()}\n{sys.implementation.cache_tag} {numba_version}\n".encode())
+    # Names of folders may contain bytes that are not valid UTF-8.
+    digest.update(os.fsencode(package.resolve()))
+    digest.update(f"\n{sys.implementation.cache_tag} {numba_version}\n".encode())
     for path in sorted(package.rglob("*.py")):
         source = path.read_bytes()
         digest.update(f"{path.relative_to(package).as_posix()} {len(source)}\n".encode())

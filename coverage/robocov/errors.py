@@ -688,7 +688,7 @@ def _count_edits(first: str, second: str) -> int:
 
 
 def format_bound(bound: float) -> str:
-    """Format a bound of a range without an exponent, if it has at most ten digits.
+    """Format a bound of a range with at most ten digits, without an exponent unless it is tiny or huge.
 
     Parameters
     ----------
@@ -703,10 +703,10 @@ def format_bound(bound: float) -> str:
     >>> format_bound(1e6), format_bound(0.5), format_bound(1e-6)
     ('1000000', '0.5', '0.000001')
     """
-    text = f"{bound:g}"
+    text = f"{bound:.10g}"
     if "e" not in text or not 1e-9 <= abs(bound) <= 1e9:
         return text
-    return f"{bound:.9f}".rstrip("0").rstrip(".")
+    return f"{Decimal(text):f}"
 
 
 def _shorten(text: str) -> str:

@@ -6,6 +6,7 @@ are not in this space, so that they neither hide obstacles nor are mistaken for 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -120,7 +121,8 @@ class RangeSensor:
         for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
             nearest = self._space.point_query_nearest(tuple(position), limit, _EVERYTHING)
             if nearest is not None:
-                points[row] = nearest.point
+                # pymunk returns no point if the position is exactly on a surface.
+                points[row] = position if math.isnan(nearest.point.x) else nearest.point
         points.setflags(write=False)
         return points
 

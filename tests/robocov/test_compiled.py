@@ -110,6 +110,13 @@ def test_changed_source_changes_cache_folder(tmp_path: Path) -> None:
     assert compiled._compute_installation_digest(tmp_path) != before
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a file system with names of any bytes")
+def test_the_folder_of_an_installation_may_have_any_name(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    folder.mkdir()
+    assert compiled._compute_installation_digest(folder).startswith("robocov-")
+
+
 def test_installations_of_one_version_have_cache_folders_of_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -50,7 +50,15 @@ def test_transposed_letters_are_one_edit(name: str, similar_names: list[str]) ->
 
 @pytest.mark.parametrize(
     ("bound", "text"),
-    [(1e6, "1000000"), (2e7, "20000000"), (1e-6, "0.000001"), (0.25, "0.25"), (1e12, "1e+12")],
+    [
+        (1e6, "1000000"),
+        (2e7, "20000000"),
+        (1e-6, "0.000001"),
+        (0.25, "0.25"),
+        (123456.7, "123456.7"),
+        (1.5e-9, "0.0000000015"),
+        (1e12, "1e+12"),
+    ],
 )
 def test_bounds_have_no_exponents(bound: float, text: str) -> None:
     assert errors.format_bound(bound) == text

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
-from robocov.environment import Environment
+from robocov.environment import Environment, WallObstacle
 from robocov.sensor import RangeSensor
 from robocov.world.obstacle_pieces import build_solid_pieces
 
@@ -32,6 +32,13 @@ def test_nearest_points_agree_with_shapely(cluttered: Environment, sensor: Range
     np.testing.assert_allclose(np.hypot(*(nearest - points).T), expected, atol=1e-9)
     on_wall = shapely.distance(shapely.points(nearest), cluttered.free.boundary)
     assert on_wall.max() < 1e-9
+
+
+def test_the_nearest_point_of_a_position_on_a_surface_is_the_position() -> None:
+    wall = Environment("wall", ((0, 0), (8, 0), (8, 6), (0, 6)), (WallObstacle(((2, 0), (2, 1)), 0.2),))
+    sensor = RangeSensor(build_solid_pieces(wall))
+    positions = np.array([[2.1, 0.5], [0.0, 3.0]])
+    np.testing.assert_array_equal(sensor.find_nearest_points(positions, np.ones(2)), positions)
 
 
 def test_nothing_is_sensed_beyond_the_range(cluttered: Environment, sensor: RangeSensor) -> None:

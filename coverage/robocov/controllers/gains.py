@@ -5,6 +5,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
+import numpy as np
+
 from robocov.controllers.user_modules import explain_fault
 from robocov.errors import ParameterError, RobocovError, describe_unknown_name, format_bound, is_number, quote
 
@@ -314,8 +316,15 @@ def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
 
 
 def get_gain_values(controller: Any) -> dict[str, Value]:
-    """Return the values of the gains of a controller, in the order of their declaration."""
-    return {name: getattr(controller, name) for name in get_gains(controller)}
+    """Return the values of the gains of a controller, in the order of their declaration.
+
+    Numbers of NumPy, which a user's controller may have, are converted to those of Python.
+    """
+    values: dict[str, Value] = {}
+    for name in get_gains(controller):
+        value = getattr(controller, name)
+        values[name] = value.item() if isinstance(value, np.generic) else value
+    return values
 
 
 def validate_gains(controller: Any) -> None:

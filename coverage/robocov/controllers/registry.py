@@ -27,7 +27,7 @@ from robocov.controllers.exploration.voronoi_graph import VoronoiGraphCoverage
 from robocov.controllers.gains import Option, Value, get_gains, instantiate_controller, update_name
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
 from robocov.controllers.gp_ucb import GpUcb
-from robocov.controllers.individual import to_team_controller
+from robocov.controllers.individual import to_team_controller, unwrap_controller
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.placement.exemplar import Exemplar
 from robocov.controllers.placement.local_search import LocalSearch
@@ -100,6 +100,24 @@ def has_memory(controller: object) -> bool:
     (False, True)
     """
     return type(controller) not in _MEMORYLESS
+
+
+def get_recorded_name(controller: Controller) -> str:
+    """Return the name of a controller in records.
+
+    Parameters
+    ----------
+    controller : Controller
+
+    Returns
+    -------
+    str
+        The name of its class if a built-in controller of another class has the same name. A subclass of a
+        built-in controller inherits such a name, and a record must not be repeated with the built-in one.
+    """
+    kind = type(unwrap_controller(controller))
+    is_other_kind = controller.name in CONTROLLERS and CONTROLLERS[controller.name] is not kind
+    return kind.__name__ if is_other_kind else controller.name
 
 
 def get_controller_label(name: str) -> str:

@@ -224,11 +224,12 @@ class WeightedPolygons(Density):
 
 
 def _build_jumps(points: FloatArray, step: float) -> FloatArray:
-    """Return the jumps across the edges of a closed, counter-clockwise ring, (k, 5).
+    """Return the jumps across the edges of a closed ring with an area on its left, (k, 5).
 
-    The density inside the ring exceeds that outside by `step`. A jump runs from the lower to the upper end of
-    its edge, and contains the change of the density from its left side to its right side: -step if the inside
-    of the ring is on the left, and +step if it is on the right.
+    The ring leads counter-clockwise around the area, or clockwise around a hole in it. The density in the
+    area exceeds that outside by `step`. A jump runs from the lower to the upper end of its edge, and contains
+    the change of the density from its left side to its right side: -step if the area is on the left, and
+    +step if it is on the right.
     """
     starts = points[:-1]
     ends = points[1:]

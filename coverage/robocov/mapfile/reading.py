@@ -68,7 +68,8 @@ def load_map(source: str | Path) -> Environment:
     """
     path = find_map_file(source)
     content = read_bytes(path)
-    if path.suffix.lower() != ".json" and not content.lstrip(_BLANK_BYTES).startswith(b"{"):
+    text = content.lstrip(_BLANK_BYTES)
+    if path.suffix.lower() != ".json" and text and not text.startswith(b"{"):
         raise MapError(
             f"{to_one_line(str(path))}: expected a robocov map, got a file in another format. "
             "Convert it with `robocov import`."
@@ -261,20 +262,20 @@ def _build_density(model: DensityModel, boundary: Ring, folder: Path | None, sou
         values[values < MIN_WEIGHT] = 0.0
     else:
         values = _read_weights(model, folder, source_name)
-    extent = model.extent or _find_extent(boundary, source_name)
+    x_min, y_min, x_max, y_max = model.extent or _find_extent(boundary, source_name)
     # A map lists the top row first, a `Raster` the lowest one.
-    return Raster(values[::-1], extent, model.interpolation)
+    return Raster(values[::-1], (x_min, y_min, x_max, y_max), model.interpolation)
 
 
 def _find_extent(boundary: Ring, source_name: str) -> tuple[float, float, float, float]:
     """Return the bounding box of a boundary; raise MapError if it has no width or no height."""
     x, y = zip(*boundary, strict=True)
-    extent = (min(x), min(y), max(x), max(y))
-    x_min, y_min, x_max, y_max = extent
-    if not (x_min < x_max and y_min < y_max):
-        message = f"expected a width and a height above 0, got {x_max - x_min:g} m x {y_max - y_min:g} m"
+    width = max(x) - min(x)
+    height = max(y) - min(y)
+    if not (width > 0.0 and height > 0.0):
+        message = f"expected a width and a height above 0, got {width:g} m x {height:g} m"
         raise MapError.from_issues(source_name, [Issue.at_path(("boundary",), message)])
-    return extent
+    return min(x), min(y), max(x), max(y)
 
 
 def _read_weights(model: RasterModel, folder: Path | None, source_name: str) -> FloatArray:

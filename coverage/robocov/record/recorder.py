@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 
 from robocov.conditions import Conditions, JoinedRobot
-from robocov.controllers import Controller, get_gain_values
+from robocov.controllers import Controller, get_gain_values, get_recorded_name
 from robocov.controllers.gains import Value
 from robocov.controllers.individual import unwrap_controller
 from robocov.environment import Environment
@@ -72,7 +72,7 @@ class Recorder:
 
     def __post_init__(self) -> None:
         if self.name is None:
-            self.name = self.controller.name
+            self.name = get_recorded_name(self.controller)
         self._gains = get_gain_values(unwrap_controller(self.controller))
         for gain, value in self._gains.items():
             if not _is_recordable(value):

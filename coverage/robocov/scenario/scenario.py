@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral
@@ -16,7 +18,13 @@ from numpy.typing import ArrayLike
 
 from robocov.conditions import PARAMETERS as CONDITION_PARAMETERS
 from robocov.conditions import Conditions
-from robocov.controllers import CONTROLLERS, Controller, IndividualController, make_controller
+from robocov.controllers import (
+    CONTROLLERS,
+    Controller,
+    IndividualController,
+    get_recorded_name,
+    make_controller,
+)
 from robocov.controllers.gains import Value, get_gain_values
 from robocov.controllers.individual import require_controller, unwrap_controller
 from robocov.controllers.user_modules import ControllerSource, provide_modules
@@ -38,7 +46,7 @@ from robocov.errors import (
 from robocov.files.documents import check_header, validate_document
 from robocov.files.strictjson import parse_json, read_bytes
 from robocov.files.writing import replace_file
-from robocov.mapfile import find_map_file, from_json, load_map, to_json
+from robocov.mapfile import find_map_file, from_json, list_bundled_maps, load_map, to_json
 from robocov.record import Record, Recorder
 from robocov.scenario.scenario_document import FORMAT, FORMAT_VERSION, ScenarioDocument
 from robocov.simulation import Simulation, TeamState, check_dt, check_joins
@@ -239,7 +247,7 @@ class Scenario:
         ----------
         **changes
             Parameters of `Scenario`. A new controller has its default gains unless `gains` is given
-            as well.
+            as well. A new number of robots discards the team, and needs new `starts` if these were given.
 
         Returns
         -------
@@ -247,9 +255,12 @@ class Scenario:
 
         Raises
         ------
-        ParameterError
+        ParameterError, StartError
             If a value cannot be used.
+        TypeError
+            If `Scenario` has no such parameter.
         """
+        require_scenario_options("replace", changes)
         controller: str | Controller = self.controller
         gains: Mapping[str, Value] | None = self.gains
         if self._controller_object is not None:
@@ -502,7 +513,7 @@ class Scenario:
         Raises
         ------
         InputError
-            If the document cannot be used. The message names the key.
+            If the document cannot be used. The message names the document and the value.
         """
         check_header(document, source_name, FORMAT, FORMAT_VERSION)
         content = validate_document(document, source_name, ScenarioDocument)
@@ -527,7 +538,7 @@ class Scenario:
                 dt=content.dt_s,
                 conditions=_read_conditions(content.conditions),
             )
-        except ParameterError as error:
+        except (ParameterError, StartError) as error:
             raise InputError(f"{source_name}: {error}") from error
         return scenario
 
@@ -673,15 +684,25 @@ def _describe_controller(
             # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
         plain_gains = {name: _to_plain_value(value) for name, value in (gains or {}).items()}
+        _require_finite_gains(plain_gains)
         return {"controller": controller, "gains": plain_gains, "_controller_object": None}
     if gains:
         raise ParameterError("gains: expected none together with a controller object, which has its own")
     team_controller = require_controller(controller)
+    own_gains = get_gain_values(unwrap_controller(team_controller))
+    _require_finite_gains(own_gains)
     return {
-        "controller": team_controller.name,
-        "gains": get_gain_values(unwrap_controller(team_controller)),
+        "controller": get_recorded_name(team_controller),
+        "gains": own_gains,
         "_controller_object": team_controller,
     }
+
+
+def _require_finite_gains(gains: Mapping[str, Value]) -> None:
+    """Raise a ParameterError if a gain cannot be written to JSON, which has no infinite numbers."""
+    for name, value in gains.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ParameterError(f"gains: {name}: expected a finite number, got {quote(value)}")
 
 
 def _to_plain_value(value: Any) -> Any:
@@ -693,6 +714,10 @@ def _load_environment(content: str | dict[str, Any], source_name: str, folder: P
     """Return the map of a document, which contains the map itself, its name, or the path of its file."""
     if not isinstance(content, str):
         return from_json(content, f"{source_name}: map", folder)
+    if folder is not None and content not in list_bundled_maps():
+        with suppress(OSError):  # The name may be too long for a file.
+            if (folder / content).is_file():
+                return load_map(folder / content)
     try:
         path = find_map_file(content)
     except MapError as error:

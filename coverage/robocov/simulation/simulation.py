@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from copy import copy, deepcopy
+from dataclasses import is_dataclass, replace
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -515,7 +516,9 @@ class Simulation:
         """Return a changed copy of the simulation, which continues from the current state.
 
         The memory of the robots and the controller messages are dropped if the controller or the number of
-        robots changes. All messages are dropped if the conditions or the number of robots change.
+        robots changes. All messages are dropped if the conditions or the number of robots change. Otherwise,
+        the memory of a built-in controller is updated with the new properties of the robots. It is not
+        adapted to another boundary.
 
         Parameters
         ----------
@@ -565,12 +568,16 @@ def _copy_knowledge(
 ) -> None:
     """Copy the memory and the messages to a simulation of the same robots, unless they are invalid there.
 
-    Another controller would understand neither the memory nor the controller messages.
+    Another controller would understand neither the memory nor the controller messages. The memory of built-in
+    controllers contains the team, whose properties may have changed.
     """
     if copy_messages:
         target.inbox = source.inbox
     if has_same_controller:
-        target.memory = deepcopy(source.memory)
+        memory = deepcopy(source.memory)
+        if is_dataclass(memory) and isinstance(getattr(memory, "team", None), Team):
+            memory = replace(memory, team=target.team)  # type: ignore[type-var]
+        target.memory = memory
     elif target.inbox is not None:
         target.inbox = target.inbox.drop_messages()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,9 @@ from robocov.conditions import Conditions, Failure
 from robocov.environment import Environment
 from robocov.errors import InputError, MapError, ParameterError, StartError
 from robocov.mapfile import to_json
+from robocov.observation import Decision, Observations
 from robocov.team import Team
+from robocov.typing import FloatArray
 
 ROOM = Environment("room", ((0, 0), (6, 0), (6, 4), (0, 4)))
 MINIMAL: dict[str, Any] = {"format": "robocov-scenario", "version": 1, "map": "rooms"}
@@ -48,6 +51,37 @@ def test_a_run_continues_from_its_state() -> None:
     rest_record = rest.run(rest.build_simulation(steps=10, is_computed=True))
     np.testing.assert_array_equal(rest_record.time, record.time[10:])
     np.testing.assert_array_equal(rest_record.positions, record.positions[10:])
+
+
+@dataclass(frozen=True)
+class Homing:
+    """Drives each robot to the origin."""
+
+    pull: float = 1.0
+
+    def force(self, own: rc.OwnView) -> FloatArray:
+        return -self.pull * own.position
+
+
+class SlowRapf(rc.Rapf):
+    """RAPF with smaller forces, and with the inherited name."""
+
+    def decide(self, seen: Observations, memory: Any) -> Decision:
+        decision = super().decide(seen, memory)
+        return replace(decision, forces=0.1 * decision.forces)
+
+
+def test_a_subclass_of_a_built_in_controller_is_not_recorded_as_that_controller() -> None:
+    record = rc.run(ROOM, SlowRapf(), robots=2, duration=0.1)
+    assert record.controller == "SlowRapf"
+    with pytest.raises(ParameterError, match="unknown controller 'SlowRapf'"):
+        rc.Scenario.from_record(record)
+
+
+def test_gains_of_a_controller_may_be_numbers_of_numpy(tmp_path: Path) -> None:
+    scenario = rc.Scenario(ROOM, Homing(np.float32(0.5)), robots=2, duration=0.1)  # type: ignore[arg-type]
+    scenario.save(tmp_path / "scenario.json")
+    assert scenario.run().gains == {"pull": 0.5}
 
 
 def test_numbers_of_numpy_are_saved(tmp_path: Path) -> None:
@@ -115,6 +149,7 @@ def test_check_accepts_what_can_run() -> None:
     [
         ({"controller": "lloid"}, r"unknown controller"),
         ({"gains": {"k": 1.0}}, r"unknown gain 'k'"),
+        ({"controller": Homing(pull=float("inf"))}, r"gains: pull: expected a finite number, got inf"),
         ({"controller": rc.Rapf(), "gains": {"k_rep": 1.0}}, r"gains: expected none"),
         ({"controller": rc.Rapf}, r"controller: expected a controller"),
         ({"robots": 0}, r"robots: expected a whole number of at least 1"),
@@ -140,6 +175,8 @@ def test_unknown_keyword_arguments_are_reported_by_the_function_that_was_called(
         rc.run(ROOM, durtion=3)
     with pytest.raises(TypeError, match=r"^compare\(\) got an unexpected keyword argument 'xyz'$"):
         rc.compare(ROOM, xyz=3)
+    with pytest.raises(TypeError, match=r"^replace\(\) got .* 'robot'. Did you mean 'robots'\?$"):
+        rc.Scenario(ROOM).replace(robot=3)
 
 
 def test_maps_are_found_by_name_and_path(tmp_path: Path) -> None:
@@ -238,6 +275,13 @@ def test_a_short_file_has_the_defaults_of_the_library(tmp_path: Path) -> None:
     assert scenario.to_json() == expected.to_json()
 
 
+def test_a_map_without_a_suffix_is_found_in_the_folder_of_the_document(tmp_path: Path) -> None:
+    rc.save_map(ROOM, tmp_path / "room.json")
+    (tmp_path / "room.json").rename(tmp_path / "room")
+    scenario = rc.Scenario.from_json({**MINIMAL, "map": "room"}, folder=tmp_path)
+    assert scenario.environment == ROOM
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -252,6 +296,8 @@ def test_a_short_file_has_the_defaults_of_the_library(tmp_path: Path) -> None:
         ({"controller": {"name": "mine.py:M"}}, r"^s: controller.name: expected a built-in controller"),
         ({"team": {"robot": 3}}, r"^s: team: unknown key 'robot': did you mean 'robots'\?"),
         ({"team": {"robots": "3"}}, r"^s: team.robots: expected a whole number"),
+        ({"team": {"robots": 2}, "starts_m": [[1, 1]]}, r"^s: starts: expected one for each of 2 robots"),
+        ({"starts_m": []}, r"^s: starts: expected an array of shape"),
         ({"seed": -3}, r"^s: seed: expected a whole number from 0, or null, got -3"),
         ({"starts_m": [[1, 2, 3]]}, r"^s: starts_m: expected a list of points"),
         ({"duration_s": -1}, r"^s: duration_s: expected a number from 0 \(s\), got -1"),

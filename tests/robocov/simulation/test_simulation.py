@@ -294,6 +294,16 @@ def test_copies_have_a_memory_of_their_own(empty: Environment) -> None:
     np.testing.assert_array_equal(copy.positions, simulation.positions)
 
 
+@pytest.mark.parametrize("name", ["lloyd", "tangentbug", "boosting", "gp-ucb", "greedy-submodular"])
+def test_controllers_know_new_properties_of_robots(empty: Environment, name: str) -> None:
+    simulation = Simulation(empty, make_controller(name), [[2.0, 2.0]])
+    simulation.run(0.5)
+    team = Team.homogeneous(1, radius=0.2, viscosity=6.0, max_speed=0.3)
+    changed = simulation.with_changes(team=team)
+    changed.step()
+    assert changed.memory.team is team
+
+
 class OwnCounter:
     """Counts its steps in a list that it changes in place, and has no method ``begin``."""
 

@@ -144,7 +144,7 @@ def _read_obstacles(reader: _Reader, value: Any) -> list[Obstacle]:
 def _has_extent(ring: Ring) -> bool:
     """Return whether a ring has a width and a height above 0."""
     x, y = zip(*ring, strict=True)
-    return min(x) < max(x) and min(y) < max(y)
+    return bool(min(x) < max(x) and min(y) < max(y))
 
 
 def _read_starts(reader: _Reader, value: Any) -> tuple[tuple[str, Any], ...]:
