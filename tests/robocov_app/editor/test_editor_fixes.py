@@ -43,6 +43,13 @@ def build_rooms(width: float) -> Sketch:
         (build_hall(PolygonObstacle(BOX, (((3.0, 3.0), (3.2, 3.0), (3.2, 3.2)),))), "sealed", "filled"),
         (build_rooms(0.3), "narrow", "wall 1 shortened by 0.1 m"),
         (
+            build_hall(
+                WallObstacle(((2.0, 5.0), (8.0, 5.0)), 0.2), WallObstacle(((2.0, 5.5), (8.0, 5.5)), 0.2)
+            ),
+            "narrow",
+            "wall 1 moved by 0.1 m",
+        ),
+        (
             build_hall(CircleObstacle((6.0, 2.0), 3.0), CircleObstacle((6.0, 5.6), 0.3)),
             "narrow",
             "circle 2 moved",

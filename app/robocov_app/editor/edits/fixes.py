@@ -1,7 +1,7 @@
 """Automatic fixes: changes that solve most kinds of problems."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple, TypeAlias
@@ -11,7 +11,7 @@ import shapely
 from shapely import Geometry, LineString, MultiPolygon
 from shapely.ops import substring
 
-from robocov.environment import MAX_SAGITTA_M, Obstacle, Point, PointsStart, WallObstacle
+from robocov.environment import MAX_SAGITTA_M, Point, PointsStart, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform, vertices
 from robocov_app.editor.model import require
@@ -36,6 +36,7 @@ BOUNDARY_MARGIN_M = 0.5  # between a new boundary and the objects that it enclos
 DEFAULT_BOUNDS_M = (0.0, 0.0, 10.0, 10.0)
 FILL_OVERLAP_M = 0.002  # by which a filled area overlaps the objects around it
 FILL_MITRE_LIMIT = 2.0
+MIN_GAP_ALIGNMENT = 0.5  # minimum cosine of the angle between a gap and a wall that ends at it
 SPARE_M = 1e-3  # by which a widened gap exceeds the diameter of a robot
 START_DISTANCE_RADII = 2.01  # minimum distance between two robots at a start, in radii
 
@@ -148,7 +149,8 @@ def _fill_cut_off_area(request: FixRequest) -> Change:
 def _widen_gap(request: FixRequest) -> Change:
     """Make a gap wide enough for a robot.
 
-    Shorten a wall that ends at the gap; if there is none, move the smallest obstacle next to it.
+    Shorten a wall that ends at the gap and points across it; if there is none, move the smallest obstacle
+    next to the gap.
     """
     sketch = request.sketch
     gap = request.problem.geometry
@@ -156,7 +158,7 @@ def _widen_gap(request: FixRequest) -> Change:
     missing = 2.0 * request.radius + SPARE_M - gap.length
     sides = _list_gap_sides(sketch, gap)
     for side in sides:
-        shortened = _shorten_wall(side.item.shape, side.end, missing)
+        shortened = _shorten_wall(side, missing)
         if shortened is not None:
             key = side.item.key
             description = f"{format_numbered_name(sketch, key)} shortened by {missing:.2g} m"
@@ -190,21 +192,34 @@ def _drop_obstacles_at_both_ends(sides: list[_GapSide]) -> list[_GapSide]:
     return [side for side in sides if len(ends_by_key[side.item.key]) == 1]
 
 
-def _shorten_wall(wall: Obstacle, end: Point, length: float) -> WallObstacle | None:
-    """Shorten a wall by a length, m, at the end close to a point; return None if that is impossible."""
+def _shorten_wall(side: _GapSide, length: float) -> WallObstacle | None:
+    """Shorten a wall by a length, m, at the end next to a gap; return None if that does not widen the gap."""
+    wall = side.item.shape
     if not isinstance(wall, WallObstacle) or len(wall.points) < 2:
         return None
     line = LineString(wall.points)
-    # For each end: its position, and the part of the line that remains after shortening it there.
+    # For each end: the points in order from that end, and the part of the line that remains after shortening.
     spans = (
-        (wall.points[0], length, line.length),
-        (wall.points[-1], 0.0, line.length - length),
+        (wall.points, length, line.length),
+        (wall.points[::-1], 0.0, line.length - length),
     )
-    for wall_end, low, high in spans:
-        is_near = math.dist(wall_end, end) <= wall.width / 2 + MAX_SAGITTA_M
-        if is_near and high - low > wall.width:
+    for points, low, high in spans:
+        is_near = math.dist(points[0], side.end) <= wall.width / 2 + MAX_SAGITTA_M
+        if is_near and high - low > wall.width and _continues_wall(side, points):
             return replace(wall, points=tuple(map(round_point, substring(line, low, high).coords)))
     return None
+
+
+def _continues_wall(side: _GapSide, points: Sequence[Point]) -> bool:
+    """Return whether a gap continues a wall beyond the first of its points, instead of being at its side.
+
+    This is also true of a gap of length 0, which has no direction.
+    """
+    wall_end = points[0]
+    previous = next(point for point in points if point != wall_end)
+    outward = np.subtract(wall_end, previous) / math.dist(wall_end, previous)
+    across = np.subtract(side.opposite_end, side.end)
+    return bool(outward @ across >= MIN_GAP_ALIGNMENT * math.dist(side.opposite_end, side.end))
 
 
 def _get_owner(request: FixRequest) -> Owner:
