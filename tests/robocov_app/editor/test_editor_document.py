@@ -225,6 +225,8 @@ def test_a_note_finds_its_obstacle_after_the_file_was_edited_by_hand():
         {"background": {"path": "x"}},
         {"notes": [], "background": {"path": "plan.png"}},
         {"notes": [{"obstacle": 0, "note": "x", "by": "somebody"}]},
+        {"notes": [{"obstacle": 99, "note": "x"}], "notes of obstacles that are gone": None},
+        {"notes": [{"obstacle": 99, "note": "x"}], "notes of obstacles that are gone": "all"},
     ],
 )
 def test_free_keys_of_other_programs_are_unchanged(foreign):

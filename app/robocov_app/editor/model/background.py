@@ -262,9 +262,10 @@ def read_marks(free_keys: FreeKeys, names: Names) -> ReadMarks:
 
 
 def _has_valid_sections(content: FreeKeys) -> bool:
-    return all(
+    has_valid_entries = all(
         _are_entries(content.get(section, []), mark_names) for section, mark_names in _SECTIONS.items()
     )
+    return has_valid_entries and isinstance(content.get(_LOST_NOTES, []), list)
 
 
 def _assign_marks(content: FreeKeys, names: Names) -> tuple[MarksByIndex, dict[str, Any]]:
