@@ -69,9 +69,14 @@ class Options:
         for option in fields(self):
             is_given = getattr(self, option.name) != option.default
             if is_given and option.name not in supported:
-                words = ", ".join(f"--{name}" for name in sorted(supported)) or "none"
+                words = ", ".join(map(_format_option, sorted(supported))) or "none"
                 known = f"no option of the format {format_name}, whose options are: {words}"
-                raise ParameterError(f"--{option.name}: {known}")
+                raise ParameterError(f"{_format_option(option.name)}: {known}")
+
+
+def _format_option(name: str) -> str:
+    """Return the name of an option as it is written on the command line."""
+    return f"--{name.replace('_', '-')}"
 
 
 def _list_words(hint: Any) -> list[str]:
