@@ -202,7 +202,9 @@ def test_a_controller_in_a_file_is_only_run_if_the_user_names_it(tmp_path: Path)
     session = advance_session(start_session(ControllerChoice(name)), 5)
     path = tmp_path / "session.robocov"
     save(session, path)
-    with pytest.raises(InputError, match=r"open the session with --controller .*mine\.py:Mine"):
+    with pytest.raises(
+        InputError, match=r"pass --controller \S+mine\.py:Mine \(--controllers for robocov demo\)$"
+    ):
         load_session(path)
     opened = Session.open(load_session(path, [name]))
     assert opened.timeline.end_time == session.timeline.end_time

@@ -124,7 +124,7 @@ def _require_known_controller(choice: ControllerChoice, info: Any) -> Controller
         # The session file may have been saved where the user's file had another path.
         same_class = [name for name in user_names if name.rpartition(":")[2] == class_name]
         if not same_class:
-            advice = f"to run it, open the session with --controller {choice.name}"
+            advice = f"to run it, pass --controller {choice.name} (--controllers for robocov demo)"
             raise build_refusal(f"{choice.name!r} is not one of robocov's controllers; {advice}")
         choice = replace(choice, name=same_class[0])
     try:
