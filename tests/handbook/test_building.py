@@ -43,15 +43,34 @@ def test_a_folder_with_other_files_is_not_changed(capsys: pytest.CaptureFixture[
     assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_no_temporary_files_remain(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def write_page(scratch: Path) -> Path:
-        pages = scratch / "pages"
-        pages.mkdir()
-        (pages / "index.html").write_text("the page")
-        return pages
+def write_page(scratch: Path) -> Path:
+    """Write a page in place of Sphinx; return its folder."""
+    pages = scratch / "pages"
+    pages.mkdir()
+    (pages / "index.html").write_text("the page")
+    return pages
 
+
+def test_no_temporary_files_remain(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(handbook, "_REQUIRED_MODULES", ())
     monkeypatch.setattr(handbook, "_run_sphinx", write_page)
     assert main(["handbook", "--out", str(tmp_path / "site")]) == 0
     assert [file.name for file in tmp_path.iterdir()] == ["site"]
     assert [file.name for file in (tmp_path / "site").iterdir()] == ["index.html"]
+
+
+def test_the_current_folder_can_be_written_to(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(handbook, "_REQUIRED_MODULES", ())
+    monkeypatch.setattr(handbook, "_run_sphinx", write_page)
+    monkeypatch.chdir(tmp_path)
+    assert main(["handbook", "--out", "."]) == 0
+    assert [file.name for file in tmp_path.iterdir()] == ["index.html"]
+
+
+def test_bundled_pages_that_cannot_be_written_are_reported(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(handbook, "_BUNDLED_PAGES", write_page(tmp_path))
+    site = tmp_path / "pages" / "index.html" / "site"
+    assert main(["handbook", "--out", str(site)]) == 2
+    assert f"{site}: cannot be written: " in capsys.readouterr().err

@@ -103,21 +103,31 @@ def _build_pages(folder: Path) -> None:
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: already exists; expected a new or empty folder")
-    if _BUNDLED_PAGES.is_dir():
-        shutil.copytree(_BUNDLED_PAGES, folder, dirs_exist_ok=True)
-        return
+    try:
+        if _BUNDLED_PAGES.is_dir():
+            shutil.copytree(_BUNDLED_PAGES, folder, dirs_exist_ok=True)
+        else:
+            _build_with_sphinx(folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
+
+
+def _build_with_sphinx(folder: Path) -> None:
+    """Build the pages in a new or empty folder."""
     missing_modules = [name for name in _REQUIRED_MODULES if importlib.util.find_spec(name) is None]
     if missing_modules:
         alternative = f"the pages can also be read as text: {find_page_sources() / 'index.md'}"
         raise RobocovError(
             f'{missing_modules[0]} is not installed: pip install "robocov[docs]"; {alternative}'
         )
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as scratch:
-            _run_sphinx(Path(scratch)).replace(folder)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as scratch:
+        pages = _run_sphinx(Path(scratch))
+        if folder.exists():
+            # A folder in use, such as the current one, cannot be replaced.
+            shutil.copytree(pages, folder, dirs_exist_ok=True)
+        else:
+            pages.replace(folder)
 
 
 def _run_sphinx(scratch: Path) -> Path:
