@@ -124,7 +124,8 @@ def _save_figure(options: Arguments, path: Path, measured_runs: list[MeasuredRun
     from robocov_app.figures.files import save_figure
     from robocov_app.figures.metric_curves import plot_metrics
 
-    title = f"Metrics  ·  {options.folder.name}"
+    # The path may be ".", which has no name.
+    title = f"Metrics  ·  {options.folder.resolve().name}"
     save_figure(plot_metrics(measured_runs, options.theme, title=title), path)
 
 

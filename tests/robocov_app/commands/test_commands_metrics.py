@@ -1,14 +1,18 @@
 """`robocov metrics`: the table of a run, JSON and rejected folders."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from command_calls import SHORT, read_error
+from matplotlib.figure import Figure
 
 from robocov.metrics.run_metrics import COLUMNS, compute_run_metrics
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.figures import metric_curves
+from robocov_app.figures.metric_curves import MeasuredRun, plot_metrics
 from robocov_app.runs import artifacts
 
 
@@ -47,6 +51,21 @@ def test_metrics_of_each_run_are_saved_as_a_table(
         expected = compute_run_metrics(Record.load(comparison / name), 4.0)
         assert len(rows) == len(expected.time) == 5
         assert [float(cell) for cell in rows[-1].split(",")] == [float(x) for x in expected.rows()[-1]]
+
+
+def test_the_figure_of_the_current_folder_has_its_name(
+    comparison: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    titles: list[str] = []
+
+    def record_title(runs: Sequence[MeasuredRun], theme: str, title: str) -> Figure:
+        titles.append(title)
+        return plot_metrics(runs, theme, title)
+
+    monkeypatch.setattr(metric_curves, "plot_metrics", record_title)
+    monkeypatch.chdir(comparison / "rapf")
+    assert main(["metrics", ".", "--rate", "1", "--plot", str(tmp_path / "metrics.svg")]) == 0
+    assert titles == ["Metrics  ·  rapf"]
 
 
 def test_json_output_contains_the_final_metrics(comparison: Path, capsys: pytest.CaptureFixture[str]) -> None:
