@@ -69,20 +69,33 @@ def _summarize_comparison(result: ReportedResult, runs: Sequence[ReportedRun]) -
     texts = []
     for run in sorted(runs, key=lambda run: run.final_distance):
         text = f"{labels[run]} {run.final_distance:.3f} m"
-        if run.final_distance > lowest > 0:
-            text += f" (+{100 * (run.final_distance / lowest - 1):.0f}%)"
+        excess = _format_excess(run.final_distance, lowest)
+        if excess:
+            text += f" (+{excess})"
         texts.append(text)
     subject = "Final mean distance to the nearest robot"
     if format_densities(result):
         subject += ", weighted by φ"
     if len(texts) == 2 and lowest > 0:
         best, other = sorted(runs, key=lambda run: run.final_distance)
-        excess = other.final_distance / lowest - 1
+        excess = _format_excess(other.final_distance, lowest)
+        comparison = f"{excess} more" if excess else "practically the same"
         return (
             f"{subject}: {lowest:.3f} m with {labels[best]}, {other.final_distance:.3f} m with "
-            f"{labels[other]}, which is {excess:.0%} more."
+            f"{labels[other]}, which is {comparison}."
         )
     return f"{subject}: {', '.join(texts)}."
+
+
+def _format_excess(distance: float, lowest: float) -> str:
+    """Return by how many percent a mean distance exceeds the lowest one.
+
+    The text is empty if the excess rounds to 0%, or if the lowest mean distance is 0.
+    """
+    if lowest == 0.0:
+        return ""
+    text = f"{distance / lowest - 1:.0%}"
+    return "" if text == "0%" else text
 
 
 def describe_incomplete_runs(result: ReportedResult) -> list[str]:

@@ -39,6 +39,20 @@ RUNS = [
             "Final mean distance to the nearest robot: 2.000 m with RPF, 3.000 m with RAPF, "
             "which is 50% more.",
         ),
+        (
+            build_result([build_run(final=2.005), build_run("rpf", final=2.0)], kind="comparison"),
+            "RAPF, RPF on rooms",
+            "Final mean distance to the nearest robot: 2.000 m with RPF, 2.005 m with RAPF, "
+            "which is practically the same.",
+        ),
+        (
+            build_result(
+                [build_run(final=2.005), build_run("rpf", final=2.0), build_run("lloyd", final=3.0)],
+                kind="comparison",
+            ),
+            "RAPF, RPF, Lloyd on rooms",
+            "Final mean distance to the nearest robot: RPF 2.000 m, RAPF 2.005 m, Lloyd 3.000 m (+50%).",
+        ),
         (build_result([build_run(final=None)], kind="run"), "RAPF on rooms", "No run has a result."),
         (
             build_result([build_run(final=2.0)]),
