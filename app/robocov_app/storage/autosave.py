@@ -157,7 +157,7 @@ class Autosaver:
         Returns
         -------
         bool
-            Whether the draft is on disk.
+            Whether no draft is waiting to be written.
         """
         with self._changed:
             self._skips_pause = True
