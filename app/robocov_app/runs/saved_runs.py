@@ -18,10 +18,7 @@ from robocov.files.result_names import COMPARISON_FILE, COST_FILE, RUN_FILE
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_history
 from robocov.record import Record
-
-_MAX_FOLDER_NAME_CHARS = 64
-"""Maximum length of a folder name, apart from a number at its end."""
-
+from robocov_app.terminal.output import clean_file_stem
 
 COMPARISON_FORMAT = "robocov-comparison"
 """Format in ``comparison.json``."""
@@ -194,7 +191,7 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
     folders: list[str] = []
     for controller in controllers:
         name = controller.rpartition(":")[2]
-        stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:_MAX_FOLDER_NAME_CHARS] or "controller"
+        stem = clean_file_stem(name, "controller")
         same_stem = re.compile(re.escape(stem) + r"(-\d+)?")
         number = 1 + sum(same_stem.fullmatch(folder) is not None for folder in folders)
         folders.append(stem if number == 1 else f"{stem}-{number}")

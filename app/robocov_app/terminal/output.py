@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from itertools import count
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 PIPED_TABLE_COLUMNS = 140
 """Width in characters of a table that is written to a file or a pipe."""
+MAX_FILE_STEM_CHARS = 64
+"""Maximum length of a file name that is made from another name, apart from a number and the extension."""
 BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
 """Look of a bold column of `print_table`."""
 RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
@@ -68,6 +71,28 @@ def print_answer(options: Any, answer: Any, *lines: str, indent: int | None = No
         echo(json.dumps(replace_non_finite(answer), indent=indent))
     else:
         echo(*lines, sep="\n", end="\n" if lines else "")
+
+
+def clean_file_stem(name: str, default: str) -> str:
+    """Convert a name to the stem of a file name that is valid on all systems, and within its folder.
+
+    Parameters
+    ----------
+    name : str
+        Any name, such as that of a map.
+    default : str
+        The stem if nothing of the name remains.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> clean_file_stem("Floor 1/2", "map"), clean_file_stem("../escaped", "map"), clean_file_stem(" ", "map")
+    ('Floor-1-2', 'escaped', 'map')
+    """
+    return re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FILE_STEM_CHARS] or default
 
 
 def find_free_path(folder: Path, stem: str, suffix: str) -> Path:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from driven_window import open_viewer
-from sample_sessions import advance_session, build_presenter, get_positions, start_session
+from sample_sessions import HALL, advance_session, build_presenter, get_positions, start_session
 
 from robocov.errors import MapError
 from robocov.mapfile import load_map
@@ -70,6 +71,17 @@ def test_a_session_that_was_saved_and_closed_leaves_no_draft(tmp_path: Path) -> 
     assert workspace.save(tmp_path, {}) == path
     workspace.close()
     assert find_recoverable_drafts(tmp_path / "drafts") == ()
+
+
+@pytest.mark.parametrize(
+    ("map_name", "stem"), [("Floor 1/A", "floor-1-a"), ("../escaped", "escaped"), (" ", "session")]
+)
+def test_any_name_of_a_map_gives_a_file_in_the_folder(tmp_path: Path, map_name: str, stem: str) -> None:
+    folder = tmp_path / "sessions"
+    folder.mkdir()
+    viewer = build_presenter(environment=replace(HALL, name=map_name), folder=folder)
+    assert viewer.files.save_copy() == folder / f"{stem}-copy-1.robocov"
+    assert viewer.files.workspace.save(folder, {}) == folder / f"{stem}-1.robocov"
 
 
 def test_a_session_that_is_closed_with_unsaved_edits_leaves_a_draft(tmp_path: Path) -> None:

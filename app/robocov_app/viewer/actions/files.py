@@ -9,7 +9,7 @@ from robocov.errors import InputError
 from robocov.mapfile import list_bundled_maps, load_map, save_map
 from robocov_app.storage.autosave import Draft
 from robocov_app.storage.regular_files import require_regular_file
-from robocov_app.terminal.output import find_free_path
+from robocov_app.terminal.output import clean_file_stem, find_free_path
 from robocov_app.viewer.key_hints import (
     explain_download,
     explain_kept_session,
@@ -152,7 +152,8 @@ class FileActions:
 
     def save_map(self) -> None:
         """Save the map to a new file."""
-        target = find_free_path(self.folder, Path(self.map_name).stem or "map", ".json")
+        stem = clean_file_stem(Path(self.map_name).stem, "map")
+        target = find_free_path(self.folder, stem, ".json")
         save_map(self._viewer.session.displayed.environment, target)
         self.map_name = str(target)
         self._viewer.show_message(self._describe_saved("map", target))
@@ -187,9 +188,11 @@ class FileActions:
         timeline = self._viewer.session.timeline
         timeline.require_reproducible()
         timeline.cache_present()
-        own_path = self.workspace.path
-        stem = self._viewer.session.displayed.environment.name.lower() if own_path is None else own_path.stem
-        target = find_free_path(self.folder, f"{stem or 'session'}-copy", SUFFIX)
+        if self.workspace.path is None:
+            stem = clean_file_stem(self._viewer.session.displayed.environment.name.lower(), "session")
+        else:
+            stem = self.workspace.path.stem
+        target = find_free_path(self.folder, f"{stem}-copy", SUFFIX)
         save_session(target, timeline.document, *timeline.destination, self.view)
         return target
 

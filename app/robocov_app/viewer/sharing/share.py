@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from robocov.errors import ParameterError, format_count
 from robocov.mapfile import save_map
-from robocov_app.terminal.output import find_free_path
+from robocov_app.terminal.output import clean_file_stem, find_free_path
 from robocov_app.toolkit.window.clipboard import Clipboard
 from robocov_app.toolkit.window.window import Remote
 from robocov_app.viewer.presenter import Presenter
@@ -102,6 +102,7 @@ class ShareActions:
         run = describe_run(self._viewer.session.timeline, files.map_name)
         if not run.has_own_map:
             return run, ""
-        path = find_free_path(files.folder, run.scenario.environment.name.lower() or "map", ".json")
+        stem = clean_file_stem(run.scenario.environment.name.lower(), "map")
+        path = find_free_path(files.folder, stem, ".json")
         save_map(run.scenario.environment, path)
         return replace(run, map_name=str(path)), f" with the map {path}"

@@ -1,6 +1,5 @@
 """Saving the runs of a session in the background, in other processes."""
 
-import re
 import subprocess
 import sys
 import tempfile
@@ -12,13 +11,12 @@ from subprocess import DEVNULL
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
 from robocov_app.runs.saved_runs import name_folders
-from robocov_app.terminal.output import echo, find_free_path
+from robocov_app.terminal.output import clean_file_stem, echo, find_free_path
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.editing.edits import Restart, SetController
 from robocov_app.viewer.session.files.session_file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
 
-MAX_FOLDER_STEM_CHARS = 64
 FIRST_WAIT_S = 0.5
 """Time for which `finish` waits for a process before it tells the user."""
 _ERROR_FILE = "errors.txt"
@@ -150,7 +148,7 @@ def _build_folder_stem(session: Session, map_name: str) -> str:
     """Build the name of a run's folder from the names of the map and the controller."""
     file_name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json")
     name = file_name or session.displayed.environment.name
-    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FOLDER_STEM_CHARS] or "map"
+    stem = clean_file_stem(name, "map")
     controllers = [pane.controller.name for pane in session.timeline.panes]
     subject = name_folders(controllers)[0] if len(controllers) == 1 else "comparison"
     return f"{stem}-{subject}"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from robocov_app.storage import autosave
-from robocov_app.terminal.output import find_free_path
+from robocov_app.terminal.output import clean_file_stem, find_free_path
 from robocov_app.viewer.session.files.drafts import DRAFT_KIND
 from robocov_app.viewer.session.files.session_file import (
     SUFFIX,
@@ -113,8 +113,8 @@ class SessionWorkspace:
         timeline.cache_present()
         target = path or self.path
         if target is None:
-            name = self.session.displayed.environment.name.lower() or "session"
-            target = find_free_path(folder, name, SUFFIX)
+            stem = clean_file_stem(self.session.displayed.environment.name.lower(), "session")
+            target = find_free_path(folder, stem, SUFFIX)
         save_session(target, timeline.document, *timeline.destination, view)
         self.path = target
         self._saved_revision = timeline.document.revision
