@@ -86,6 +86,17 @@ def test_robots_fail_and_join_by_themselves() -> None:
     assert np.hypot(*(position - [4.5, 2.0])) < 0.2
 
 
+@pytest.mark.parametrize("last_failures", [(), ((1, 5.0), (3, 5.0), (4, 5.0))])
+def test_a_robot_that_fails_at_the_start_is_an_obstacle(last_failures: tuple[tuple[int, float], ...]) -> None:
+    session = start_session(Conditions(failures=((2, 0.0), *last_failures)))
+    pane = session.timeline.panes[0]
+    assert pane.setup.follows_schedule is not bool(last_failures)
+    assert session.displayed.numbers == (1, 3, 4)
+    assert pane.setup.failed == {2: (2.0, 1.5)}
+    advance_session(session, 5)
+    assert pane.setup.failed == {2: (2.0, 1.5)}
+
+
 def test_a_branch_observes_the_same_bit_for_bit() -> None:
     session = start_session()
     advance_session(session, 10)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -153,6 +154,16 @@ def test_an_edited_map_is_saved_for_the_command(tmp_path: Path) -> None:
     assert np.array_equal(positions, expected)
 
 
+def test_an_edited_map_is_saved_in_the_folder_whatever_its_name(tmp_path: Path) -> None:
+    folder = tmp_path / "maps"
+    folder.mkdir()
+    with open_viewer(folder, environment=replace(HALL, name="../escaped")) as driver:
+        driver.session.edit_map(add_obstacle(driver.session.displayed.environment, PILLAR), "circle added")
+        copy_text(driver, "share:command")
+    assert [path.name for path in tmp_path.rglob("*.json")] == ["escaped-1.json"]
+    assert (folder / "escaped-1.json").exists()
+
+
 def test_later_edits_are_in_the_session_that_the_command_runs(tmp_path: Path) -> None:
     with open_viewer(tmp_path, environment=ROOMS, map_name="rooms") as driver:
         advance_session(driver.session, STEPS)
@@ -211,6 +222,20 @@ def test_the_window_lets_the_last_robot_work_and_the_script_says_so(tmp_path: Pa
 def test_robots_that_differ_are_in_the_script(tmp_path: Path) -> None:
     properties = RobotProperties(values_by_robot={"max_speed": {2: 0.3}})
     with open_viewer(tmp_path, environment=ROOMS, map_name="rooms", properties=properties) as driver:
+        advance_session(driver.session, STEPS)
+        script = copy_text(driver, "share:python")
+        expected = get_positions(driver)
+    (positions,) = run_python(script)
+    assert np.array_equal(positions, expected)
+
+
+def test_headings_of_unicycles_are_in_the_script(tmp_path: Path) -> None:
+    options: dict[str, Any] = {
+        "properties": RobotProperties(track_width=0.3),
+        "given_starts": ROOMS.start().sample(3, seed=0),
+        "steering": np.array([[1.0, 0.0], [2.0, 0.5], [-1.0, 0.0]]),
+    }
+    with open_viewer(tmp_path, environment=ROOMS, map_name="rooms", **options) as driver:
         advance_session(driver.session, STEPS)
         script = copy_text(driver, "share:python")
         expected = get_positions(driver)

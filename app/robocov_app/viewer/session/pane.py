@@ -394,7 +394,11 @@ def select_working(snapshot: Snapshot, setup: PaneSetup) -> Snapshot:
 
 
 def start_simulation(
-    setup: PaneSetup, positions: FloatArray, dt: float, velocities: FloatArray | None = None
+    setup: PaneSetup,
+    positions: FloatArray,
+    dt: float,
+    velocities: FloatArray | None = None,
+    steering: FloatArray | None = None,
 ) -> Simulation:
     """Build the simulation of a pane at time 0.
 
@@ -408,6 +412,8 @@ def start_simulation(
         Control period.
     velocities : (n, 2) array or None, m/s
         Initial velocities; by default, robots are at rest.
+    steering : (n, 2) array or None, rad and rad/s
+        Initial headings and turning rates of unicycles.
 
     Returns
     -------
@@ -420,7 +426,7 @@ def start_simulation(
     ParameterError
         If the controller or the team does not accept a value.
     """
-    return _build_pane_scenario(setup, positions, dt, velocities).build_simulation()
+    return _build_pane_scenario(setup, positions, dt, velocities, steering).build_simulation()
 
 
 def resume_simulation(state: PaneState, dt: float, step: int) -> Simulation:

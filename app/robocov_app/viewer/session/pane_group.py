@@ -10,7 +10,7 @@ from robocov.conditions import TIME_TOLERANCE_S, Conditions
 from robocov.environment import Point
 from robocov.errors import ParameterError
 from robocov.simulation import check_joins
-from robocov.typing import FloatArray
+from robocov.typing import BoolArray, FloatArray
 from robocov_app.viewer.session.editing.drag_spring import compute_spring_forces
 from robocov_app.viewer.session.editing.edits import (
     AddRobot,
@@ -85,10 +85,12 @@ class PaneGroup:
         conditions = scenario.conditions
         is_working = np.ones(len(positions), dtype=bool)
         is_simulated = is_working
+        failed: dict[int, Point] = {}
         scheduled_robots = 0
         if conditions is not None:
             check_joins(scenario.environment, conditions)
             is_working = conditions.find_working_robots(0.0, len(positions))
+            failed = _find_failed_robots(conditions, positions)
             if keeps_a_robot(conditions, len(positions)):
                 scheduled_robots = len(positions)
             else:
@@ -96,8 +98,10 @@ class PaneGroup:
                 conditions = conditions.drop_team_changes()
                 is_simulated = is_working
         velocities = None
-        if scenario.given_starts is not None and scenario.velocities is not None:
-            velocities = scenario.velocities[is_simulated]
+        steering = None
+        if scenario.given_starts is not None:
+            velocities = _select_rows(scenario.velocities, is_simulated)
+            steering = _select_rows(scenario.steering, is_simulated)
         numbers = tuple((np.flatnonzero(is_working) + 1).tolist())
         self.scenario = scenario
         self.step = 0
@@ -109,11 +113,11 @@ class PaneGroup:
                 controller,
                 scenario.properties,
                 numbers,
-                {},
+                failed,
                 conditions,
                 scheduled_robots,
             )
-            simulation = start_simulation(setup, positions[is_simulated], scenario.dt, velocities)
+            simulation = start_simulation(setup, positions[is_simulated], scenario.dt, velocities, steering)
             self.panes.append(Pane(number, setup, simulation))
 
     @classmethod
@@ -315,6 +319,20 @@ class PaneGroup:
         if offset < MIN_REPORTED_OFFSET_M:
             return ""
         return f" {offset:.2f} m from [{requested[0]:g}, {requested[1]:g}]"
+
+
+def _find_failed_robots(conditions: Conditions, positions: FloatArray) -> dict[int, Point]:
+    """Return the positions of the robots that have failed at time 0, by number."""
+    failed: dict[int, Point] = {}
+    for row in np.flatnonzero(conditions.find_failed_robots(0.0, len(positions))).tolist():
+        x, y = positions[row].tolist()
+        failed[row + 1] = (x, y)
+    return failed
+
+
+def _select_rows(rows: FloatArray | None, is_selected: BoolArray) -> FloatArray | None:
+    """Return the selected rows of an array; None if there is no array."""
+    return None if rows is None else rows[is_selected]
 
 
 def keeps_a_robot(conditions: Conditions, robot_count: int) -> bool:

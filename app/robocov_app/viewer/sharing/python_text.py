@@ -87,6 +87,8 @@ def _list_arguments(run: SharedRun) -> Iterator[str]:
         yield f"starts={_format_rows(scenario.given_starts.tolist())}"
         if scenario.velocities is not None:
             yield f"velocities={_format_rows(scenario.velocities.tolist())}"
+        if scenario.steering is not None:
+            yield f"steering={_format_rows(scenario.steering.tolist())}"
     if run.duration is not None:
         yield f"duration={format_time(run.duration)}"
     if scenario.dt != DEFAULT_DT_S:

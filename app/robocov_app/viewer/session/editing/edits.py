@@ -18,7 +18,7 @@ from robocov_app.viewer.session.files.fields import Position, RobotNumber, Step,
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.setup.controller_choice import FileController
 from robocov_app.viewer.session.setup.robot_properties import FileProperties
-from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS, SessionScenario
+from robocov_app.viewer.session.setup.scenario import MAX_ROBOTS, FileScenario, SessionScenario
 
 MAX_PANE_NUMBER = 100
 MAX_BRUSH_RADIUS_M = 1e6
@@ -334,7 +334,7 @@ class Restart(_Edit):
         Map, robots and controllers at time 0.
     """
 
-    scenario: Annotated[SessionScenario, WrapValidator(_load_scenario)]
+    scenario: Annotated[FileScenario, WrapValidator(_load_scenario)]
     do: Literal["restart"] = field(default="restart", kw_only=True)
 
 

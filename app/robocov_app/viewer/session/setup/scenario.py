@@ -1,10 +1,10 @@
 """The scenario of a session: one map and team under up to four controllers."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, WrapSerializer
 
 from robocov.conditions import Conditions
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_ROBOTS
@@ -73,6 +73,8 @@ class SessionScenario:
         Starting positions; None to sample them.
     velocities : (n, 2) array or None, m/s
         Initial velocities of robots with given starts.
+    steering : (n, 2) array or None, rad and rad/s
+        Initial headings and turning rates of unicycles with given starts.
     conditions : Conditions or None
         Noise, message loss, and robots that fail or join at given times.
 
@@ -105,6 +107,11 @@ class SessionScenario:
         FloatArray | None,
         _ROWS,
         Field(alias="start_velocities_m_per_s", description="Initial velocities [vx, vy] in m/s"),
+    ] = None
+    steering: Annotated[
+        FloatArray | None,
+        _ROWS,
+        Field(alias="start_steering", description="[heading, turning rate] of unicycles in rad and rad/s"),
     ] = None
     conditions: Annotated[Conditions | None, _CONDITIONS] = None
 
@@ -164,6 +171,19 @@ class SessionScenario:
             seed=self.seed,
             starts=self.given_starts,
             velocities=self.velocities if self.given_starts is not None else None,
+            steering=self.steering if self.given_starts is not None else None,
             dt=self.dt,
             conditions=self.conditions,
         )
+
+
+def _drop_steering(scenario: SessionScenario, serialize: Any) -> dict[str, Any]:
+    """Serialize a scenario, but omit the steering if there is none."""
+    content: dict[str, Any] = serialize(scenario)
+    if scenario.steering is None:
+        del content["start_steering"]
+    return content
+
+
+FileScenario: TypeAlias = Annotated[SessionScenario, WrapSerializer(_drop_steering)]
+"""The scenario in a session file."""
