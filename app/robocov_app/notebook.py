@@ -14,6 +14,9 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
+from robocov.conditions import TIME_TOLERANCE_S, Conditions, Failure, Join
+from robocov.conditions.events import MAX_TIME_S
+from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import get_gain_values
 from robocov.controllers.individual import unwrap_controller
 from robocov.cost import CoverageResult
@@ -403,8 +406,8 @@ def show(
     Parameters
     ----------
     map : str, Path, Environment or Simulation
-        Name of a bundled map, a file, the map itself, or a simulation. The window continues a copy of the
-        simulation.
+        Name of a bundled map, a file, the map itself, or a simulation. The window does not change the
+        simulation: see `robocov.Simulation.show` for the state from which it starts.
     robots : int
         Number of robots; ignored for a simulation.
     controllers : sequence of str
@@ -417,7 +420,15 @@ def show(
     Returns
     -------
     LiveWindow or Record
-        The window or, if ``robocov[web]`` is not installed, the record of a run of one minute.
+        The window or, if ``robocov[web]`` is not installed, the record of a run of one minute under the first
+        controller. For a simulation, it is the record of its next minute.
+
+    Raises
+    ------
+    ParameterError
+        If a simulation has a controller that is not built in, obstacles that have moved, or no working robot.
+    RobocovError
+        If the window cannot start.
     """
     has_web = find_spec("websockets") is not None
     if isinstance(map, Simulation):
@@ -442,8 +453,12 @@ def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
     from robocov_app.viewer.session.setup.robot_properties import RobotProperties
     from robocov_app.viewer.session.setup.scenario import SessionScenario
 
+    _require_showable(simulation)
     controller = simulation.controller
     gains = get_gain_values(unwrap_controller(controller))
+    conditions = simulation.conditions
+    if conditions is not None:
+        conditions = _shift_conditions(conditions, simulation.time, len(simulation.team))
     session = Session(
         SessionScenario(
             simulation.environment,
@@ -453,13 +468,46 @@ def _show_simulation(simulation: Simulation, height: int) -> LiveWindow:
             dt=simulation.dt,
             given_starts=simulation.positions,
             velocities=simulation.velocities,
-            conditions=simulation.conditions,
+            steering=simulation.steering,
+            conditions=conditions,
         )
     )
     with TemporaryDirectory() as folder:
         file = Path(folder) / "simulation.robocov"
         save_session(file, session.timeline.document, session.timeline.head, 0, {})
         return LiveWindow(["demo", str(file)], height)
+
+
+def _require_showable(simulation: Simulation) -> None:
+    """Raise a ParameterError if a session cannot start from the state of a simulation."""
+    controller = unwrap_controller(simulation.controller)
+    if type(controller) is not CONTROLLERS.get(simulation.controller.name):
+        expected = "the window can show only simulations with built-in controllers"
+        raise ParameterError(f"controller: {expected}, got {type(controller).__name__}")
+    if simulation.time > 0.0 and simulation.environment.has_moving_obstacles:
+        expected = "the window can show simulations with moving obstacles only at 0 s"
+        raise ParameterError(f"simulation: {expected}, got {simulation.time:.2f} s")
+    if not simulation.is_working.any():
+        raise ParameterError("simulation: expected at least one working robot, got none")
+
+
+def _shift_conditions(conditions: Conditions, time: float, robot_count: int) -> Conditions:
+    """Return the conditions for a run that starts at a given time, s, of the original run.
+
+    Earlier failures happen at the start, and random failures at the times at which they would have happened.
+    """
+    _, failure_times = conditions.compute_working_periods(robot_count)
+    failures = [
+        Failure(robot, max(failure_time - time, 0.0))
+        for robot, failure_time in enumerate(failure_times.tolist(), start=1)
+        if failure_time - time <= MAX_TIME_S
+    ]
+    joins = [
+        Join(join.robot, join.time - time, join.position)
+        for join in conditions.joins
+        if join.time > time + TIME_TOLERANCE_S
+    ]
+    return replace(conditions, failure_rate=0.0, failures=tuple(failures), joins=tuple(joins))
 
 
 def _check_axes(axes: Any) -> None:

@@ -114,10 +114,9 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has thi
     Parameters
     ----------
     map : str, Path, Environment or Simulation
-        Name of a bundled map, a file, the map itself, or a simulation to continue. For a simulation, `height`
-        is the only valid option.
+        Name of a bundled map, a file, the map itself, or a simulation, as in `Simulation.show`.
     **options
-        Options of the window:
+        Options of the window. For a simulation, all except `height` are ignored.
 
         robots : int
             Number of robots; 6 by default.

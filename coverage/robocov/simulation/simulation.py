@@ -426,7 +426,10 @@ class Simulation:
     def show(self, *, height: int = 620) -> Any:
         """Show the simulation in an interactive window, or in a cell of a notebook.
 
-        The window starts from the current positions, at 0 s. It does not change this simulation.
+        The window does not change this simulation. It starts at 0 s with the current positions, velocities
+        and headings of the robots, which fail and join when they would in this simulation. Memories and
+        messages of the robots start empty, and the random numbers for noise and message loss start from the
+        first step.
 
         Parameters
         ----------
@@ -437,6 +440,13 @@ class Simulation:
         -------
         object
             See `robocov.show`.
+
+        Raises
+        ------
+        ParameterError
+            If the controller is not built in, obstacles have moved, or no robot works.
+        RobocovError
+            If the window cannot start.
         """
         return show(self, height=height)
 

@@ -3,6 +3,7 @@
 import functools
 import http.server
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,19 +73,108 @@ def test_the_cell_works_in_a_page_of_another_site(tmp_path, monkeypatch):
         window.close()
 
 
-def test_the_window_continues_a_simulation(monkeypatch):
-    def load_shown_simulation(arguments, height):
-        session_file = Path(arguments[1])
-        return Session.open(load_session(session_file)).timeline.panes[0].simulation
+@pytest.fixture
+def shown_simulations(monkeypatch):
+    """Simulations of the windows that are shown, which are opened in this process."""
+    simulations = []
 
-    monkeypatch.setattr("robocov_app.notebook.LiveWindow", load_shown_simulation)
+    def open_session(arguments, height):
+        session = Session.open(load_session(Path(arguments[1])))
+        simulations.append(session.timeline.panes[0].simulation)
+
+    monkeypatch.setattr("robocov_app.notebook.LiveWindow", open_session)
+    return simulations
+
+
+def build_simulation(controller=None, robots=3, **options):
     rooms = robocov.load_map("rooms")
-    simulation = robocov.Simulation(rooms, robocov.Rapf(k_rep=0.4), rooms.start().sample(3, seed=1))
+    starts = rooms.start().sample(robots, seed=1)
+    return robocov.Simulation(rooms, controller or robocov.Rapf(), starts, **options)
+
+
+def test_the_window_continues_a_simulation(shown_simulations):
+    simulation = build_simulation(robocov.Rapf(k_rep=0.4))
     simulation.run(1.0)
-    shown = simulation.show()
+    simulation.show()
+    (shown,) = shown_simulations
     assert np.array_equal(shown.positions, simulation.positions)
     assert np.array_equal(shown.velocities, simulation.velocities)
     assert shown.controller.k_rep == 0.4
+
+
+def test_robots_fail_and_join_in_the_window_as_in_the_simulation(shown_simulations):
+    conditions = robocov.Conditions(
+        failures=(robocov.Failure(2, 0.2), robocov.Failure(4, 1.0)),
+        joins=(robocov.Join(3, 0.3), robocov.Join(5, 1.2)),
+    )
+    simulation = build_simulation(robots=6, conditions=conditions)
+    simulation.run(0.67)
+    simulation.show()
+    (shown,) = shown_simulations
+    assert shown.is_working.tolist() == [True, False, True, True, False, True]
+    for _ in range(60):
+        shown.step()
+        simulation.step()
+    assert shown.is_working.tolist() == [True, False, True, False, True, True]
+    assert np.array_equal(shown.positions, simulation.positions)
+
+
+def test_robots_fail_at_random_in_the_window_as_in_the_simulation(shown_simulations):
+    simulation = build_simulation(robots=6, conditions=robocov.Conditions(failure_rate=0.8, seed=1))
+    simulation.run(1.0)
+    simulation.show()
+    (shown,) = shown_simulations
+    assert 0 < len(shown.team) == simulation.is_working.sum() < 6
+    assert np.array_equal(shown.positions, simulation.positions[simulation.is_working])
+    assert len(shown.environment.obstacles) - len(simulation.environment.obstacles) == 6 - len(shown.team)
+
+
+def test_unicycles_keep_their_headings_in_the_window(shown_simulations):
+    simulation = build_simulation(team=robocov.Team.homogeneous(3, track_width=0.3))
+    simulation.run(0.5)
+    simulation.show()
+    (shown,) = shown_simulations
+    assert np.array_equal(shown.steering, simulation.steering)
+    shown.run(0.5)
+    simulation.run(0.5)
+    assert np.array_equal(shown.positions, simulation.positions)
+
+
+class Gentle(robocov.Rapf):
+    """A controller with the name of the built-in one."""
+
+
+class Homing:
+    """A controller of a single robot."""
+
+    def force(self, own):
+        return own.centroid - own.position
+
+
+@pytest.mark.parametrize("controller", [Gentle(), Homing()])
+def test_a_simulation_with_a_controller_that_is_not_built_in_is_rejected(controller):
+    expected = f"only simulations with built-in controllers, got {type(controller).__name__}$"
+    with pytest.raises(robocov.ParameterError, match=expected):
+        build_simulation(controller).show()
+
+
+def test_a_simulation_whose_robots_have_all_failed_is_rejected():
+    simulation = build_simulation(conditions=robocov.Conditions(failures=((1, 0.1), (2, 0.1), (3, 0.1))))
+    simulation.run(0.2)
+    with pytest.raises(robocov.ParameterError, match="expected at least one working robot, got none"):
+        simulation.show()
+
+
+def test_a_simulation_whose_obstacles_have_moved_is_rejected(shown_simulations):
+    path = robocov.ObstaclePath(((4.0, 3.0), (6.0, 3.0)), speed=1.0)
+    obstacle = robocov.CircleObstacle((4.0, 3.0), 0.5, path=path)
+    square = replace(robocov.load_map("square"), obstacles=(obstacle,))
+    simulation = robocov.Simulation(square, robocov.Rapf(), [[1.0, 1.0]])
+    simulation.show()
+    assert shown_simulations
+    simulation.run(0.5)
+    with pytest.raises(robocov.ParameterError, match=r"moving obstacles only at 0 s, got 0\.50 s"):
+        simulation.show()
 
 
 def test_without_the_web_extra_a_replay_continues_a_simulation(monkeypatch):
