@@ -90,7 +90,9 @@ class LatestWorker(Generic[_Answer]):
         return latest.value
 
     def put(self, request: object) -> None:
-        """Send a request without waiting for the answer. Older requests that were not sent yet are dropped.
+        """Send a request without waiting for the answer.
+
+        Older requests that have not been sent yet are dropped.
 
         Parameters
         ----------
@@ -195,8 +197,11 @@ class LatestWorker(Generic[_Answer]):
         try:
             # If the process has ended, the reading thread notices it.
             with suppress(OSError), process.stdin as stream:
-                while self._has_request.wait() and self.process is process:
+                while self._has_request.wait():
+                    # Cleared before the checks, so that a later request or `close` wakes the thread again.
                     self._has_request.clear()
+                    if self.process is not process:
+                        break
                     if self._requests:
                         number, request = self._requests.pop()
                         send(stream, (number, codec.encode(request)))

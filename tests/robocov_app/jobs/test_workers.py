@@ -161,6 +161,31 @@ def test_a_worker_may_be_closed_twice_or_without_a_process(worker):
     assert not worker.is_alive
 
 
+def test_a_worker_can_be_closed_while_it_is_woken_by_a_request(worker):
+    closing_thread = threading.Thread(target=worker.close, daemon=True)
+
+    class InterruptedEvent(threading.Event):
+        """An event whose first `clear` is delayed until `close` has set the event, too."""
+
+        set_count = 0
+
+        def set(self):
+            super().set()
+            self.set_count += 1
+
+        def clear(self):
+            if self.set_count == 1:
+                closing_thread.start()
+                wait_for(lambda: self.set_count == 2)
+            super().clear()
+
+    worker._has_request = InterruptedEvent()
+    worker.put(1)
+    wait_for(lambda: closing_thread.ident is not None)
+    closing_thread.join(HANG_LIMIT_S)
+    assert not closing_thread.is_alive()
+
+
 def test_requests_to_a_process_are_answered_one_by_one():
     process = start_process(SERVICE)
     assert [ask_process(process, number).answer for number in (1, 2)] == [2, 4]
