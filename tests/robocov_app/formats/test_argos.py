@@ -64,9 +64,14 @@ CHANCE = '<position method="uniform" min="-1,-1,0" max="1,1,0"/>'
 POST = '<box id="post" size="0.5,0.5,1" movable="false"/>'
 
 
-def distribute(position: str, quantity: int, thing: str, values: str = "0,0,0") -> str:
+ALIKE = '<orientation method="constant" values="0,0,0"/>'
+TURNED = '<orientation method="uniform" min="0,0,0" max="360,0,0"/>'
+TILTED = '<orientation method="gaussian" mean="0,0,0" std_dev="0,20,0"/>'
+
+
+def distribute(position: str, quantity: int, thing: str, orientation: str = ALIKE) -> str:
     return (
-        f'<distribute>{position}<orientation method="constant" values="{values}"/>'
+        f"<distribute>{position}{orientation}"
         f'<entity quantity="{quantity}" max_trials="100">{thing}</entity></distribute>'
     )
 
@@ -85,6 +90,35 @@ def test_grids_are_read_and_random_distributions_counted(tmp_path: Path) -> None
     )
     robots = read(tmp_path, distribute('<position method="constant" values="1,1,0"/>', 1, '<e-puck id="e"/>'))
     assert robots.robots == ((1.0, 1.0),)
+
+
+@pytest.mark.parametrize("orientation", [TURNED, TILTED, '<orientation method="unknown"/>'])
+def test_robots_in_grids_need_no_orientation(tmp_path: Path, orientation: str) -> None:
+    foreign = read(tmp_path, distribute(GRID, 3, '<e-puck id="e"/>', orientation))
+    assert foreign.robots == ((2.0, 0.5), (0.0, 0.5), (2.0, -0.5))
+    assert foreign.dropped == ()
+
+
+def test_obstacles_in_grids_need_a_known_outline(tmp_path: Path) -> None:
+    pillar = '<cylinder id="pillar" radius="0.3" height="1" movable="false"/>'
+    foreign = read(tmp_path, distribute(GRID, 1, pillar, TURNED))
+    assert foreign.free.symmetric_difference(ARENA - CircleObstacle((2.0, 0.5), 0.3).polygon).area < 1e-5
+    body = distribute(GRID, 4, pillar, TILTED) + distribute(GRID, 2, POST, TURNED)
+    foreign = read(tmp_path, body)
+    assert foreign.free.equals(ARENA)
+    assert foreign.dropped == (
+        "2 boxes that ARGoS turns at random",
+        "4 cylinders that ARGoS turns at random",
+    )
+
+
+def test_randomly_placed_entities_can_be_skipped(tmp_path: Path) -> None:
+    body = distribute(CHANCE, 30, POST) + distribute(CHANCE, 7, '<e-puck id="e"/>')
+    foreign = read(tmp_path, body, skip=("post",))
+    assert foreign.dropped == (
+        "7 e-pucks that ARGoS places at random",
+        "30 shapes by their names (--only, --skip)",
+    )
 
 
 @pytest.mark.parametrize(

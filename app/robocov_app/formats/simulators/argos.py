@@ -4,8 +4,8 @@ C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for mult
 Intelligence 6 (2012), 271-295.
 
 Boxes and cylinders are obstacles, whether or not they can be moved. Other bodies are robots, and their
-positions become starts. Entities distributed by the methods ``grid`` and ``constant`` are placed. Those
-distributed at random are left out and counted, because only ARGoS can compute their positions from the seed.
+positions become starts. Entities distributed by the methods ``grid`` and ``constant`` are placed. Randomly
+placed entities are left out and counted: only ARGoS can compute their positions from the seed.
 """
 
 import math
@@ -75,20 +75,37 @@ def _distribute(element: Element, shapes: Shapes) -> None:
     quantity = int(entity.parse_numbers("quantity", count=1)[0])
     body = entity.children[0]
     method = position.attributes.get("method", "")
-    is_turned_alike = orientation.attributes.get("method", "") == "constant"
-    if method not in ("grid", "constant") or not is_turned_alike:
-        tag = to_one_line(body.tag)[:_MAX_TAG_CHARACTERS]
-        shapes.count_omission(tag, "that ARGoS places at random", max(quantity, 0))
+    if method not in ("grid", "constant"):
+        count = max(quantity, 0)
+        if shapes.accept(_list_labels(body), count):
+            tag = to_one_line(body.tag)[:_MAX_TAG_CHARACTERS]
+            shapes.count_omission(tag, "that ARGoS places at random", count)
         return
     if not 0 <= quantity <= MAX_PLACED_ENTITIES:
         entity.raise_error(f"expected a number from 0 to {MAX_PLACED_ENTITIES}, got quantity {quantity}")
-    angles = orientation.parse_numbers("values", count=3)
+    angles = _parse_common_angles(orientation)
     if method == "constant":
         positions = [position.parse_numbers("values", count=3)] * quantity
     else:
         positions = list(_compute_grid_positions(position, quantity))
     for point in positions:
         _place(body, point, angles, shapes)
+
+
+def _parse_common_angles(element: Element) -> FloatArray:
+    """Return the angles of all entities of a <distribute> about z, y and x, (3,) degrees; nan if random."""
+    method = element.attributes.get("method", "")
+    if method == "constant":
+        return element.parse_numbers("values", count=3)
+    if method == "uniform":
+        lowest = element.parse_numbers("min", count=3)
+        highest = element.parse_numbers("max", count=3)
+        return np.where(lowest == highest, lowest, np.nan)
+    if method == "gaussian":
+        means = element.parse_numbers("mean", count=3)
+        deviations = element.parse_numbers("std_dev", count=3)
+        return np.where(deviations == 0.0, means, np.nan)
+    return np.full(3, np.nan)
 
 
 def _compute_grid_positions(element: Element, quantity: int) -> FloatArray:
@@ -105,6 +122,12 @@ def _compute_grid_positions(element: Element, quantity: int) -> FloatArray:
     return positions
 
 
+def _list_labels(element: Element) -> list[str]:
+    """Return the names by which an entity can be selected: its id if it has one, and its tag."""
+    tag = element.tag
+    return [element.attributes.get("id", tag), tag]
+
+
 def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: Shapes) -> None:
     """Add a body as an obstacle or a robot.
 
@@ -114,11 +137,11 @@ def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: S
         The body.
     position : (3,) array, m
     angles : (3,) array, degrees
-        Angles of rotation about z, y and x.
+        Angles of rotation about z, y and x; nan if only ARGoS knows them.
     shapes : Shapes
     """
     tag = element.tag
-    labels = [element.attributes.get("id", tag), tag]
+    labels = _list_labels(element)
     if not shapes.accept(labels):
         return
     if tag not in ("box", "cylinder"):
@@ -128,6 +151,11 @@ def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: S
     tilt = np.abs((angles[1:] + 90) % 180 - 90)
     if (tilt > _MAX_TILT_DEG).any():
         shapes.count_omission(tag, "that is tilted")
+        return
+    # Turning a cylinder about z does not change its outline.
+    outline_angles = angles if tag == "box" else angles[1:]
+    if np.isnan(outline_angles).any():
+        shapes.count_omission(tag, "that ARGoS turns at random")
     elif tag == "box":
         ring = UNIT_SQUARE * _parse_lengths(element, "size")[:2]
         frame = build_frame(position[0], position[1], math.radians(angles[0]))

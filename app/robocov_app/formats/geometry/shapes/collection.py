@@ -84,11 +84,11 @@ class Shapes:
         self.page: Polygon | None = None
         self._crossings = CrossingCounter(source_name)
 
-    def accept(self, labels: Iterable[str]) -> bool:
-        """Return whether to read a shape with these labels; if not, count it as left out."""
+    def accept(self, labels: Iterable[str], count: int = 1) -> bool:
+        """Return whether to read `count` shapes with these labels; if not, count them as left out."""
         is_accepted = self.labels.accepts(labels)
         if not is_accepted:
-            self.count_omission("shape", "by their names (--only, --skip)")
+            self.count_omission("shape", "by their names (--only, --skip)", count)
         return is_accepted
 
     def add_all(self, geometries: Iterable[SourceGeometry]) -> None:
