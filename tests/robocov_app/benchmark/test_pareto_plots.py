@@ -67,6 +67,16 @@ def test_of_many_equal_values_only_the_smallest_gaps_are_drawn() -> None:
     assert [point.label for point in drawn] == ["3.0", "1.0", "bundled", "other"]
 
 
+def test_omitted_points_are_named_with_the_value_by_which_they_were_grouped() -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    values = {"a": 1200.0, "b": 1201.0, "c": 1202.0, "d": 1203.0, "e": 1204.0}
+    equal = [ParetoPoint(style, label, x, 1.0, is_rival=True) for label, x in values.items()]
+    _, omitted = thin_out_equal_values(equal)
+    assert pareto_plots._describe_omitted_points(omitted, []) == (
+        "Not drawn, because a controller with the same value (1200) has no larger gap: b; c; d; e."
+    )
+
+
 def test_points_at_zero_on_a_logarithmic_axis_are_named() -> None:
     style = choose_curve_styles(["rapf"])[0]
     points = [ParetoPoint(style, f"{x:g}", x, 1.0, is_rival=True) for x in (0.0, 1.0, 9.0)]

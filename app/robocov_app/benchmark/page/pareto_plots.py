@@ -165,16 +165,21 @@ def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[
         Points far from all others.
     """
     sentences = []
-    for value in dict.fromkeys(f"{point.x:.4g}" for point in omitted):
+    for value in dict.fromkeys(_round_value(point) for point in omitted):
         # Some labels contain commas.
-        labels = "; ".join(point.label for point in omitted if f"{point.x:.4g}" == value)
+        labels = "; ".join(point.label for point in omitted if _round_value(point) == value)
         sentences.append(
-            f"Not drawn, because a controller with the same value ({value}) has a smaller gap: {labels}."
+            f"Not drawn, because a controller with the same value ({value}) has no larger gap: {labels}."
         )
     if outliers:
         labels = "; ".join(point.label for point in outliers)
         sentences.append(f"Not drawn, because they are far from all others: {labels}.")
     return " ".join(sentences)
+
+
+def _round_value(point: ParetoPoint) -> str:
+    """Return the value of the quantity with three digits; points for which it is the same count as equal."""
+    return f"{float(f'{point.x:.3g}'):g}"
 
 
 def _shorten_label(label: str, *, is_bundled: bool) -> str:
@@ -206,7 +211,7 @@ def thin_out_equal_values(
     """
     points_by_value: dict[str, list[ParetoPoint]] = {}
     for point in points:
-        points_by_value.setdefault(f"{point.x:.3g}", []).append(point)
+        points_by_value.setdefault(_round_value(point), []).append(point)
     omitted: list[ParetoPoint] = []
     for equal_points in points_by_value.values():
         omitted += _list_superfluous_points(equal_points)
