@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TypeVar
 
 import pygame
@@ -15,6 +16,7 @@ from robocov_app.toolkit.commands.menu import Menu
 from robocov_app.viewer.inspection import Inspection
 from robocov_app.viewer.tools.hand import HandTool
 from robocov_app.viewer.tools.handles import drag_handle, find_handle, list_handles
+from robocov_app.viewer.tools.obstacle_drags import add_obstacles, exchange_obstacles
 from robocov_app.viewer.tools.outlines import AddWallTool
 from robocov_app.viewer.tools.segments import RulerTool
 
@@ -91,6 +93,23 @@ def test_alt_drag_copies_an_obstacle(driver: Driver) -> None:
     assert isinstance(after[-1], CircleObstacle)
     assert after[-1].center == pytest.approx((4.6, 2.9), abs=0.05)
     assert driver.viewer.selected_obstacles == (after[-1],)
+
+
+def test_of_equal_obstacles_only_one_is_changed() -> None:
+    session = start_session()
+    obstacles = session.displayed.environment.obstacles
+    pillar = next(obstacle for obstacle in obstacles if isinstance(obstacle, CircleObstacle))
+    add_obstacles(session, (pillar,), "pillar copied")
+    moved = replace(pillar, center=(4.6, 2.9))
+    exchange_obstacles(session, (pillar,), (moved,), "pillar moved")
+    assert session.displayed.environment.obstacles.count(pillar) == 1
+    assert session.displayed.environment.obstacles.count(moved) == 1
+    add_obstacles(session, (pillar,), "pillar copied")
+    exchange_obstacles(session, (pillar,), (), "pillar deleted")
+    assert session.displayed.environment.obstacles.count(pillar) == 1
+    exchange_obstacles(session, (pillar, moved), (moved, pillar), "both moved")
+    assert session.displayed.environment.obstacles.count(pillar) == 1
+    assert session.displayed.environment.obstacles.count(moved) == 1
 
 
 def test_shift_drag_keeps_the_direction(driver: Driver) -> None:

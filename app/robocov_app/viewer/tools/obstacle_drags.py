@@ -203,12 +203,18 @@ def exchange_obstacles(
     str
     """
     environment = session.displayed.environment
+    # A map may contain equal obstacles. Each obstacle in `before` stands for one of them.
+    remaining = list(before)
+    replacements = list(after)
     obstacles: list[Obstacle] = []
     for obstacle in environment.obstacles:
-        if obstacle not in before:
+        if obstacle not in remaining:
             obstacles.append(obstacle)
-        elif after:
-            obstacles.append(after[before.index(obstacle)])
+            continue
+        k = remaining.index(obstacle)
+        del remaining[k]
+        if replacements:
+            obstacles.append(replacements.pop(k))
     changed = map_edits.replace_obstacles(environment, 0, len(environment.obstacles), obstacles)
     return change_map(session, changed, description)
 
