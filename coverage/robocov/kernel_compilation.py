@@ -229,7 +229,7 @@ def are_kernels_compiled(examples: Sequence[Example] = COMMON_EXAMPLES) -> bool:
 
 @contextmanager
 def compile_in_background() -> Iterator[None]:
-    """Compile all kernels in another process, and run kernels as Python as long as they are not compiled.
+    """Compile all kernels in another process, and run kernels as Python until they are compiled.
 
     The results are the same. A step of six robots in Python takes less than a millisecond, so that a window
     can show a simulation in real time from the start. At the end of the ``with`` block, the other process is

@@ -320,7 +320,7 @@ def test_robot_commands_require_a_selected_robot() -> None:
     assert viewer.selected_robot is None
 
 
-def test_undo_of_restarts_restores_the_map_name() -> None:
+def test_undoing_a_restart_restores_the_map_name() -> None:
     viewer = build_presenter()
     run_command(viewer, "more")
     viewer.files.open_map("square")

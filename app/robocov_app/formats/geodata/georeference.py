@@ -21,7 +21,7 @@ from robocov_app.formats.options import get_or_default
 DEGREES = "OGC:CRS84"
 """Longitude and latitude on WGS 84, the system of all GeoJSON (RFC 7946, section 4)."""
 _SYSTEMS_IN_DEGREES = (DEGREES, "EPSG:4326")
-_WAY_OUT = "--units meters uses coordinates without conversion"
+_UNITS_HINT = "--units meters uses coordinates without conversion"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
 _URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
 _ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
@@ -118,7 +118,7 @@ def _are_degrees(geometries: Sequence[SourceGeometry]) -> bool:
 def _unwrap_longitudes(points: FloatArray, center: float) -> FloatArray:
     """Return longitudes and latitudes, with all longitudes within 180 degrees of `center`.
 
-    So shapes that cross the antimeridian have no jump there.
+    This way, shapes that cross the antimeridian have no jump there.
     """
     longitudes = center + (points[:, 0] - center + 180.0) % 360.0 - 180.0
     return np.column_stack([longitudes, points[:, 1]])
@@ -131,7 +131,7 @@ def _parse_reference_system(crs: str, source_name: str) -> str:
     """
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
-        expected = f"expected a code such as EPSG:25832 ({_WAY_OUT})"
+        expected = f"expected a code such as EPSG:25832 ({_UNITS_HINT})"
         raise MapError(f"{source_name}: {expected}, got reference system {quote(crs)}")
     return f"{match[1].upper()}:{match[2].upper()}"
 
@@ -151,7 +151,7 @@ def _project(
         if system in _SYSTEMS_IN_DEGREES:
             expected = "longitude and latitude in degrees"
         raise MapError(
-            f"{shapes.source_name}: expected {expected}, got a point at [{x:g}, {y:g}] ({_WAY_OUT})"
+            f"{shapes.source_name}: expected {expected}, got a point at [{x:g}, {y:g}] ({_UNITS_HINT})"
         )
     points = _unwrap_longitudes(points, points[0, 0])
     if origin is None:
@@ -171,7 +171,7 @@ def _import_pyproj(system: str, source_name: str) -> Any:
         return import_optional("pyproj", "geo")
     except RobocovError as error:
         label = "degrees" if system == DEGREES else system
-        raise MapError(f"{source_name}: coordinates in {label}: {error} ({_WAY_OUT})") from None
+        raise MapError(f"{source_name}: coordinates in {label}: {error} ({_UNITS_HINT})") from None
 
 
 def _transform_to_degrees(pyproj: Any, points: FloatArray, system: str, source_name: str) -> FloatArray:
@@ -180,7 +180,7 @@ def _transform_to_degrees(pyproj: Any, points: FloatArray, system: str, source_n
         source = pyproj.CRS.from_authority(*system.split(":"))
         transformer = pyproj.Transformer.from_crs(source, DEGREES, always_xy=True)
     except pyproj.exceptions.ProjError:
-        raise MapError(f"{source_name}: reference system {system} is unknown ({_WAY_OUT})") from None
+        raise MapError(f"{source_name}: reference system {system} is unknown ({_UNITS_HINT})") from None
     return np.column_stack(transformer.transform(*points.T))
 
 

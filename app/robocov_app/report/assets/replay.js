@@ -42,21 +42,20 @@ function choice(label, options, chosen) {
   return element;
 }
 
-/** Number of columns for pictures side by side, and their maximum width so that all fit on the screen. */
-function columnsFor(count, aspect, width, height) {
-  let best = { columns: 1, wide: 0 };
-  let [most, slot] = [1, width];
+/** Number of columns for panes side by side, and their maximum width so that all fit on the screen. */
+function columnsFor(count, aspect, stageWidth, windowHeight) {
+  let best = { columns: 1, width: 0 };
+  let [maxColumns, minWidth] = [1, Math.min(stageWidth, 420)];
   for (let columns = 1; columns <= count; columns += 1) {
-    const room = (width - (columns - 1) * GAP) / columns;
-    if (columns > 1 && room < 230) break;
-    [most, slot] = [columns, room];
-    const tall = (height - 230) / Math.ceil(count / columns) - WORDS;
-    const wide = Math.min(room, tall * aspect);
-    if (wide > best.wide + 1) best = { columns, wide };
+    const maxWidth = (stageWidth - (columns - 1) * GAP) / columns;
+    if (columns > 1 && maxWidth < 230) break;
+    [maxColumns, minWidth] = [columns, Math.min(maxWidth, 420)];
+    const height = (windowHeight - 230) / Math.ceil(count / columns) - WORDS;
+    const width = Math.min(maxWidth, height * aspect);
+    if (width > best.width + 1) best = { columns, width };
   }
-  // if they do not all fit, they are at least large enough to be seen
-  const least = Math.min(slot, 420);
-  return best.wide < least ? { columns: most, wide: least } : best;
+  // If they do not all fit, each is still large enough to see.
+  return best.width < minWidth ? { columns: maxColumns, width: minWidth } : best;
 }
 
 class Replay {
@@ -319,11 +318,11 @@ class Replay {
 
   draw() {
     if (!this.look) return;
-    const width = this.stage.clientWidth;
-    if (!width) return;
+    const stageWidth = this.stage.clientWidth;
+    if (!stageWidth) return;
     const aspect = Math.min(...this.panes.map(({ run }) => run.arenaMap.width / run.arenaMap.height));
-    const { columns, wide } = columnsFor(this.panes.length, aspect, width, window.innerHeight);
-    const layout = `repeat(${columns}, minmax(0, ${Math.floor(wide)}px))`;
+    const { columns, width } = columnsFor(this.panes.length, aspect, stageWidth, window.innerHeight);
+    const layout = `repeat(${columns}, minmax(0, ${Math.floor(width)}px))`;
     if (this.stage.style.gridTemplateColumns !== layout) this.stage.style.gridTemplateColumns = layout;
     for (const { run, canvas, mark } of this.panes) {
       drawArena(canvas, run, this.time, this.look, this.show);

@@ -70,7 +70,7 @@ class CardSection:
         inner = box.inflate(-2 * padding, -2 * padding)
         picture = Rect(inner.left, inner.top, inner.width, inner.height - text_height)
         if len(card.previews) > 1:
-            # Several runs fill the whole width, where the first one would be below the badge.
+            # Several runs fill the whole width, so the badge would cover the first one.
             badge_width = drawing.px(_BADGE_PX + _GAP_PX)
             picture = Rect(
                 picture.left + badge_width, picture.top, picture.width - badge_width, picture.height
