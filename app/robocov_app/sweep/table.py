@@ -215,7 +215,7 @@ class Table:
                 return
             self._csv.close()
             is_shorter = self._row_count < self._earlier_row_count
-            if not self.is_complete and is_shorter and not self.is_replaced:
+            if not self.is_complete and is_shorter:
                 return
             self._replace_files()
             self.is_replaced = True

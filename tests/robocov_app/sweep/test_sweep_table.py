@@ -159,14 +159,14 @@ def test_without_pyarrow_parquet_is_rejected_before_the_first_run(
     write_table(tmp_path, study, [COMPLETED] * len(study))
     assert [len(row) for row in read_results(tmp_path).rows()] == [len(build_columns(study))] * len(study)
     message = 'pyarrow is not installed: pip install "robocov[parquet]"'
-    for dry in ([], ["--dry-run"]):
-        assert main(["sweep", "study.toml", "--parquet", *dry]) == 2
+    for options in ([], ["--dry-run"]):
+        assert main(["sweep", "study.toml", "--parquet", *options]) == 2
         assert capsys.readouterr().err == f"robocov: error: {message}\n"
     before = read_tables(tmp_path)
     (tmp_path / "results.parquet").touch()  # an older file, which would not contain these rows
-    for asked in (True, False):
+    for is_requested in (True, False):
         error = pytest.raises(RobocovError, match=re.escape(f"{tmp_path}/results.parquet: {message}"))
-        with error, Table(tmp_path, build_columns(study), parquet=asked):
+        with error, Table(tmp_path, build_columns(study), parquet=is_requested):
             pass
     assert read_tables(tmp_path) == [*before, b""]
     assert not list(tmp_path.glob(".*"))
@@ -204,7 +204,7 @@ def test_in_a_first_sweep_csv_grows_and_parquet_appears_at_the_end(tmp_path: Pat
 
 @pytest.mark.parametrize("finished", [True, False])
 @pytest.mark.parametrize(("complete", "rows"), [(True, 3), (False, 3), (False, 4)])
-def test_a_table_is_only_replaced_by_a_complete_or_longer_one(
+def test_a_table_is_not_replaced_by_an_incomplete_shorter_one(
     tmp_path: Path, complete: bool, rows: int, finished: bool
 ) -> None:
     study = build_small_study()
@@ -221,7 +221,9 @@ def test_a_table_is_only_replaced_by_a_complete_or_longer_one(
         table.is_complete = complete
     replaced = complete or rows == 4  # no shorter
     assert table.is_replaced == replaced == ((tmp_path / "study.json").read_bytes() == b"{}")
-    assert len((tmp_path / "results.csv").read_text().splitlines()) == (1 + rows if replaced else 5)
+    text = (tmp_path / "results.csv").read_text()
+    assert ("no room" in text) == replaced
+    assert len(text.splitlines()) == (1 + rows if replaced else 5)
     assert not list(tmp_path.glob(".*"))
 
 
