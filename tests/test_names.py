@@ -162,7 +162,7 @@ def test_docstrings_of_public_names_are_complete(name: str) -> None:
     is_error = isinstance(value, type) and issubclass(value, Exception)
     if not is_interface and not is_error:
         for parameter in list_parameters(value):
-            is_described = re.search(rf"^(?:[\w*]+, )*\**{parameter}\b", text, re.M)
+            is_described = re.search(rf"^(?:\**\w+, )*\**{parameter}(?:, \**\w+)*(?: :.*)?$", text, re.M)
             assert is_described or parameter.startswith("_"), f"{parameter} is not described"
     if not isinstance(value, type) and inspect.signature(value).return_annotation not in (None, "None"):
         assert "Returns" in sections

@@ -86,25 +86,20 @@ def test_interpreted_kernels_give_the_same_bits(
 
 
 def test_only_kernels_that_must_be_are_interpreted() -> None:
-    interpreted: list[str] = []
-
-    def record(name: str, arguments: tuple[Any, ...]) -> bool:
-        interpreted.append(name)
-        return name.endswith("first")
-
     def first(x: float) -> object:
         return type(x)
 
     def second(x: float) -> float:
         return 2.0 * x
 
-    interpret_kernels(record)
+    kernels = [Kernel(first), Kernel(second)]
+    interpret_kernels(lambda name, arguments: name == kernels[0].name)
     try:
-        assert Kernel(first)(1.0) is float  # which no compiled kernel returns
-        assert Kernel(second)(1.0) == 2.0
+        assert kernels[0](1.0) is float
+        assert kernels[1](1.0) == 2.0
     finally:
         interpret_kernels(None)
-    assert len(interpreted) == 2
+    assert [kernel.is_compiled for kernel in kernels] == [False, True]
 
 
 def test_examples_are_called_once_for_a_cache(empty_cache: Path) -> None:

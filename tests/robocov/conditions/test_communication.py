@@ -349,7 +349,7 @@ def test_reported_positions_without_neighbors_are_rejected() -> None:
         partition(np.ones((2, 2)), SQUARE, reported_positions=np.ones((2, 2)))
 
 
-def test_inboxes_can_be_selected_for_another_team() -> None:
+def test_an_inbox_is_adapted_to_another_team() -> None:
     radio = Radio(Conditions(delay=0.2), np.full(3, np.inf), DT)
     inbox = Inbox.create_empty(3)
     working = np.ones(3, dtype=bool)
@@ -361,6 +361,10 @@ def test_inboxes_can_be_selected_for_another_team() -> None:
     np.testing.assert_array_equal(selected.positions[0, 2], inbox.positions[2, 0])
     assert (selected.sent_steps[1] == NEVER).all()
     assert (selected.sent_steps[:, 1] == NEVER).all()
+    reports = radio.read_reports(selected, 5, working)
+    robots, others = reports.neighbors.list_pairs()
+    assert (robots.tolist(), others.tolist()) == ([0, 2], [2, 0])
     assert len(selected.in_flight) == len(inbox.in_flight) == 2
-    assert not selected.in_flight[0].is_received[:, 1].any()
-    assert selected.in_flight[0].is_received[0, 2]
+    for new, old in zip(selected.in_flight, inbox.in_flight, strict=True):
+        assert new.is_received.tolist() == [[False, False, True], [False] * 3, [True, False, False]]
+        np.testing.assert_array_equal(new.positions[[0, 2]], old.positions[[2, 0]])

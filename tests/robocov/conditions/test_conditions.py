@@ -14,7 +14,7 @@ from robocov.conditions import Conditions, DensityKnowledge, Failure, Join, pars
 from robocov.errors import ParameterError
 
 
-def test_conditions_are_ideal_by_default() -> None:
+def test_conditions_are_ideal_unless_one_has_an_effect() -> None:
     assert Conditions().is_ideal
     assert Conditions(seed=4, forget_after=1.0).is_ideal
     for parameters in (
@@ -31,6 +31,7 @@ def test_conditions_are_ideal_by_default() -> None:
         {"failure_rate": 0.1},
         {"failures": ((1, 2),)},
         {"joins": ((1, 2),)},
+        {"density": "sensed"},
     ):
         assert not Conditions(**parameters).uses_messages
         assert not Conditions(**parameters).is_ideal

@@ -284,9 +284,12 @@ def test_copies_have_a_memory_of_their_own(empty: Environment) -> None:
     for _ in range(3):
         simulation.step()
     assert (simulation.observe_and_decide().decision.memory, simulation.memory) == ([4], [3])
-    assert simulation.with_changes(velocities=np.zeros((1, 2))).memory == [3]
     assert simulation.with_changes(controller=ChangesItsMemory(np.zeros((1, 2)))).memory == [0]
+    changed = simulation.with_changes(velocities=np.zeros((1, 2)))
     copy = simulation.copy()
+    for other in (changed, copy):
+        assert other.memory == [3]
+        assert other.memory is not simulation.memory
     for _ in range(5):
         simulation.step()
     for _ in range(5):
