@@ -54,19 +54,34 @@ ALL = Selection(frozenset({0, 1, 2}), frozenset(), frozenset({"corner", "two", "
 
 
 def test_drawn_obstacles_are_on_top_and_selected(sketch):
-    change = create.add_circle(sketch, (2.00004, 3.0), 0.70001)
-    item = change.sketch.obstacles[-1]
-    assert item.shape == CircleObstacle((2.0, 3.0), 0.7)
-    assert change.selection == Selection.of(item.key)
-    assert change.description == "circle drawn"
-    wall = create.add_wall(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
-    assert wall.sketch.obstacles[-1].shape == WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15)
-    box = create.add_rectangle(sketch, [(3.0, 2.0), (1.0, 5.0)])
-    assert box.sketch.obstacles[-1].shape.vertices == ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
-    ring = create.add_polygon(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
-    assert ring.sketch.obstacles[-1].shape.vertices == ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-    crossing = create.add_polygon(sketch, [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)])
-    assert len(crossing.sketch.obstacles) == 4
+    box = ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
+    triangle = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    crossing = ((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0))
+    wall_points = [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)]
+    for change, shape, description in (
+        (create.add_circle(sketch, (2.00004, 3.0), 0.70001), CircleObstacle((2.0, 3.0), 0.7), "circle drawn"),
+        (
+            create.add_wall(sketch, wall_points, 0.15),
+            WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15),
+            "wall drawn",
+        ),
+        (
+            create.add_rectangle(sketch, [(3.0, 2.0), (1.0, 5.0)]),
+            PolygonObstacle(box),
+            "rectangle drawn",
+        ),
+        (
+            create.add_polygon(sketch, [*triangle, triangle[0]]),
+            PolygonObstacle(triangle),
+            "polygon drawn",
+        ),
+        (create.add_polygon(sketch, crossing), PolygonObstacle(crossing), "polygon drawn"),
+    ):
+        assert len(change.sketch.obstacles) == 4
+        item = change.sketch.obstacles[-1]
+        assert item.shape == shape
+        assert change.selection == Selection.of(item.key)
+        assert change.description == description
 
 
 def test_boundary_and_starts_are_drawn(sketch):

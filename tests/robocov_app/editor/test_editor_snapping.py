@@ -65,6 +65,8 @@ def test_a_snap_stays_within_reach_and_has_a_guide(sketch, point, reach, grid, k
         assert abs(moved.point[1] + 0.2) <= max_shift
     else:
         assert math.dist(moved.point, (0.3, -0.2)) <= reach
+        assert moved.guides or moved.point == (0.3, -0.2)
+    assert {guide.kind for guide in moved.guides} <= kinds
     if len(kinds) == 1 and snap.guides:
         # A point that has snapped snaps to itself.
         assert math.dist(snap_point(snap.point, targets, snapping, origin).point, snap.point) <= 1e-7

@@ -138,9 +138,10 @@ class TestThinning:
             render_trail(painter, trail[:n_rows], fade_s=fade_s)
             render_trail(painter_of_thinned_trail, trail[:n_rows], fade_s=fade_s)
         layer = get_trajectory_layer(painter_of_thinned_trail)
-        page = layer._page
-        key = layer._key
+        n_kept_pages = 0
         for n_rows in range(self.N_ROWS_WHEN_THINNED + n_new_rows, self.N_ROWS + 1):
+            page = layer._page
+            key = layer._key
             expected = render_trail(painter, trail[:n_rows], fade_s=fade_s)
             thinned_trail, time = self.thin(trail[:n_rows])
             frame = render_trail(painter_of_thinned_trail, thinned_trail, fade_s=fade_s, time=time)
@@ -148,6 +149,8 @@ class TestThinning:
             is_same_fade_step = layer._key == key
             if fade_s is None or is_same_fade_step:
                 assert layer._page is page
+                n_kept_pages += 1
+        assert n_kept_pages > 0
 
     def test_a_new_painter_draws_nearly_the_same_trail(self):
         trail = build_random_trail(self.N_ROWS)

@@ -274,6 +274,7 @@ def test_panes_are_added_changed_and_removed(opened) -> None:
         "list.dispatchEvent(new Event('change'))"
     )
     assert opened.time == 3.0 and opened.has_focus(".pane select")
+    assert opened.run_script("return document.querySelector('.pane select').value") == "1"
     for _ in range(3):
         opened.find(".remove").click()
     assert len(opened.find_all(".pane")) == 1 and not opened.find_all(".pane .remove")

@@ -372,25 +372,22 @@ def test_the_pencil_is_never_cut_off() -> None:
     assert min(counts) > 0.85 * max(counts)
 
 
-BADGE_REACH_PX = 28
-"""Distance of the lower right corner of a badge from the corner of its card."""
-
-
 def test_badges_cover_no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
-    boxes: list[pygame.Rect] = []
+    previews: list[pygame.Rect] = []
+    badges: list[pygame.Rect] = []
 
-    def list_box(
+    def record_preview(
         screen: pygame.Surface, run: RunPreview, box: pygame.Rect, *args: Any, **kwargs: Any
     ) -> None:
-        boxes.append(fit_outline(run.outline, box))
+        previews.append(fit_outline(run.outline, box))
 
-    monkeypatch.setattr("robocov_app.viewer.start.card_section.draw_run", list_box)
+    def record_badge(screen: pygame.Surface, box: pygame.Rect, *args: Any, **kwargs: Any) -> None:
+        badges.append(box)
+
+    monkeypatch.setattr("robocov_app.viewer.start.card_section.draw_run", record_preview)
+    monkeypatch.setattr("robocov_app.viewer.start.card_section.draw_rounded_box", record_badge)
     with open_page(size=(900, 600)) as page:
         page.run_frame(0.0)
-        corners = [
-            pygame.Rect(item.box.left, item.box.top, BADGE_REACH_PX, BADGE_REACH_PX)
-            for item in page.focus.items
-            if item.name.startswith("card:")
-        ]
-    assert boxes
-    assert not any(box.collidelist(corners) >= 0 for box in boxes)
+    assert previews
+    assert badges
+    assert not any(preview.collidelist(badges) >= 0 for preview in previews)
