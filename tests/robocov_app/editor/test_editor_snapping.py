@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from drawn_sketches import HALL, valid_sketches
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
@@ -44,6 +44,7 @@ def targets() -> SnapTargets:
     some_kinds,
     st.one_of(st.none(), cursor),
 )
+@example(Sketch(boundary=HALL), (-0.25, 0.25), 0.3, 0.1, frozenset({"vertex"}), None)
 def test_a_snap_stays_within_reach_and_has_a_guide(sketch, point, reach, grid, kinds, origin):
     targets = collect_snap_targets(sketch)
     snapping = SnapSettings(reach, grid, kinds=kinds)
