@@ -283,6 +283,29 @@ class TestScrolling:
         assert page.ui.find("label", "line 0") is None
         assert page.ui.find("bar", "more") is None
 
+    @pytest.mark.parametrize("scale", [1.0, 1.125, 1.25, 1.75])
+    def test_the_rows_of_a_long_list_fill_the_area_at_any_scale(
+        self, scale: float, screen: pygame.Surface
+    ) -> None:
+        rows: list[tuple[int, pygame.Rect]] = []
+
+        def show_rows(ui: Ui) -> None:
+            rows.clear()
+            with ui.scroll("rows"):
+                rows.extend((number, ui.cell()) for number in ui.visible_rows(1000, 22.0))
+
+        ui = Ui(show_rows, LIGHT, scale)
+        ui.box = screen.get_rect()
+        ui.draw(screen)
+        for offset in (0.0, 2200.0, 11000.0, 22000.0):
+            ui.scroll_offsets["rows"] = offset
+            ui.run(None, screen)
+            _, first = rows[0]
+            _, last = rows[-1]
+            assert first.top <= ui.box.top
+            assert last.bottom >= ui.box.bottom - 1
+        assert rows[-1][0] == 999
+
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.25])
 def test_an_unchanged_page_is_drawn_again(scale: float, screen: pygame.Surface) -> None:

@@ -123,9 +123,11 @@ def list_visible_rows(page: Page, count: int, height: float) -> Iterator[int]:
     int
     """
     page.end_row()
-    first = int((page.clip.top - page.box.top - page.px(page.y)) / page.px(height))
+    # The height is not rounded, because the positions of rows are computed before they are rounded.
+    row_px = height * page.scale
+    first = int((page.clip.top - page.box.top - page.y * page.scale) / row_px)
     first = min(max(first, 0), count)
-    last = min(first + page.clip.height // page.px(height) + 2, count)
+    last = min(first + int(page.clip.height / row_px) + 2, count)
     # Skip the invisible rows above and below without laying them out.
     page.y += first * height
     page.row(height=height, below=0)
