@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from driven_window import Driver
@@ -24,6 +27,15 @@ def test_the_point_under_the_pointer_stays_there() -> None:
     assert glide.is_over
     assert zooms == sorted(zooms)
     assert zooms[-1] == end.zoom
+
+
+def test_the_zoom_may_differ_by_a_rounding_error() -> None:
+    start = Camera((2.0, 3.0), 63.0, (0.0, 0.0, 400.0, 300.0))
+    end = replace(start, center=(4.0, 3.0), zoom=math.nextafter(63.0, 64.0))
+    assert 1.0 / end.zoom == 1.0 / start.zoom
+    camera = CameraGlide(start, end).advance(GLIDE_S / 2)
+    assert 2.0 < camera.center[0] < 4.0
+    assert camera.center[1] == 3.0
 
 
 def test_the_map_glides_to_the_zoom_and_back(driver: Driver) -> None:

@@ -1,11 +1,14 @@
 """A short, smooth change from one camera to another."""
 
+import math
 from dataclasses import replace
 
 from robocov_app.render.camera import Camera
 
 GLIDE_S = 0.15
 """Duration of a change: long enough to be followed by eye, too short to wait for."""
+_MIN_RELATIVE_CHANGE = 1e-9
+"""Below this relative change of the zoom, the center moves linearly."""
 
 
 class CameraGlide:
@@ -38,10 +41,12 @@ class CameraGlide:
         start = self._start
         end = self.end
         zoom = start.zoom * (end.zoom / start.zoom) ** progress
+        start_width = 1.0 / start.zoom
+        end_width = 1.0 / end.zoom
         fraction = progress
-        if start.zoom != end.zoom:
+        if not math.isclose(start_width, end_width, rel_tol=_MIN_RELATIVE_CHANGE):
             # The center moves along with the width of the view, 1 / zoom, not with the logarithm of the zoom.
-            fraction = (1.0 / zoom - 1.0 / start.zoom) / (1.0 / end.zoom - 1.0 / start.zoom)
+            fraction = (1.0 / zoom - start_width) / (end_width - start_width)
         x = start.center[0] + fraction * (end.center[0] - start.center[0])
         y = start.center[1] + fraction * (end.center[1] - start.center[1])
         return replace(start, center=(x, y), zoom=zoom)
