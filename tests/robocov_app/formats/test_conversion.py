@@ -223,6 +223,10 @@ def test_cells_larger_than_robots_are_noted() -> None:
     assert build_environment(build_foreign_map(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
 
 
+CORRIDOR = box(0, 0, 5.15, 0.3) | box(4.85, 0, 5.15, 3)
+"""An L. Its widest point is in the corner, 0.176 m from the walls."""
+
+
 def test_unreachable_regions_are_noted() -> None:
     rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
     _, report = build_environment(build_foreign_map(rooms), Shaping(), "plan")
@@ -238,6 +242,8 @@ def test_unreachable_regions_are_noted() -> None:
         ((), {}, "plan: there is no free space"),
         ((Polygon([(0, 0), (1, 1), (2, 2)]),), {}, "plan: there is no free space"),
         ((box(0, 0, 9, 0.15),), {}, "(the widest is for one of 0.0735 m): is the scale right?"),
+        ((CORRIDOR,), {"radius": 0.2}, "(the widest is for one of 0.172 m): is the scale right?"),
+        ((CORRIDOR,), {"radius": 1.0}, "(the widest is for one of 0.172 m): is the scale right?"),
         ((ROOM,), {"radius": 30.0}, "plan: no position has enough clearance for a robot of radius 30 m"),
         ((box(0, 0, 1e-4, 1e-4),), {}, "is the scale right?"),
         ((box(0, 0, 20_000, 9),), {}, "boundary: expected at most 10 km"),

@@ -24,6 +24,8 @@ _START_STEPS_PER_SIDE = 500
 """The tolerance for the center of a start is the side of a square of the same area, divided by this."""
 _STEPS_PER_CLEARANCE = 50
 """The tolerance in the search for a position with enough clearance is the clearance divided by this."""
+_STEPS_PER_WIDTH = 500
+"""The tolerance for the widest point of a part is the mean width of the part divided by this."""
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
 _MAX_DISC_RADIUS_M = 2.0
 _MIN_DISC_RADIUS_M = 0.02
@@ -59,7 +61,8 @@ def find_widest_point(
     tolerance : float, m
         Accuracy of the distance: no other point is farther from the walls by more than this.
     sufficient : float, m
-        The search ends as soon as it finds a point at this distance from the walls.
+        The search ends as soon as it finds a point at this distance from the walls, and skips areas without
+        such a point; the returned point is then not the farthest one.
 
     Returns
     -------
@@ -117,21 +120,34 @@ def _cover_with_squares(free: Polygon, max_squares: int) -> tuple[FloatArray, fl
 def require_clearance(parts: list[Polygon], conversion: Conversion) -> None:
     """Raise MapError if no part of the free space is wide enough for a robot to start in."""
     clearance = conversion.clearance
-    widest = 0.0
     for part in parts:
-        # No point of a part is farther from its walls than the radius of the disc of the same area.
-        if math.sqrt(part.area / math.pi) > widest:
+        if _limit_distance(part) >= clearance:
             _, distance = find_widest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
-            widest = max(widest, distance)
-        if widest >= clearance:
-            return
+            if distance >= clearance:
+                return
     radius = clearance / (1 + MIN_START_GAP_RADII)
-    max_radius = widest / (1 + MIN_START_GAP_RADII)
+    max_radius = _find_max_distance(parts) / (1 + MIN_START_GAP_RADII)
     reason = f"no position has enough clearance for a robot of radius {radius:g} m"
     raise MapError(
         f"{conversion.source_name}: {reason} (the widest is for one of {max_radius:.3g} m): "
         "is the scale right?"
     )
+
+
+def _find_max_distance(parts: list[Polygon]) -> float:
+    """Return the distance of the widest point of all parts from its walls, m."""
+    max_distance = 0.0
+    for part in parts:
+        if _limit_distance(part) > max_distance:
+            mean_width = part.area / part.length
+            _, distance = find_widest_point(part, mean_width / _STEPS_PER_WIDTH)
+            max_distance = max(max_distance, distance)
+    return max_distance
+
+
+def _limit_distance(part: Polygon) -> float:
+    """Return the radius of the disc of the same area, m: no point of a part is farther from its walls."""
+    return math.sqrt(part.area / math.pi)
 
 
 def build_starts(free: MultiPolygon, conversion: Conversion) -> dict[str, StartSpec]:
