@@ -90,7 +90,7 @@ def test_scale_and_raw_give_the_solid_fraction_of_a_cell(tmp_path: Path) -> None
 
 
 def test_names_that_yaml_would_misread_are_quoted(tmp_path: Path) -> None:
-    for name in ("a: b", "#1", "- x", "über", "'q'", "true", "12"):
+    for name in ("a: b", "#1", "- x", "über", "'q'", "true", "12", "tür 🚪", "\x7f"):
         path = tmp_path / f"{name}.yaml"
         export_map(CORNER, path, options=WriteOptions(cell=0.25))
         assert import_map(path)[0].free_area > 0, name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from driven_window import Driver, open_viewer
 from sample_sessions import HALL, LLOYD, PILLAR, RAPF, advance_session
 
 from robocov.conditions import Conditions
+from robocov.environment import UniformStart
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov_app.cli import main
@@ -24,7 +26,7 @@ from robocov_app.viewer.session.files.session_file import load_session
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.sharing.share import ShareActions
-from robocov_app.viewer.sharing.values import format_number
+from robocov_app.viewer.sharing.values import format_number, format_python_text
 
 STEPS = 40
 ROOMS = load_map("rooms")
@@ -243,6 +245,14 @@ def test_headings_of_unicycles_are_in_the_script(tmp_path: Path) -> None:
     assert np.array_equal(positions, expected)
 
 
+def test_a_start_with_an_emoji_in_its_name_is_in_the_script(tmp_path: Path) -> None:
+    name = "tür 🚪"
+    rooms = replace(ROOMS, starts={name: UniformStart()})
+    with open_viewer(tmp_path, RAPF, environment=rooms, map_name="rooms", start=name) as driver:
+        script = copy_text(driver, "share:python")
+    assert f'start="{name}"' in script
+
+
 def test_a_copy_opens_this_session_which_keeps_its_own_file(driver: Driver, tmp_path: Path) -> None:
     advance_session(driver.session, STEPS)
     driver.window.run_command("save:session")
@@ -308,3 +318,11 @@ def test_the_message_about_a_copy_ends_with_a_command_that_opens_it(
 @pytest.mark.parametrize("value", [2.0, 0.1, 0.1 + 0.2, 1e-7, 123456789.125, np.inf])
 def test_numbers_are_exact(value: float) -> None:
     assert float(format_number(value)) == value
+
+
+@pytest.mark.parametrize("text", ["rooms", "tür 🚪", "it's", 'a "b"', "'\"\\\n", "\x7f\u202e", "\udcff", ""])
+def test_texts_are_exact(text: str) -> None:
+    literal = format_python_text(text)
+    assert ast.literal_eval(literal) == text
+    # Surrogates are escaped, because the clipboard is in UTF-8.
+    assert literal.encode().decode() == literal

@@ -1,6 +1,5 @@
 """A run as a few lines of Python."""
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,7 +9,12 @@ from robocov.team import UNITS, Team
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.scenario import DEFAULT_PROPERTIES, SessionScenario
 from robocov_app.viewer.sharing.shared_run import SharedRun
-from robocov_app.viewer.sharing.values import format_gain_value, format_python_number, format_time
+from robocov_app.viewer.sharing.values import (
+    format_gain_value,
+    format_python_number,
+    format_python_text,
+    format_time,
+)
 
 _IDEAL = Conditions()
 
@@ -40,7 +44,7 @@ def build_python(run: SharedRun) -> str:
         lines += _list_team_lines(scenario)
     controllers = scenario.controllers
     if len(controllers) == 1:
-        arguments = [json.dumps(run.map_name), json.dumps(controllers[0].name)]
+        arguments = [format_python_text(run.map_name), format_python_text(controllers[0].name)]
         gains = controllers[0].drop_defaults().gains
         if gains:
             arguments.append(f"gains={_format_gains(controllers[0])}")
@@ -48,7 +52,7 @@ def build_python(run: SharedRun) -> str:
         lines.append("print(record)")
     else:
         names = ", ".join(_format_controller(controller) for controller in controllers)
-        arguments = [json.dumps(run.map_name), f"[{names}]"]
+        arguments = [format_python_text(run.map_name), f"[{names}]"]
         lines += _format_call("comparison = rc.compare", [*arguments, *_list_arguments(run)])
         lines.append("print(comparison)")
     return "\n".join(lines) + "\n"
@@ -61,7 +65,7 @@ def _format_call(function: str, arguments: list[str]) -> list[str]:
 
 def _format_controller(controller: ControllerChoice) -> str:
     """Return a controller as an argument of `robocov.compare`."""
-    name = json.dumps(controller.name)
+    name = format_python_text(controller.name)
     if controller.drop_defaults().gains:
         return f"rc.make_controller({name}, {_format_gains(controller)})"
     return name
@@ -72,7 +76,7 @@ def _format_gains(controller: ControllerChoice) -> str:
     items: list[str] = []
     for name, value in controller.drop_defaults().gains.items():
         text = format_gain_value(value, is_json=False)
-        items.append(f"{json.dumps(name)}: {text}")
+        items.append(f"{format_python_text(name)}: {text}")
     return "{" + ", ".join(items) + "}"
 
 
@@ -81,7 +85,7 @@ def _list_arguments(run: SharedRun) -> Iterator[str]:
     scenario = run.scenario
     yield _format_team(scenario)
     if scenario.start is not None:
-        yield f"start={json.dumps(scenario.start)}"
+        yield f"start={format_python_text(scenario.start)}"
     yield f"seed={scenario.seed}"
     if scenario.given_starts is not None:
         yield f"starts={_format_rows(scenario.given_starts.tolist())}"

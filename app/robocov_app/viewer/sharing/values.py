@@ -1,6 +1,5 @@
-"""Numbers in commands and in Python: as short as possible, but exact."""
+"""Numbers and texts in commands and in Python: as short as possible, but exact."""
 
-import json
 import math
 
 
@@ -62,8 +61,30 @@ def format_gain_value(value: float | str | None, *, is_json: bool) -> str:
     if value is None:
         return "null" if is_json else "None"
     if isinstance(value, str):
-        return value if is_json else json.dumps(value)
+        return value if is_json else format_python_text(value)
     return format_number(value)
+
+
+def format_python_text(text: str) -> str:
+    """Return text as a string literal of Python, in double quotes if it contains no quotes.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(format_python_text("rooms"))
+    "rooms"
+    """
+    literal = repr(text)
+    if "'" in text or '"' in text:
+        return literal
+    return f'"{literal[1:-1]}"'
 
 
 def format_python_number(value: float) -> str:

@@ -4,12 +4,12 @@ Cells outside the boundary are unknown, except for those next to the free space:
 planners that treat unknown cells as passable stay inside.
 """
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -33,6 +33,8 @@ _SUBDIVISION = 4
 """Subcells along each side of a cell; the solid fraction of them is its occupancy in modes scale and raw."""
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 """File names that need no quotes in YAML."""
+_MAX_LINE_CHARACTERS = 10_000
+"""File names of up to this length are written in one line."""
 
 
 def list_files(path: Path, options: WriteOptions) -> tuple[Path, ...]:
@@ -92,7 +94,11 @@ def _quote_image_name(path: Path, image: Path) -> str:
         image.name.encode()
     except UnicodeEncodeError:
         raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: expected a name in UTF-8") from None
-    return image.name if _PLAIN_NAME.fullmatch(image.name) else json.dumps(image.name)
+    if _PLAIN_NAME.fullmatch(image.name):
+        return image.name
+    # YAML does not join the surrogate pairs that JSON has for characters beyond U+FFFF.
+    quoted = yaml.safe_dump(image.name, default_style='"', allow_unicode=True, width=_MAX_LINE_CHARACTERS)
+    return quoted.rstrip("\n")
 
 
 def _compute_occupancy(environment: Environment, grid: CellGrid, free: BoolArray) -> Float32Array:
