@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,6 +14,8 @@ from robocov.files.writing import replace_file
 
 FOLDER_VARIABLE = "ROBOCOV_SETTINGS"
 """Environment variable that selects another folder for settings; if it is empty, none are stored."""
+BACKUP_SUFFIX = ".bak"
+"""Suffix that is appended to the name of a file that cannot be read, before a new one is written."""
 SettingsType = TypeVar("SettingsType", bound=BaseModel)
 
 
@@ -59,7 +61,7 @@ def merge_changed_settings(
     Parameters
     ----------
     saved : BaseModel
-        Settings as they were loaded.
+        Settings in the file, which another window may have changed.
     at_opening, at_closing : BaseModel
         Settings of the window when it opened and when it closed. Options from the command line are in both,
         so they do not count as changes and are not saved.
@@ -104,6 +106,10 @@ def save_changed_settings(
 ) -> Iterator[None]:
     """Save the settings that change while the block runs; save nothing if it raises.
 
+    Other settings keep the values that they have in the file at the end, because another window may have
+    saved them. If the file cannot be read then, it is renamed to end in `BACKUP_SUFFIX`. Without changes, an
+    existing file stays as it is.
+
     Parameters
     ----------
     settings : BaseModel
@@ -115,4 +121,11 @@ def save_changed_settings(
     """
     at_opening = read(settings)
     yield
-    save_settings(merge_changed_settings(settings, at_opening, read(settings)), file)
+    at_closing = read(settings)
+    if file is None or (at_closing == at_opening and file.exists()):
+        return
+    saved, problem = load_settings(type(settings), file)
+    if problem and file.is_file():
+        with suppress(OSError):
+            file.replace(file.with_name(file.name + BACKUP_SUFFIX))
+    save_settings(merge_changed_settings(saved, at_opening, at_closing), file)

@@ -15,6 +15,7 @@ from robocov_app.storage.settings import (
     find_settings_file,
     load_settings,
     merge_changed_settings,
+    save_changed_settings,
     save_settings,
 )
 from robocov_app.viewer.launch import ViewerSettings
@@ -133,3 +134,51 @@ def test_only_settings_changed_in_the_window_are_saved():
     assert merge_changed_settings(saved, opened, opened) == saved
     closed = opened.model_copy(update={"fade": True, "width": 1400})
     assert merge_changed_settings(saved, opened, closed) == ViewerSettings(width=1400, fade=True)
+
+
+class ChangedWindow:
+    """A window whose settings a test changes while it is open."""
+
+    def __init__(self) -> None:
+        self.changes: dict[str, object] = {}
+
+    def read(self, settings: ViewerSettings) -> ViewerSettings:
+        return settings.model_copy(update=self.changes)
+
+
+def test_a_window_keeps_the_settings_that_another_one_has_saved(tmp_path):
+    file = tmp_path / "window.json"
+    assert save_settings(ViewerSettings(), file) == ""
+    settings, _ = load_window_settings(file)
+    first = ChangedWindow()
+    second = ChangedWindow()
+    with save_changed_settings(settings, file, second.read):
+        with save_changed_settings(settings, file, first.read):
+            first.changes["theme"] = "dark"
+        second.changes["width"] = 1400
+    assert load_window_settings(file) == (ViewerSettings(theme="dark", width=1400), "")
+    with save_changed_settings(settings, file, lambda settings: settings):
+        pass
+    assert load_window_settings(file) == (ViewerSettings(theme="dark", width=1400), "")
+
+
+def test_the_first_window_saves_its_settings_even_if_nothing_changes(tmp_path):
+    file = tmp_path / "window.json"
+    with save_changed_settings(ViewerSettings(), file, lambda settings: settings):
+        pass
+    assert load_window_settings(file) == (ViewerSettings(), "")
+
+
+def test_an_unreadable_file_is_kept_when_settings_are_saved(tmp_path):
+    file = tmp_path / "window.json"
+    text = '{"theme": "dark",}'
+    file.write_text(text)
+    settings, _ = load_window_settings(file)
+    window = ChangedWindow()
+    with save_changed_settings(settings, file, window.read):
+        pass
+    assert file.read_text() == text
+    with save_changed_settings(settings, file, window.read):
+        window.changes["width"] = 1400
+    assert load_window_settings(file) == (ViewerSettings(width=1400), "")
+    assert (tmp_path / "window.json.bak").read_text() == text
