@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import signal
+import subprocess
+import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +18,7 @@ from sample_sessions import HALL, LLOYD, RAPF, advance_session, advance_with_cos
 from session_records import build_record, have_same_arrays, select_present_branch
 
 from robocov.environment import CircleObstacle
+from robocov.errors import OutputError
 from robocov.metrics import compute_path_lengths
 from robocov.record import Record
 from robocov_app.cli import main
@@ -217,6 +224,63 @@ def test_a_run_is_saved_by_another_process_without_temporary_files(
     assert not is_error
     assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
     assert not list(temporary_folder.iterdir())
+
+
+def raise_memory_error(*arguments: object, **options: object) -> None:
+    raise OSError(errno.ENOMEM, "Cannot allocate memory")
+
+
+def raise_full_disk(*arguments: object, **options: object) -> None:
+    raise OutputError("session.robocov: cannot be written: No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("name", "fail", "expected"),
+    [
+        ("subprocess.Popen", raise_memory_error, "the run cannot be saved: Cannot allocate memory"),
+        ("tempfile.TemporaryDirectory", raise_memory_error, "the run cannot be saved: Cannot allocate"),
+        ("save_session", raise_full_disk, "session.robocov: cannot be written"),
+    ],
+)
+def test_a_run_that_cannot_be_saved_leaves_no_folder(
+    name: str,
+    fail: Callable[..., None],
+    expected: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    temporary_folder = tmp_path / "temporary"
+    temporary_folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary_folder))
+    monkeypatch.setattr(f"robocov_app.viewer.session.files.run_saver.{name}", fail)
+    saver = RunSaver(16)
+    with pytest.raises(OutputError, match=expected):
+        saver.save(start_session(RAPF), tmp_path / "runs")
+    assert not list((tmp_path / "runs").iterdir())
+    assert not list(temporary_folder.iterdir())
+    saver.finish()
+    assert saver.poll() == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_the_message_says_that_the_process_of_a_run_was_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start_process = subprocess.Popen
+
+    def start_and_kill(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        process = start_process([sys.executable, "-c", "import time; time.sleep(60)"], **options)
+        process.send_signal(signal.SIGKILL)
+        return process
+
+    monkeypatch.setattr("robocov_app.viewer.session.files.run_saver.subprocess.Popen", start_and_kill)
+    saver = RunSaver(16)
+    saver.save(start_session(RAPF), tmp_path)
+    saver.finish()
+    target = tmp_path / "hall-rapf-1"
+    reason = "the process has ended (killed by signal 9 (SIGKILL))"
+    assert saver.poll() == [(f"run not saved: {target}/: {reason}", True)]
+    assert not target.exists()
 
 
 def test_the_path_length_excludes_placing_a_robot() -> None:

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import tempfile
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import DEVNULL
@@ -12,10 +12,12 @@ from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
 from robocov_app.runs.saved_runs import name_folders
 from robocov_app.terminal.output import clean_file_stem, echo, find_free_path
+from robocov_app.terminal.supervision import describe_status
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.editing.edits import Restart, SetController
 from robocov_app.viewer.session.files.session_file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.timeline import Timeline
 
 FIRST_WAIT_S = 0.5
 """Time for which `finish` waits for a process before it tells the user."""
@@ -77,26 +79,36 @@ class RunSaver:
         ParameterError
             If the session cannot be recomputed from its edits.
         OutputError
-            If the folder cannot be created, or the process cannot be started.
+            If a folder or the session file cannot be written, or the process cannot be started. Then the
+            folder of the run is removed again.
         """
         timeline = session.timeline
         timeline.require_reproducible()
         target = _make_new_folder(folder, _build_folder_stem(session, map_name))
-        temporary = tempfile.TemporaryDirectory(prefix="robocov-")
-        file = Path(temporary.name) / f"session{SUFFIX}"
-        save_session(file, timeline.document, timeline.head, timeline.step, {})
-        command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
-        command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
-        user_controllers = list_user_controllers(timeline.document)
-        if user_controllers:
-            command += ["--controller", ",".join(user_controllers)]
         try:
-            with file.with_name(_ERROR_FILE).open("wb") as errors:
-                process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
+            self._jobs.append(self._start_job(timeline, target))
         except OSError as error:
             raise OutputError(f"the run cannot be saved: {error.strerror or error}") from error
-        self._jobs.append(_Job(target, process, temporary))
         return f"saving the run: {target}/"
+
+    def _start_job(self, timeline: Timeline, target: Path) -> _Job:
+        """Start the process that saves a run in the folder `target`; remove the folder if that fails."""
+        with ExitStack() as cleanup:
+            cleanup.callback(_remove_if_empty, target)
+            temporary = tempfile.TemporaryDirectory(prefix="robocov-")
+            cleanup.callback(temporary.cleanup)
+            file = Path(temporary.name) / f"session{SUFFIX}"
+            save_session(file, timeline.document, timeline.head, timeline.step, {})
+            command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
+            command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
+            user_controllers = list_user_controllers(timeline.document)
+            if user_controllers:
+                command += ["--controller", ",".join(user_controllers)]
+            with file.with_name(_ERROR_FILE).open("wb") as errors:
+                process = subprocess.Popen(command, stdin=DEVNULL, stdout=DEVNULL, stderr=errors)
+            # The process needs both folders.
+            cleanup.pop_all()
+        return _Job(target, process, temporary)
 
     def poll(self) -> list[tuple[str, bool]]:
         """Return (message, is_error) for each run whose process has ended since the last call."""
@@ -132,16 +144,22 @@ class RunSaver:
         # A program that cleans up temporary files may already have removed the folder.
         with suppress(OSError), job.temporary as folder:
             lines = Path(folder, _ERROR_FILE).read_text("utf-8", "replace").strip().splitlines()
-        if job.process.returncode == 0:
+        status = job.process.returncode
+        if status == 0:
             self._messages.append((f"run saved: {job.target}/ (record, cost, figures)", False))
             return
-        reason = "the process has ended"
-        if lines:
+        reason = f"the process has ended ({describe_status(status)})"
+        # A process that was killed has not reported why.
+        if lines and status > 0:
             reason = lines[-1].removeprefix("robocov: error: ")
-        # Remove the folder only if it is empty.
-        with suppress(OSError):
-            job.target.rmdir()
+        _remove_if_empty(job.target)
         self._messages.append((f"run not saved: {job.target}/: {reason}", True))
+
+
+def _remove_if_empty(folder: Path) -> None:
+    """Remove a folder if it exists and is empty."""
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def _build_folder_stem(session: Session, map_name: str) -> str:
