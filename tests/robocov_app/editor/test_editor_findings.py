@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
-from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, Gap, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.canvas import list_map_facts
-from robocov_app.editor.canvas.overlay import STEM_PX
+from robocov_app.editor.canvas.overlay import STEM_PX, build_gap_label
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import LAYERS
 from robocov_app.look.theme import DARK, LIGHT, Theme
@@ -48,9 +48,30 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
         assert count_pixels(draw_without_message(driver), at, amber, 6) > 15
         driver.run_command("radius 0.05")
         assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
+        # A passage that is narrower than a robot by less than a micrometer is wide enough.
+        driver.run_command("radius 0.0750004")
+        assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
         driver.run_command("radius 0.1")
         driver.press_key("alt+1")
         assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
+
+
+@pytest.mark.parametrize(
+    ("width", "radius", "label"),
+    [
+        (0.15, 0.1, "passage 0.15 m < 0.20 m"),
+        (0.023, 0.0125, "passage 2.3 cm < 2.5 cm"),
+        (0.1997, 0.1, "passage 0.1997 m < 0.2000 m"),
+        (0.0234, 0.01172, "passage 0.02340 m < 0.02344 m"),
+        (0.098, 0.05, "passage 0.098 m < 0.100 m"),
+        (0.199998, 0.1, "passage 0.199998 m < 0.200000 m"),
+        (1.3 - 1.1, 0.1, "passage 0.200 m ≥ 0.200 m"),
+        (0.1, 0.1 / 2, "passage 0.100 m ≥ 0.100 m"),
+        (5.0, 0.02, "passage 5.000 m ≥ 0.040 m"),
+    ],
+)
+def test_the_label_of_a_passage_does_not_contradict_itself(width: float, radius: float, label: str) -> None:
+    assert build_gap_label(Gap(width, ((0.0, 0.0), (width, 0.0))), radius) == label
 
 
 def test_cut_off_areas_are_hatched_and_reported(tmp_path: Path) -> None:

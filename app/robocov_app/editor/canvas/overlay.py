@@ -14,7 +14,8 @@ from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart
 from robocov.typing import FloatArray
 from robocov_app.editor.canvas.outlines import build_outline
 from robocov_app.editor.canvas.sheet_view import View, compute_pixel_box
-from robocov_app.editor.model.geometry import distance, format_length
+from robocov_app.editor.model.geometry import distance, format_compared_lengths, format_length
+from robocov_app.editor.model.measurement import is_too_narrow
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.handles import KNOB_HEIGHT_PX, Handle
@@ -434,7 +435,7 @@ def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
     """Draw the narrowest gap, in the color of warnings if robots with a radius, m, do not fit through it."""
     start, end, across = _locate_gap(canvas, gap)
     color = canvas.theme.start
-    if gap.width < 2 * radius:
+    if is_too_narrow(gap, radius):
         color = canvas.theme.warning
     # A line along the gap, and a short one across it at each end.
     for line_start, line_end in (
@@ -466,12 +467,7 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     """
     start, end, across = _locate_gap(canvas, gap)
     scale = canvas.scale
-    sign = "<" if gap.width < 2 * radius else "≥"
-    width = format_length(gap.width)
-    diameter = format_length(2 * radius)
-    if width == diameter:
-        width = f"{gap.width:.3f} m"
-    label = f"passage {width} {sign} {diameter}"
+    label = build_gap_label(gap, radius)
     side = 1.0
     if abs(across[0]) >= MIN_LENGTH_PX:
         # The label is to the right of the gap.
@@ -482,6 +478,29 @@ def draw_gap_label(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None
     if cursor is not None:
         position = _move_above_cursor_label(canvas, label, position, cursor)
     draw_tag(canvas.surface, label, position, canvas.theme, scale)
+
+
+def build_gap_label(gap: Gap, radius: float) -> str:
+    """Build the label of the narrowest gap, which compares its width with the diameter of a robot.
+
+    Parameters
+    ----------
+    gap : Gap
+        The gap.
+    radius : float
+        Radius of a robot, m.
+
+    Returns
+    -------
+    str
+    """
+    width = format_length(gap.width)
+    diameter = format_length(2 * radius)
+    has_one_unit = width.split()[1] == diameter.split()[1]
+    if width == diameter or not has_one_unit:
+        width, diameter = format_compared_lengths(gap.width, 2 * radius)
+    sign = "<" if is_too_narrow(gap, radius) else "≥"
+    return f"passage {width} {sign} {diameter}"
 
 
 def _move_above_cursor_label(canvas: Canvas, label: str, position: Point, cursor: Point) -> Point:

@@ -18,6 +18,7 @@ from robocov_app.toolkit.tools.geometry import compute_bearing
 Box: TypeAlias = tuple[float, float, float, float]  # minimum x and y, maximum x and y, m
 SHIFT_ROTATION_DEG = 15.0  # while Shift is held, rotations are a multiple of this angle
 DECIMALS = 4  # decimal places of lengths in files, m: tenths of a millimeter
+COMPARED_DECIMALS = range(3, 7)  # decimal places of two lengths in m; the first number that suffices is used
 distance = math.dist
 
 
@@ -127,6 +128,23 @@ def format_length(meters: float) -> str:
     if meters < 1000:
         return f"{meters:.2f} m"
     return f"{meters:.1f} m"
+
+
+def format_compared_lengths(first: float, second: float) -> tuple[str, str]:
+    """Format two lengths in m so that different lengths have different texts, if 6 decimals suffice.
+
+    Examples
+    --------
+    >>> format_compared_lengths(0.05, 0.2)
+    ('0.050 m', '0.200 m')
+    >>> format_compared_lengths(0.1997, 0.2)
+    ('0.1997 m', '0.2000 m')
+    """
+    text_pairs = [(f"{first:.{decimals}f} m", f"{second:.{decimals}f} m") for decimals in COMPARED_DECIMALS]
+    for texts in text_pairs:
+        if texts[0] != texts[1]:
+            return texts
+    return text_pairs[0]
 
 
 def format_shift(dx: float, dy: float) -> str:

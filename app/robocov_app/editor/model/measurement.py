@@ -102,6 +102,11 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS_M) -> Measurement:
     )
 
 
+def is_too_narrow(gap: Gap, radius: float) -> bool:
+    """Return whether robots with a radius, m, do not fit through a gap, so that a warning reports it."""
+    return gap.width < 2.0 * radius - _FIT_TOLERANCE_M
+
+
 def _count_vertices(sketch: Sketch) -> int:
     return sum(len(points) for owner in sketch.owners for _, points, _ in sketch.list_rings(owner))
 

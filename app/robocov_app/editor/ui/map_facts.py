@@ -5,8 +5,8 @@ from typing import NamedTuple
 from robocov.errors import format_count
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits import density
-from robocov_app.editor.model.geometry import format_point
-from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.geometry import format_compared_lengths, format_point
+from robocov_app.editor.model.measurement import Measurement, is_too_narrow
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.team import Team
 
@@ -82,9 +82,9 @@ def _describe_gap(measurement: Measurement | None) -> str:
     gap = measurement.gap
     if gap is None:
         return "none"
-    diameter = 2 * measurement.radius
-    sign = "≥" if gap.width >= diameter else "<"
-    return f"{gap.width:.3f} m {sign} {diameter:.2f} m"
+    width, diameter = format_compared_lengths(gap.width, 2 * measurement.radius)
+    sign = "<" if is_too_narrow(gap, measurement.radius) else "≥"
+    return f"{width} {sign} {diameter}"
 
 
 def _describe_content(sketch: Sketch, measurement: Measurement | None) -> str:
