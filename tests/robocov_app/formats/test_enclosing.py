@@ -200,6 +200,12 @@ def test_hairlines_become_walls() -> None:
     assert foreign.free.area == pytest.approx(200 - 0.005)
 
 
+def test_a_line_without_a_length_is_not_widened() -> None:
+    foreign = build_map(collect_shapes(HALL, lines=[[[1, 1], [1, 1]]], thickness=1e-5))
+    assert foreign.dropped == ("1 line without a length",)
+    assert foreign.repaired == ()
+
+
 def test_self_crossing_outlines_are_counted() -> None:
     bow = [[0, 0], [4, 4], [4, 0], [0, 4]]
     one = build_map(collect_shapes(bow), solid=False)

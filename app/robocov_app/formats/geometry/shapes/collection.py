@@ -210,13 +210,13 @@ class Shapes:
         if location:
             source = f"{self.source_name}: {location}"
         files.require_length(width, f"{source}: width", 0.0)
+        if (points[1:] == points[:-1]).all():
+            self.count_omission("line", "without a length")
+            return
         if width < MIN_SIZE_M:
             minimum = f"{1000 * MIN_SIZE_M:g} mm"
             self.repairs.counts["line", f"thinner than {minimum}, widened to {minimum}"] += 1
             width = MIN_SIZE_M
-        if (points[1:] == points[:-1]).all():
-            self.count_omission("line", "without a length")
-            return
         self.lines.append(replace(line, points=points, width=width, order=self._get_next_order()))
 
     def add_point(self, point: FloatArray, labels: Sequence[str] = (), *, location: str = "") -> None:
