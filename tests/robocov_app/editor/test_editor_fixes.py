@@ -35,6 +35,7 @@ def build_rooms(width: float) -> Sketch:
             "no boundary",
             "drawn around everything",
         ),
+        (Sketch("Hall"), "no boundary", "boundary of 10 m × 10 m drawn"),
         (build_hall(BOW_TIE), "crossing", "1 outline repaired"),
         (build_hall(CircleObstacle((20.0, 3.0), 1.0, "lamp")), "outside", "circle “lamp” deleted"),
         (build_hall(*[CircleObstacle((5.0, 5.0), 1.0)] * 2), "twice", "circle deleted"),

@@ -161,6 +161,12 @@ def test_a_file_without_an_arena_is_rejected(tmp_path: Path) -> None:
         IMPORTER.read(write_arena(tmp_path, "", '"0,4,1"'), ReadOptions())
 
 
+def test_an_arena_that_is_too_large_is_rejected(tmp_path: Path) -> None:
+    expected = "expected lengths above 0 and up to 10000 m, got size '100000,5,1'"
+    with pytest.raises(MapError, match=expected):
+        IMPORTER.read(write_arena(tmp_path, "", '"100000,5,1"'), ReadOptions())
+
+
 def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
     environment, report, _ = import_map(
         write_arena(tmp_path, WALL.format("a", 1, 1, 2, 0, 0) + ROBOT.format(0, 0))

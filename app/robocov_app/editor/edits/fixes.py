@@ -125,14 +125,15 @@ def _draw_boundary(request: FixRequest) -> Change:
     sketch = request.sketch
     margin = BOUNDARY_MARGIN_M
     bounds = sketch.bounds
+    description = "boundary drawn around everything"
     if bounds is None:
         margin = 0.0
         bounds = DEFAULT_BOUNDS_M
+        description = f"boundary of {bounds[2] - bounds[0]:g} m × {bounds[3] - bounds[1]:g} m drawn"
     low_x, low_y, high_x, high_y = bounds
     low = round_point((low_x - margin, low_y - margin))
     high = round_point((high_x + margin, high_y + margin))
     boundary = build_rectangle(low, high)
-    description = "boundary drawn around everything"
     return Change(replace(sketch, boundary=boundary), Selection(boundary=True), description)
 
 

@@ -166,9 +166,10 @@ def _place(element: Element, position: FloatArray, angles: FloatArray, shapes: S
 
 
 def _parse_lengths(element: Element, name: str, count: int = 3) -> FloatArray:
-    """Return the lengths in an attribute, m; the first two must be positive."""
+    """Return the lengths in an attribute, m; the first two must be positive and at most `MAX_SIZE_M`."""
     values = element.parse_numbers(name, count=count)
     lengths = values[:2]
     if not (lengths.min() >= _MIN_LENGTH_M and lengths.max() <= MAX_SIZE_M):
-        element.raise_error(f"expected lengths above 0, got {name} {quote(element.attributes[name])}")
+        expected = f"expected lengths above 0 and up to {MAX_SIZE_M:g} m"
+        element.raise_error(f"{expected}, got {name} {quote(element.attributes[name])}")
     return values

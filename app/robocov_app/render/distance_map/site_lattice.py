@@ -116,8 +116,8 @@ class FieldLattice:
         is_selected : (s, s) bool array
             Divided squares and their neighbors.
         sites : (k, 20) int array
-            For each selected square its own four sites, then four for each side: those of the neighbor if it
-            is divided, otherwise its own again.
+            For each selected square its own four sites, then four for each side: those of a divided neighbor
+            because of which the square was selected, otherwise its own again.
         """
         is_selected = is_divided.copy()
         site_groups = [self.corner_sites]
