@@ -102,6 +102,38 @@ def import_invalid_module(name):
     except ImportError:
         pass
 
+def call_if_installed(module_name, name, *arguments):
+    # If the function does not exist, there is nothing to forbid.
+    try:
+        function = getattr(importlib.import_module(module_name), name)
+    except (AttributeError, ImportError):
+        violations.append("not installed")
+        return
+    function(*arguments)
+
+def start_a_program():
+    import _posixsubprocess
+    _posixsubprocess.fork_exec()
+
+def start_a_program_by_subprocess():
+    import subprocess
+    subprocess._fork_exec()
+
+def start_a_thread():
+    import threading
+    threading.Thread(target=print).start()
+
+def import_with(name, **settings):
+    # Settings of sys have other values during the import.
+    previous = {key: getattr(sys, key) for key in settings}
+    for key, value in settings.items():
+        setattr(sys, key, value)
+    try:
+        importlib.import_module(name)
+    finally:
+        for key, value in previous.items():
+            setattr(sys, key, value)
+
 ATTEMPTS = {
     "write by the cache of numba": lambda: IndexDataCacheFile(FOLDER, "a", 1).save("k", b"data"),
     "read references by numba": lambda: Loc(REFERENCES, 1).strformat(),
@@ -120,6 +152,22 @@ ATTEMPTS = {
     "set the affinity": lambda: os.sched_setaffinity(0, os.sched_getaffinity(0)),
     "create a semaphore": create_semaphore,
     "create shared memory": create_shared_memory,
+    "open a process": lambda: call_if_installed("os", "pidfd_open", os.getppid()),
+    "write a history": lambda: call_if_installed("readline", "write_history_file", f"{FOLDER}/d"),
+    "append to a history": lambda: call_if_installed("readline", "append_history_file", 1, f"{FOLDER}/d"),
+    "read a history": lambda: call_if_installed("readline", "read_history_file", f"{FOLDER}/d"),
+    "read settings of a history": lambda: call_if_installed("readline", "read_init_file", f"{FOLDER}/d"),
+    "open a database": lambda: call_if_installed("_gdbm", "open", f"{FOLDER}/e", "c"),
+    "open another database": lambda: call_if_installed("_dbm", "open", f"{FOLDER}/f", "c"),
+    "create a Tcl interpreter": lambda: call_if_installed("_tkinter", "create"),
+    "load a library": lambda: call_if_installed("_cffi_backend", "load_library", None, 0),
+    "write names of functions": lambda: call_if_installed("sys", "activate_stack_trampoline", "perf"),
+    "start a program": start_a_program,
+    "start a program by subprocess": start_a_program_by_subprocess,
+    "start a thread": start_a_thread,
+    "write bytecode": lambda: import_with(
+        "colorsys", dont_write_bytecode=False, pycache_prefix=f"{FOLDER}/g"
+    ),
     "list a folder": lambda: os.listdir(FOLDER),
     "scan a folder": lambda: os.scandir(FOLDER),
     "list an open folder": list_open_folder,

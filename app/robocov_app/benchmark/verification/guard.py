@@ -75,8 +75,7 @@ _FORBIDDEN_PREFIXES = (
     "sqlite3.",
     "subprocess.",
     "syslog.",
-    "_thread.start_new_thread",
-    "_posixsubprocess.",
+    "_thread.start_",
 )
 """Beginnings of the names of audit events that a controller must not cause."""
 _FUNCTIONS_WITHOUT_EVENTS = {
@@ -86,6 +85,7 @@ _FUNCTIONS_WITHOUT_EVENTS = {
         "mknod",
         "nice",
         "openpty",
+        "pidfd_open",
         "posix_openpt",
         "sched_setaffinity",
         "sched_setparam",
@@ -95,12 +95,24 @@ _FUNCTIONS_WITHOUT_EVENTS = {
         "setpriority",
         "setsid",
     ),
+    "readline": ("append_history_file", "read_history_file", "read_init_file", "write_history_file"),
     "signal": ("pidfd_send_signal",),
+    "subprocess": ("_fork_exec",),
+    "sys": ("activate_stack_trampoline",),
+    "threading": ("_start_joinable_thread", "_start_new_thread"),
+    "_cffi_backend": ("load_library",),
+    "_dbm": ("open",),
+    "_gdbm": ("open",),
     "_multiprocessing": ("SemLock", "sem_unlink"),
     "_posixshmem": ("shm_open", "shm_unlink"),
+    "_posixsubprocess": ("fork_exec",),
+    "_thread": ("start_joinable_thread", "start_new", "start_new_thread"),
+    "_tkinter": ("create",),
 }
-"""Functions by module that a controller must not call, and that cause no audit event. Each changes something
-that another process can see."""
+"""Functions by module that a controller must not call, and that cause no audit event, at least in some versions
+of Python. Each reads or changes something that another process can see, gives access to functions that do, or
+starts a thread, which would act while the controller is not called. Modules that are not installed are
+skipped."""
 _LOOKUP_FUNCTIONS = ("access", "lstat", "open", "readlink", "stat")
 """Functions of the module os that look up a path. Audit events do not contain their argument ``dir_fd``, and
 only that of ``open`` exists. Without these checks, a process could see which files another one has opened."""
@@ -262,6 +274,7 @@ class _Policy:
         search_folders = [*map(Path, sys.path), *[Path(file).parent for file in self._own_files]]
         self._search_folders = tuple(os.path.realpath(folder) + os.sep for folder in search_folders)
         self._cache_folder = _find_cache_folder()
+        self._bytecode_settings = _get_bytecode_settings()
 
     def allows(self, action: _Action, frame: FrameType | None) -> bool:
         """Return whether an action in a frame is allowed.
@@ -296,7 +309,9 @@ class _Policy:
             if file.startswith(self._compiler_paths) and self._may_compiler_cause(action):
                 return True
             if (code.co_filename, code.co_name) == (_IMPORT_FILE, _IMPORT_FUNCTION):
-                return not self._is_own_module(frame.f_locals["name"])
+                # With other settings, imports would read and write bytecode files in any folder.
+                is_unchanged = _get_bytecode_settings() == self._bytecode_settings
+                return is_unchanged and not self._is_own_module(frame.f_locals["name"])
             frame = frame.f_back
         return False
 
@@ -338,6 +353,11 @@ def _find_folder(package: str) -> str | None:
     if spec is None or not spec.submodule_search_locations:
         return None
     return os.path.realpath(spec.submodule_search_locations[0]) + os.sep
+
+
+def _get_bytecode_settings() -> tuple[bool, str | None]:
+    """Return whether imports write no bytecode files, and the folder that replaces the usual one; None if none."""
+    return sys.dont_write_bytecode, sys.pycache_prefix
 
 
 def _find_cache_folder() -> str | None:
