@@ -35,6 +35,8 @@ RESULT_FORMAT = {"format": "robocov-benchmark", "version": 1}
 """Entries of a result that identify its format."""
 _FORMER_METRIC_NAMES = {"told_bytes": "sent_bytes"}
 """Names of metrics in rows of earlier versions, with those of today."""
+_MAX_ERROR_CHARS = 1000
+"""Maximum length of an error in a row. A verification receives at least as many characters of an error."""
 _FIRST_VERSION_WITH_MESSAGES = 5
 """Version of the results from which on the built-in controllers share maps by messages."""
 
@@ -89,7 +91,7 @@ def build_row(track: str, task: Task, run: Entry | Outcome, effort: bytes) -> Ro
     """
     head: Row = {"track": track, "map": task.map, "seed": task.seed}
     if run.error is not None:
-        return {**head, "error": run.error}
+        return {**head, "error": run.error[:_MAX_ERROR_CHARS]}
     metrics = {name: run.metrics[name] for name in METRICS}
     row = {**head, **metrics, **json.loads(effort), **compute_gaps(track, task.map, metrics)}
     _update_row_names(row)

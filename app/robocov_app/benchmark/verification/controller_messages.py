@@ -23,7 +23,7 @@ from robocov.controllers.base import Information
 from robocov.controllers.gains import Value, get_gain_values
 from robocov.controllers.individual import unwrap_controller
 from robocov.environment import Environment
-from robocov.errors import RobocovError
+from robocov.errors import RobocovError, format_count
 from robocov.observation import Decision, Message, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.team import Team
@@ -40,6 +40,9 @@ READING = "reading"
 """Kind of a message from a process: a file that the controller has read."""
 VIOLATION = "violation"
 """Kind of a message from a process: a forbidden action of its controller."""
+MAX_TEXT_CHARS = 4096
+"""Maximum length of a text that is accepted from a process, such as an error or a path. No path on Linux is
+longer."""
 KEPT: Any = None
 """Value in place of the region or the density in a `Step` if the process already has it."""
 _PAYLOAD_PROTOCOL = 4
@@ -230,6 +233,8 @@ def decode_decision(values: Any, robot_count: int) -> Decision:
     """
     try:
         forces, goals, messages = values
+        if not isinstance(messages, list) or len(messages) not in (0, robot_count):
+            raise TypeError(f"expected a list of messages for each of {format_count(robot_count, 'robot')}")
         decoded_messages = [
             [_decode_message(size, payload) for size, payload in robot_messages]
             for robot_messages in messages

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable
+import threading
+import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
@@ -15,13 +19,14 @@ import numpy as np
 
 from robocov.compiled import open_cache_folder
 from robocov.controllers.base import Information
-from robocov.errors import ParameterError, RobocovError, quote
+from robocov.errors import ParameterError, RobocovError, quote, to_one_line
 from robocov.observation import Decision, Observations, Scanning
 from robocov.typing import FloatArray, IntArray
 from robocov_app.benchmark.controller_code import ControllerCode
 from robocov_app.benchmark.verification.controller_messages import (
     ANSWER,
     FAULT,
+    MAX_TEXT_CHARS,
     MEASURE,
     READING,
     VIOLATION,
@@ -41,14 +46,90 @@ run_controller_program()
 """
 CACHE_PREFIX = "robocov-verify-"
 """Beginning of the names of temporary folders for machine code."""
-_MAX_LISTED = 20
-"""Maximum number of violations, and of files, that are listed."""
+_MAX_VIOLATIONS = 20
+"""Maximum number of violations that are listed."""
+MAX_READ_FILES = 20
+"""Maximum number of files that a controller may read. Reading more is a violation, so that none is hidden."""
+DESCRIPTION_LIMIT_S = 120.0
+"""Maximum time in which a controller describes itself."""
+ANSWER_LIMIT_S = 600.0
+"""Maximum time of a single step, in which a controller may compile its functions."""
+_POLL_INTERVAL_S = 0.2
+"""Time between two checks whether a process is late."""
 Measure: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
 """Returns the density at points that robots measure, as the function of a `DensitySensor`."""
 
 
 class ControllerFaultError(RobocovError):
-    """The controller in a process has raised an error, or its process has ended."""
+    """The controller in a process has raised an error, or its process has ended or does not answer."""
+
+
+@dataclass(frozen=True)
+class DescribedController:
+    """The description of a controller, and what the controller did while it was built.
+
+    Attributes
+    ----------
+    description : Description
+        What the controller declares about itself.
+    violations : list of str
+        Forbidden actions that it attempted.
+    read_files : list of str
+        Files that it has read, apart from those of Python and installed packages.
+    """
+
+    description: Description
+    violations: list[str]
+    read_files: list[str]
+
+
+class _Watchdog:
+    """A thread that kills a process if it does not answer in time, or if its answer is no longer needed.
+
+    Parameters
+    ----------
+    process : subprocess.Popen
+        The process.
+    is_cancelled : callable
+        Returns whether the answer is no longer needed.
+
+    Attributes
+    ----------
+    limit_s : float
+        Time in which the current answer is expected.
+    is_late : bool
+        Whether the process was killed because it did not answer in time.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], is_cancelled: Callable[[], bool]) -> None:
+        self.limit_s = math.inf
+        self.is_late = False
+        self._process = process
+        self._is_cancelled = is_cancelled
+        self._deadline = math.inf
+        self._has_ended = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def expect_answer(self, limit_s: float) -> None:
+        """Start to wait for an answer."""
+        self.limit_s = limit_s
+        self._deadline = time.monotonic() + limit_s
+
+    def accept_answer(self) -> None:
+        """Stop waiting, because the answer has arrived."""
+        self._deadline = math.inf
+
+    def end(self) -> None:
+        """End the thread."""
+        self._has_ended.set()
+
+    def _watch(self) -> None:
+        while not self._has_ended.wait(_POLL_INTERVAL_S):
+            if time.monotonic() > self._deadline:
+                self.is_late = True
+            if self.is_late or self._is_cancelled():
+                self._process.kill()
+                return
 
 
 class ControllerProcess:
@@ -58,6 +139,8 @@ class ControllerProcess:
     ----------
     folder : Path
         Folder for the machine code that processes compile. Each process has its own subfolder.
+    is_cancelled : callable, optional
+        Returns whether the answers of the process are no longer needed, and it is killed.
 
     Attributes
     ----------
@@ -67,7 +150,7 @@ class ControllerProcess:
         Files that the controller has read, apart from those of Python and installed packages.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, is_cancelled: Callable[[], bool] = lambda: False) -> None:
         self.violations: list[str] = []
         self.read_files: list[str] = []
         # Processes must not share a file, through which robots could exchange what they know.
@@ -75,6 +158,7 @@ class ControllerProcess:
         self._process = start_python(
             _PROGRAM, stderr=subprocess.DEVNULL, variables={"NUMBA_CACHE_DIR": str(self._cache)}
         )
+        self._watchdog = _Watchdog(self._process, is_cancelled)
         self._step_encoder = StepEncoder()
         self._robot_count = 0
 
@@ -84,14 +168,16 @@ class ControllerProcess:
         Raises
         ------
         ControllerFaultError
-            If the controller cannot be built.
+            If the controller cannot be built, or does not answer in time.
         """
+        self._watchdog.expect_answer(DESCRIPTION_LIMIT_S)
         self._send(code)
         return read_description(self._receive_answer())
 
     def begin(self, setup: Setup) -> None:
         """Send what the process knows before the first step, without waiting for the controller."""
         self._robot_count = len(setup.team)
+        self._watchdog.expect_answer(ANSWER_LIMIT_S)
         self._send(setup)
 
     def wait_until_ready(self) -> None:
@@ -100,12 +186,13 @@ class ControllerProcess:
         Raises
         ------
         ControllerFaultError
-            If the controller fails.
+            If the controller fails, or does not answer in time.
         """
         self._receive_answer()
 
     def send_observations(self, observations: Observations) -> None:
         """Send the observations of a step, without those that a process must not receive."""
+        self._watchdog.expect_answer(ANSWER_LIMIT_S)
         self._send(self._step_encoder.encode(observations))
 
     def receive_decision(self, measure: Measure | None) -> Decision:
@@ -124,7 +211,7 @@ class ControllerProcess:
         Raises
         ------
         ControllerFaultError
-            If the controller fails, or the answer is not a decision.
+            If the controller fails or does not answer in time, or if the answer is not a decision.
         """
         values = self._receive_answer(measure)
         try:
@@ -134,6 +221,7 @@ class ControllerProcess:
 
     def end(self) -> None:
         """End the process, and remove its machine code."""
+        self._watchdog.end()
         self._process.kill()
         end_process(self._process)
         shutil.rmtree(self._cache, ignore_errors=True)
@@ -149,36 +237,59 @@ class ControllerProcess:
         while True:
             kind, *values = self._receive()
             if kind == ANSWER and len(values) == 1:
+                self._watchdog.accept_answer()
                 return values[0]
             if kind == FAULT:
-                raise ControllerFaultError(" ".join(map(str, values)))
+                raise ControllerFaultError(_require_text(values))
             if kind == VIOLATION:
-                _add_once(self.violations, " ".join(map(str, values)))
+                self._add_violation(to_one_line(_require_text(values)))
             elif kind == READING:
-                _add_once(self.read_files, " ".join(map(str, values)))
+                self._add_read_file(to_one_line(_require_text(values)))
             elif kind == MEASURE and measure is not None and len(values) == 2:
                 self._send(self._answer_measurement(measure, *values))
             else:
                 raise ControllerFaultError("its process sent an invalid message")
 
-    def _receive(self) -> Iterable[Any]:
-        """Return the next message of the process."""
+    def _receive(self) -> tuple[Any, ...]:
+        """Return the kind and the values of the next message of the process."""
         assert self._process.stdout is not None
         try:
             message = receive_plain(self._process.stdout)
         except (EOFError, OSError):
-            raise ControllerFaultError("its process ended") from None
+            raise ControllerFaultError(self._describe_end()) from None
         except DamagedMessageError as error:
-            raise ControllerFaultError(str(error)) from None
-        if not isinstance(message, tuple) or not message:
-            # No message has this kind, so the caller rejects it.
-            return ("",)
+            raise ControllerFaultError(
+                self._describe_end() if self._watchdog.is_late else str(error)
+            ) from None
+        if not isinstance(message, tuple) or not message or not isinstance(message[0], str):
+            raise ControllerFaultError("its process sent an invalid message")
         return message
+
+    def _describe_end(self) -> str:
+        if self._watchdog.is_late:
+            return f"its process does not answer within {self._watchdog.limit_s:g} s"
+        return "its process ended"
+
+    def _add_violation(self, action: str) -> None:
+        if action not in self.violations and len(self.violations) < _MAX_VIOLATIONS:
+            self.violations.append(action)
+
+    def _add_read_file(self, path: str) -> None:
+        if path in self.read_files:
+            return
+        if len(self.read_files) < MAX_READ_FILES:
+            self.read_files.append(path)
+        else:
+            self._add_violation(
+                f"reading more than {MAX_READ_FILES} files that are not part of its source code"
+            )
 
     def _answer_measurement(self, measure: Measure, robots: Any, points: Any) -> FloatArray | str:
         """Return the density at points, or the reason why it cannot be measured."""
         try:
             rows = np.array(robots, dtype=np.intp)
+            if rows.ndim != 1:
+                raise ValueError("expected a list of robots")
             coordinates = np.frombuffer(points).reshape(len(rows), 2)
         except (TypeError, ValueError, OverflowError):
             raise ControllerFaultError("its process sent an invalid measurement") from None
@@ -206,38 +317,47 @@ def _create_cache(folder: Path) -> Path:
     return cache
 
 
-def _add_once(texts: list[str], text: str) -> None:
-    """Add a text to a list that does not contain it, unless the list is full."""
-    if text not in texts and len(texts) < _MAX_LISTED:
-        texts.append(text)
+def _require_text(values: list[Any]) -> str:
+    """Return the only value, which must be a text; a process may send anything else."""
+    if len(values) != 1 or not _is_short_text(values[0]):
+        raise ControllerFaultError(
+            f"its process sent an invalid message: expected a text of at most {MAX_TEXT_CHARS} characters"
+        )
+    return str(values[0])
 
 
-def describe_controller(code: ControllerCode) -> tuple[Description, list[str]]:
+def _is_short_text(value: Any) -> bool:
+    return isinstance(value, str) and len(value) <= MAX_TEXT_CHARS
+
+
+def describe_controller(
+    code: ControllerCode, is_cancelled: Callable[[], bool] = lambda: False
+) -> DescribedController:
     """Let a process describe a controller.
 
     Parameters
     ----------
     code : ControllerCode
         The controller.
+    is_cancelled : callable, optional
+        Returns whether the description is no longer needed, for example because the user has pressed Ctrl+C.
 
     Returns
     -------
-    description : Description
-        What the controller declares about itself.
-    violations : list of str
-        Forbidden actions that it attempted while it was built.
+    DescribedController
 
     Raises
     ------
     ControllerFaultError
-        If the controller cannot be built.
+        If the controller cannot be built or does not answer in time, or if the description is cancelled.
     """
     with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX) as folder:
-        process = ControllerProcess(Path(folder))
+        process = ControllerProcess(Path(folder), is_cancelled)
         try:
-            return process.describe(code), process.violations
+            description = process.describe(code)
         finally:
             process.end()
+    return DescribedController(description, process.violations, process.read_files)
 
 
 def read_description(values: Any) -> Description:
@@ -258,13 +378,40 @@ def read_description(values: Any) -> Description:
         If the values are not a description.
     """
     try:
-        label: Any = values["label"]
+        label = values["label"]
+        if not _is_short_text(label):
+            raise ParameterError(f"label: expected at most {MAX_TEXT_CHARS} characters, got {quote(label)}")
         information: Information = values["information"]
-        gains: Any = values["gains"]
-        scanning = None if values["scanning"] is None else Scanning(*values["scanning"])
         if information not in get_args(Information):
             expected = ", ".join(get_args(Information))
             raise ParameterError(f"information: expected one of {expected}, got {quote(information)}")
+        gains = values["gains"]
+        _require_gains(gains)
+        scanning = None if values["scanning"] is None else Scanning(*values["scanning"])
         return Description(label, information, gains, scanning)
-    except (KeyError, TypeError, RobocovError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RobocovError) as error:
         raise ControllerFaultError(f"its process sent an invalid description: {error}") from None
+
+
+def _require_gains(gains: Any) -> None:
+    """Raise ParameterError unless the values are gains: finite numbers, short texts or None, by name."""
+    if not isinstance(gains, Mapping):
+        raise ParameterError(f"gains: expected values by name, got {quote(gains)}")
+    for name, value in gains.items():
+        if not _is_short_text(name):
+            raise ParameterError(
+                f"gains: expected names of at most {MAX_TEXT_CHARS} characters, got {quote(name)}"
+            )
+        if value is not None and not _is_short_text(value) and not _is_finite_number(value):
+            raise ParameterError(
+                f"gains: {quote(name)}: expected a finite number, a text of at most {MAX_TEXT_CHARS} "
+                f"characters or None, got {quote(value)}"
+            )
+
+
+def _is_finite_number(value: Any) -> bool:
+    try:
+        return isinstance(value, int | float) and math.isfinite(value)
+    except OverflowError:
+        # A whole number that no float can represent.
+        return False

@@ -33,6 +33,7 @@ from robocov_app.benchmark.controller_code import ControllerCode
 from robocov_app.benchmark.verification.controller_messages import (
     ANSWER,
     FAULT,
+    MAX_TEXT_CHARS,
     MEASURE,
     READING,
     VIOLATION,
@@ -140,6 +141,10 @@ class _Connection:
         """Wait for the next message; None if there will be none."""
         return receive(self._source)
 
+    def send_text(self, kind: str, text: str) -> None:
+        """Send a message with a text of any length, of which the verification receives the beginning."""
+        self.send(kind, " ".join(text.split())[:MAX_TEXT_CHARS])
+
     def send(self, kind: str, *values: Any) -> None:
         """Send a message of plain values, unless the verification has ended."""
         with suppress(OSError):
@@ -164,8 +169,8 @@ def run_controller_program() -> None:
     code = request if isinstance(request, ControllerCode) else request.code
     modules = {} if code.source is None else code.source.modules
     install_guard(
-        lambda action: connection.send(VIOLATION, action),
-        lambda path: connection.send(READING, path),
+        lambda action: connection.send_text(VIOLATION, action),
+        lambda path: connection.send(READING, path[:MAX_TEXT_CHARS]),
         _list_own_modules(code),
         _list_own_files(code),
     )
@@ -177,7 +182,7 @@ def run_controller_program() -> None:
                 _decide_steps(request, connection)
         except BaseException as error:  # A controller of the user may raise anything.
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
-            connection.send(FAULT, message)
+            connection.send_text(FAULT, message)
 
 
 def _list_own_modules(code: ControllerCode) -> set[str]:

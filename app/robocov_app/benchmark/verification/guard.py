@@ -109,8 +109,8 @@ _FUNCTIONS_WITHOUT_EVENTS = {
     "_thread": ("start_joinable_thread", "start_new", "start_new_thread"),
     "_tkinter": ("create",),
 }
-"""Functions by module that a controller must not call, and that cause no audit event, at least in some versions
-of Python. Each reads or changes something that another process can see, gives access to functions that do, or
+"""Functions by module that a controller must not call, and that cause no audit event in some versions of
+Python. Each reads or changes something that another process can see, gives access to functions that do, or
 starts a thread, which would act while the controller is not called. Modules that are not installed are
 skipped."""
 _LOOKUP_FUNCTIONS = ("access", "lstat", "open", "readlink", "stat")
@@ -356,7 +356,7 @@ def _find_folder(package: str) -> str | None:
 
 
 def _get_bytecode_settings() -> tuple[bool, str | None]:
-    """Return whether imports write no bytecode files, and the folder that replaces the usual one; None if none."""
+    """Return whether imports write no bytecode files, and the folder that replaces the usual one, if any."""
     return sys.dont_write_bytecode, sys.pycache_prefix
 
 

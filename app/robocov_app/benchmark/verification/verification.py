@@ -42,6 +42,7 @@ from robocov_app.benchmark.verification.controller_messages import Description, 
 from robocov_app.benchmark.verification.controller_process import (
     CACHE_PREFIX,
     ControllerFaultError,
+    DescribedController,
     describe_controller,
     read_description,
 )
@@ -139,7 +140,7 @@ class Verification:
     differences : list of str
         Everything that is not as expected.
     read_files : list of str
-        Files that the controller has read, which are not part of its source code.
+        Sorted paths of the files that the controller has read, which are not part of its source code.
     """
 
     seed: int
@@ -178,7 +179,7 @@ class Verification:
         self.robots += check.robots
         self.declared_bytes += check.declared_bytes
         self.compressed_bytes += check.compressed_bytes
-        self.read_files += [file for file in check.read_files if file not in self.read_files]
+        self.read_files = sorted({*self.read_files, *check.read_files})
 
     @property
     def is_successful(self) -> bool:
@@ -249,9 +250,10 @@ class Verification:
             )
         if self.read_files:
             lines.append(
-                f"The controller has read files that are not part of its source code, such as "
-                f"{self.read_files[0]}. The verification does not check their content."
+                "The controller has read these files, which are not part of its source code. The verification "
+                "does not check their content:"
             )
+            lines += [f"  {file}" for file in self.read_files]
         lines.append(f"Random choices: --seed {self.seed} repeats them.")
         return lines
 
@@ -325,6 +327,7 @@ def verify_result(
     Returns
     -------
     Verification
+        Without some of the findings if the user has interrupted it.
 
     Raises
     ------
@@ -340,7 +343,10 @@ def verify_result(
     code = rated.read_code()
     identity = rated.identify(code.source)
     _check_source(rated, identity, result, path)
-    description, violations = _describe_controller(rated, code)
+    described = _describe_controller(rated, code, stop)
+    if described is None:
+        return Verification(seed, rows=len(result["rows"]))
+    description = described.description
     # The studies determine everything but the controller, whose code must not be executed here.
     studies = dict(rated.replace_user_code().build_studies(_get_selection(result)))
     tasks = _index_tasks(studies)
@@ -348,7 +354,8 @@ def verify_result(
     failed_count = sum("error" in row for row in rows.values())
     verification = Verification(seed, rows=len(rows), failed_rows=failed_count)
     verification.has_unidentified_code = not rated.is_built_in and code.source is None
-    verification.differences += [f"its controller tried {violation}" for violation in violations]
+    verification.read_files = sorted(described.read_files)
+    verification.differences += [f"its controller tried {action}" for action in described.violations]
     verification.differences += _compare_descriptions(result["entry"], {**identity, **asdict(description)})
     verification.differences += _compare_without_running(result, rows, tasks)
 
@@ -412,13 +419,17 @@ def _check_source(
         )
 
 
-def _describe_controller(rated: RatedController, code: ControllerCode) -> tuple[Description, list[str]]:
-    """Return what a controller declares about itself, and the forbidden actions that it attempted."""
+def _describe_controller(
+    rated: RatedController, code: ControllerCode, stop: Interruption
+) -> DescribedController | None:
+    """Return the description of a controller; None if the user has interrupted the verification."""
     if rated.is_built_in:
-        return read_description(describe(code)), []
+        return DescribedController(read_description(describe(code)), violations=[], read_files=[])
     try:
-        return describe_controller(code)
+        return describe_controller(code, lambda: stop.requested)
     except ControllerFaultError as error:
+        if stop.requested:
+            return None
         raise InputError(f"--controller: {error}") from None
 
 
