@@ -14,7 +14,7 @@ from robocov.typing import FloatArray, IntArray
 from robocov_app.benchmark.controller_code import ControllerCode
 from robocov_app.benchmark.verification.controller_messages import (
     Setup,
-    StepEncoder,
+    Step,
     decode_decision,
     encode_decision,
 )
@@ -29,7 +29,6 @@ class LocalDecider:
 
     def __init__(self) -> None:
         self.received: list[Observations] = []
-        self._step_encoder = StepEncoder()
 
     def begin(self, setup: Setup) -> None:
         self._robot_count = len(setup.team)
@@ -38,8 +37,8 @@ class LocalDecider:
     def wait_until_ready(self) -> None:
         pass
 
-    def send_observations(self, observations: Observations) -> None:
-        self._step = pickle.loads(pickle.dumps(self._step_encoder.encode(observations)))
+    def send_step(self, step: Step) -> None:
+        self._step = pickle.loads(pickle.dumps(step))
         self.received.append(self._step.observations)
 
     def receive_decision(self, measure: Any) -> Decision:
@@ -61,11 +60,10 @@ def run_isolated(
     environment = None
     if information == "whole map":
         environment = task.hide_unknown_density().build_environment().static
-    deciders = {robot: LocalDecider() for robot in robots}
     team = IsolatedTeam(
         ControllerCode(task.controller, task.gains, task.source),
         LocalDecider(),
-        deciders,
+        robots,
         scanning=scanning,
         environment=environment,
         may_send_messages=information != "own",
@@ -73,9 +71,12 @@ def run_isolated(
     )
 
     def watch(snapshot: Snapshot) -> None:
-        team.compare_decisions(snapshot)
+        team.record_step(snapshot)
         if snapshots is not None:
             snapshots.append(snapshot)
 
     outcome = perform(task, watch, team)
+    deciders = {robot: LocalDecider() for robot in robots}
+    for robot, decider in deciders.items():
+        team.check_robot(robot, decider)
     return outcome, team, deciders

@@ -132,6 +132,15 @@ class DensitySensor:
             self.log[robot, points[k].tobytes()] = float(values[k])
         return values
 
+    def copy_without_log(self) -> DensitySensor:
+        """Return a sensor for the same density and positions, which has measured nothing yet.
+
+        Returns
+        -------
+        DensitySensor
+        """
+        return DensitySensor(self._measure)
+
     def __reduce__(self) -> tuple[Any, ...]:
         # The density must not reach another process.
         return RecordedDensitySensor, (self.log,)

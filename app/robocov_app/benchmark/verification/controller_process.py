@@ -13,14 +13,14 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, get_args
+from typing import Any, Self, TypeAlias, get_args
 
 import numpy as np
 
 from robocov.compiled import open_cache_folder
 from robocov.controllers.base import Information
 from robocov.errors import ParameterError, RobocovError, quote, to_one_line
-from robocov.observation import Decision, Observations, Scanning
+from robocov.observation import Decision, Scanning
 from robocov.typing import FloatArray, IntArray
 from robocov_app.benchmark.controller_code import ControllerCode
 from robocov_app.benchmark.verification.controller_messages import (
@@ -33,7 +33,7 @@ from robocov_app.benchmark.verification.controller_messages import (
     DamagedMessageError,
     Description,
     Setup,
-    StepEncoder,
+    Step,
     decode_decision,
     receive_plain,
 )
@@ -135,6 +135,8 @@ class _Watchdog:
 class ControllerProcess:
     """A process that executes a controller, and from which only plain values are accepted.
 
+    As a context manager, it ends the process.
+
     Parameters
     ----------
     folder : Path
@@ -159,8 +161,13 @@ class ControllerProcess:
             _PROGRAM, stderr=subprocess.DEVNULL, variables={"NUMBA_CACHE_DIR": str(self._cache)}
         )
         self._watchdog = _Watchdog(self._process, is_cancelled)
-        self._step_encoder = StepEncoder()
         self._robot_count = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.end()
 
     def describe(self, code: ControllerCode) -> Description:
         """Return what a controller declares about itself.
@@ -190,10 +197,10 @@ class ControllerProcess:
         """
         self._receive_answer()
 
-    def send_observations(self, observations: Observations) -> None:
-        """Send the observations of a step, without those that a process must not receive."""
+    def send_step(self, step: Step) -> None:
+        """Send the observations of a step."""
         self._watchdog.expect_answer(ANSWER_LIMIT_S)
-        self._send(self._step_encoder.encode(observations))
+        self._send(step)
 
     def receive_decision(self, measure: Measure | None) -> Decision:
         """Wait for the decision of the controller for the observations that were sent.
@@ -351,12 +358,11 @@ def describe_controller(
     ControllerFaultError
         If the controller cannot be built or does not answer in time, or if the description is cancelled.
     """
-    with tempfile.TemporaryDirectory(prefix=CACHE_PREFIX) as folder:
-        process = ControllerProcess(Path(folder), is_cancelled)
-        try:
-            description = process.describe(code)
-        finally:
-            process.end()
+    with (
+        tempfile.TemporaryDirectory(prefix=CACHE_PREFIX) as folder,
+        ControllerProcess(Path(folder), is_cancelled) as process,
+    ):
+        description = process.describe(code)
     return DescribedController(description, process.violations, process.read_files)
 
 

@@ -1,17 +1,18 @@
-"""A team controlled by separate processes, each of which receives only the observations of its robot.
+"""A team controlled by a separate process, and robots that decide again with their own observations only.
 
 During a verification, the code of a controller is never in the process that simulates the run, records it and
-computes its metrics. That process, the referee, calls an `IsolatedTeam`, which asks other processes for a
-decision in each step:
+computes its metrics. That process, the referee, calls an `IsolatedTeam`, which asks other processes for
+decisions:
 
-- One process decides for the whole team. Its decisions are executed.
-- For each robot that is checked, another process receives only the observations of this robot. Its decision
-  must be the same as that for the team, bit for bit. The process of the team does not know which robots are
-  checked.
+- During the run, one process decides for the whole team. Its decisions are executed. It does not know which
+  robots are checked, and ends with the run.
+- After the run, a new process for each robot that is checked receives the recorded observations of this
+  robot, one step after the other. Its decisions must be the same as those for the team, bit for bit.
 
-No process receives the observations of a step before it has decided on the previous step, so none can infer
-from later observations what the team did. If the decisions of a robot are the same in all steps, the run
-would have been the same if a separate process had controlled this robot.
+Only one of these processes exists at a time, so none can learn from the time or the processor load of another
+one. No process receives the observations of a step before it has decided on the previous step, so none can
+infer from later observations what the team did. If the decisions of a robot are the same in all steps, the
+run would have been the same if a separate process had controlled this robot.
 
 The input of a process depends on the information that the controller declares:
 
@@ -32,9 +33,11 @@ shows that its decisions follow from the observations and the map, but ignores t
 
 from __future__ import annotations
 
+import pickle
+import tempfile
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Protocol
 
@@ -57,7 +60,7 @@ from robocov.observation.region import Region
 from robocov.team import Team
 from robocov.typing import BoolArray, FloatArray, IntArray
 from robocov_app.benchmark.controller_code import ControllerCode
-from robocov_app.benchmark.verification.controller_messages import Setup
+from robocov_app.benchmark.verification.controller_messages import Setup, Step, StepEncoder
 
 _MAX_ATTEMPTS = 1000
 """Maximum number of attempts to sample random points in a region, which may be very thin."""
@@ -168,11 +171,59 @@ class Decider(Protocol):
     def wait_until_ready(self) -> None:
         """Wait until the controller is ready; raise RobocovError if it fails."""
 
-    def send_observations(self, observations: Observations) -> None:
+    def send_step(self, step: Step) -> None:
         """Receive the observations of a step."""
 
     def receive_decision(self, measure: Any) -> Decision:
         """Return the decision for these observations; raise RobocovError if there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class _RobotStep:
+    """What a robot has observed and decided in a step.
+
+    Attributes
+    ----------
+    time : float, s
+        Simulation time.
+    step : Step
+        The observations of this robot.
+    decision : tuple
+        The decision of the team's process for this robot; see `_extract_robot_decision`.
+    is_working : bool
+        Whether the robot works, so that its decision has an effect.
+    """
+
+    time: float
+    step: Step
+    decision: tuple[Any, ...]
+    is_working: bool
+
+
+class _RobotRecord:
+    """All steps of a robot, in a temporary file, because messages with maps may need much memory."""
+
+    def __init__(self) -> None:
+        self._encoder = StepEncoder()
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115
+
+    def encode(self, observations: Observations) -> Step:
+        """Return a step with observations, without what earlier steps contain."""
+        return self._encoder.encode(observations)
+
+    def add(self, robot_step: _RobotStep) -> None:
+        """Record a step."""
+        pickle.dump(robot_step, self._file, protocol=pickle.HIGHEST_PROTOCOL)
+
+    def read(self) -> Iterator[_RobotStep]:
+        """Yield all steps in order, and remove the file."""
+        with self._file:
+            self._file.seek(0)
+            while True:
+                try:
+                    yield pickle.load(self._file)
+                except EOFError:
+                    return
 
 
 class IsolatedTeam:
@@ -184,8 +235,8 @@ class IsolatedTeam:
         The controller.
     team : Decider
         Decides for all robots.
-    robots : mapping of int to Decider
-        The processes of the robots that are checked, by row.
+    robots : sequence of int
+        Rows of the robots that will be checked after the run.
     scanning : Scanning or None
         Settings of the range scans that the controller needs.
     environment : Environment or None
@@ -199,6 +250,10 @@ class IsolatedTeam:
     ----------
     differences : list of str
         The first difference of each robot, and messages that the robots must not send.
+    step_count : int
+        Number of steps in which the team has decided.
+    checked_robots : int
+        Number of robots of which at least one decision was compared.
     declared_bytes : int
         Total size of the messages of all robots, as their controller declares it.
     compressed_bytes : int
@@ -212,7 +267,7 @@ class IsolatedTeam:
         self,
         code: ControllerCode,
         team: Decider,
-        robots: Mapping[int, Decider],
+        robots: Sequence[int],
         *,
         scanning: Scanning | None,
         environment: Environment | None,
@@ -221,53 +276,42 @@ class IsolatedTeam:
     ) -> None:
         self.scanning = scanning
         self.differences: list[str] = []
+        self.step_count = 0
+        self.checked_robots = 0
         self.declared_bytes = 0
         self.compressed_bytes = 0
         self._may_send_messages = may_send_messages
         self._has_reported_messages = False
         self._code = code
         self._team = team
-        self._robots = dict(robots)
+        self._team_encoder = StepEncoder()
+        self._records = {robot: _RobotRecord() for robot in robots}
+        self._sensors: list[DensitySensor | None] = []
         self._environment = environment
         self._rng = rng
         self._substitutes = np.zeros((0, 2))
-        self._team_decision: Decision | None = None
-        self._own_decisions: dict[int, Decision] = {}
+        self._setup: Setup | None = None
+        self._seen: Observations | None = None
+        self._decision: Decision | None = None
 
     def begin(self, region: Region, team: Team) -> None:
-        """Send all processes what they know before the first step, and wait until they are ready."""
+        """Send the process of the team what it knows before the first step, and wait until it is ready."""
         self._substitutes = sample_substitutes(region, len(team), self._rng)
-        deciders: list[tuple[int | None, Decider]] = [(None, self._team), *self._robots.items()]
-        for robot, decider in deciders:
-            decider.begin(Setup(self._code, robot, self._environment, region, team))
+        self._setup = Setup(self._code, None, self._environment, region, team)
+        self._team.begin(self._setup)
         self._team.wait_until_ready()
-        for robot, decider in list(self._robots.items()):
-            try:
-                decider.wait_until_ready()
-            except RobocovError as error:
-                self._stop_checking(robot, f"in a separate process: {error}")
 
     def decide(self, seen: Observations, memory: object) -> Decision:
-        """Return the decision for the team, after all processes have decided."""
-        self._team.send_observations(seen)
-        for robot, decider in self._robots.items():
-            decider.send_observations(hide_others(seen, robot, self._substitutes))
+        """Return the decision for the team."""
+        self._team.send_step(self._team_encoder.encode(seen))
         sensor = seen.density_sensor
-        team_decision = self._team.receive_decision(None if sensor is None else sensor.measure)
-        self._team_decision = team_decision
-        if any(team_decision.messages):
+        decision = self._team.receive_decision(None if sensor is None else sensor.measure)
+        self._seen = seen
+        self._decision = decision
+        if any(decision.messages):
             self._report_messages(seen.time)
-            self._measure_messages(team_decision)
-        self._own_decisions = {}
-        for robot, decider in list(self._robots.items()):
-            own_sensor = None if sensor is None else _OwnSensor(sensor, robot)
-            try:
-                self._own_decisions[robot] = decider.receive_decision(
-                    None if own_sensor is None else own_sensor.measure
-                )
-            except RobocovError as error:
-                self._stop_checking(robot, f"in a separate process: {error}")
-        return team_decision
+            self._measure_messages(decision)
+        return decision
 
     def _report_messages(self, time: float) -> None:
         """Note that robots send messages at a time, s, if they must not; the first time is enough."""
@@ -284,23 +328,58 @@ class IsolatedTeam:
             self.declared_bytes += message.size
             self.compressed_bytes += len(zlib.compress(message.payload))
 
-    def compare_decisions(self, snapshot: Snapshot) -> None:
-        """Compare the decisions of the latest step. Those of failed robots have no effect and are ignored."""
-        assert self._team_decision is not None
-        for robot, own_decision in self._own_decisions.items():
-            if snapshot.is_working is not None and not snapshot.is_working[robot]:
-                continue
-            if not _is_same_decision(self._team_decision, own_decision, robot):
-                self._stop_checking(
-                    robot,
-                    f"decides differently from {snapshot.time:.2f} s on "
-                    f"if its process receives only {self._describe_knowledge()}",
+    def record_step(self, snapshot: Snapshot) -> None:
+        """Record what the robots that will be checked have observed and decided in the latest step."""
+        assert self._seen is not None
+        assert self._decision is not None
+        self.step_count += 1
+        # The log of the measurements of all robots would need much memory.
+        sensor = self._seen.density_sensor
+        self._sensors.append(None if sensor is None else sensor.copy_without_log())
+        for robot, record in self._records.items():
+            own_observations = hide_others(self._seen, robot, self._substitutes)
+            record.add(
+                _RobotStep(
+                    time=snapshot.time,
+                    step=record.encode(own_observations),
+                    decision=_extract_robot_decision(self._decision, robot),
+                    is_working=snapshot.is_working is None or bool(snapshot.is_working[robot]),
                 )
+            )
 
-    def _stop_checking(self, robot: int, difference: str) -> None:
-        """Note the first difference of a robot, whose process then receives nothing more."""
-        self.differences.append(f"robot {robot + 1} {difference}")
-        del self._robots[robot]
+    def check_robot(self, robot: int, decider: Decider) -> None:
+        """Let a robot decide again in all recorded steps, and note its first different decision.
+
+        Decisions of a failed robot have no effect and are not compared.
+
+        Parameters
+        ----------
+        robot : int
+            Row of the robot. A robot can be checked once, after the run.
+        decider : Decider
+            Decides for this robot only.
+        """
+        assert self._setup is not None
+        is_compared = False
+        try:
+            decider.begin(replace(self._setup, robot=robot))
+            decider.wait_until_ready()
+            for sensor, recorded in zip(self._sensors, self._records[robot].read(), strict=True):
+                decider.send_step(recorded.step)
+                own_sensor = None if sensor is None else _OwnSensor(sensor, robot)
+                decision = decider.receive_decision(None if own_sensor is None else own_sensor.measure)
+                if not recorded.is_working:
+                    continue
+                is_compared = True
+                if _extract_robot_decision(decision, robot) != recorded.decision:
+                    self.differences.append(
+                        f"robot {robot + 1} decides differently from {recorded.time:.2f} s on "
+                        f"if its process receives only {self._describe_knowledge()}"
+                    )
+                    break
+        except RobocovError as error:
+            self.differences.append(f"robot {robot + 1} in a separate process: {error}")
+        self.checked_robots += is_compared
 
     def _describe_knowledge(self) -> str:
         if self._environment is None:
@@ -331,22 +410,9 @@ class _OwnSensor:
         return values
 
 
-def _is_same_decision(team_decision: Decision, own_decision: Decision, robot: int) -> bool:
-    """Return whether two decisions agree for a robot in force, goal and messages, bit for bit."""
-    if not _is_same_row(team_decision.forces, own_decision.forces, robot):
-        return False
-    if not _is_same_row(team_decision.goals, own_decision.goals, robot):
-        return False
-    return _list_message_contents(team_decision, robot) == _list_message_contents(own_decision, robot)
-
-
-def _is_same_row(first: FloatArray | None, second: FloatArray | None, robot: int) -> bool:
-    if first is None or second is None:
-        return first is second
-    return bool(first[robot].tobytes() == second[robot].tobytes())
-
-
-def _list_message_contents(decision: Decision, robot: int) -> list[tuple[int, Any]]:
-    """Return the size and payload of each message sent by a robot."""
+def _extract_robot_decision(decision: Decision, robot: int) -> tuple[Any, ...]:
+    """Return the force, the goal and the messages of a robot, with bytes in place of arrays."""
+    force = decision.forces[robot].tobytes()
+    goal = None if decision.goals is None else decision.goals[robot].tobytes()
     messages: Sequence[Message] = decision.messages[robot] if decision.messages else ()
-    return [(message.size, message.payload) for message in messages]
+    return force, goal, [(message.size, message.payload) for message in messages]

@@ -11,7 +11,6 @@ import subprocess
 import tempfile
 import threading
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -66,11 +65,13 @@ class RunCheck:
         Outcome of the repeated run; None if its process ended, or if the referees were killed before it
         started.
     robots : int
-        Number of robots in processes of their own.
+        Number of robots of which at least one decision was repeated in a process of its own.
     differences : list of str
         Everything that is not as expected, apart from the metrics of the run.
     read_files : list of str
         Files that the controller has read, apart from those of Python and installed packages.
+    steps : int
+        Number of steps in which the team decided.
     declared_bytes, compressed_bytes : int
         Total size of all messages, as declared and as compressed payloads.
     """
@@ -79,35 +80,40 @@ class RunCheck:
     robots: int
     differences: list[str]
     read_files: list[str] = field(default_factory=list)
+    steps: int = 0
     declared_bytes: int = 0
     compressed_bytes: int = 0
 
 
 class RefereeService:
-    """Worker service that repeats one run."""
+    """Worker service that repeats one run, and then the decisions of some of its robots."""
 
     failure_message = "the verification failed"
 
     def __call__(self, requests: list[RepeatedRun], channel: Channel) -> RunCheck:
-        """Repeat a run while other processes execute its controller. There is only one request."""
+        """Repeat a run while another process executes its controller. There is only one request."""
         (run,) = requests
-        with ExitStack() as stack:
-            team_process = _start_controller_process(run, stack)
-            robot_processes = {robot: _start_controller_process(run, stack) for robot in run.robots}
-            environment = None
-            if run.description.information == "whole map":
-                environment = run.task.hide_unknown_density().build_environment().static
+        environment = None
+        if run.description.information == "whole map":
+            environment = run.task.hide_unknown_density().build_environment().static
+        with ControllerProcess(run.cache_folder) as team_process:
             isolated_team = IsolatedTeam(
                 run.code,
                 team_process,
-                robot_processes,
+                run.robots,
                 scanning=run.description.scanning,
                 environment=environment,
                 may_send_messages=run.description.information != "own",
                 rng=np.random.default_rng(run.seed),
             )
-            outcome = perform(run.task, isolated_team.compare_decisions, isolated_team)
-        processes = (team_process, *robot_processes.values())
+            outcome = perform(run.task, isolated_team.record_step, isolated_team)
+        processes = [team_process]
+        # If the run failed before the first decision, there is nothing to compare.
+        for robot in run.robots if isolated_team.step_count else ():
+            # Processes that exist at the same time could measure each other's computing times.
+            with ControllerProcess(run.cache_folder) as robot_process:
+                isolated_team.check_robot(robot, robot_process)
+            processes.append(robot_process)
         violations = [action for process in processes for action in process.violations]
         read_files = [file for process in processes for file in process.read_files]
         differences = [f"its controller tried {action}" for action in dict.fromkeys(violations)]
@@ -116,19 +122,13 @@ class RefereeService:
         files = {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
         return RunCheck(
             replace(outcome, files=files),
-            robots=len(robot_processes),
+            robots=isolated_team.checked_robots,
+            steps=isolated_team.step_count,
             differences=differences,
             read_files=list(dict.fromkeys(read_files)),
             declared_bytes=isolated_team.declared_bytes,
             compressed_bytes=isolated_team.compressed_bytes,
         )
-
-
-def _start_controller_process(run: RepeatedRun, stack: ExitStack) -> ControllerProcess:
-    """Start a process for the controller of a run. It ends when the stack is closed."""
-    process = ControllerProcess(run.cache_folder)
-    stack.callback(process.end)
-    return process
 
 
 class Referees:

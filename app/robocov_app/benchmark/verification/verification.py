@@ -174,7 +174,7 @@ class Verification:
             self.new_maps += 1
         else:
             self.runs += 1
-        if is_joint:
+        if is_joint and check.steps:
             self.teams += 1
         self.robots += check.robots
         self.declared_bytes += check.declared_bytes
@@ -250,8 +250,8 @@ class Verification:
             )
         if self.read_files:
             lines.append(
-                "The controller has read these files, which are not part of its source code. The verification "
-                "does not check their content:"
+                "The controller has read these files, which are not part of its source code. The "
+                "verification does not check their content:"
             )
             lines += [f"  {file}" for file in self.read_files]
         lines.append(f"Random choices: --seed {self.seed} repeats them.")
