@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -112,6 +114,21 @@ def test_files_with_equal_values_do_not_remove_bundled_results() -> None:
     drawn, omitted = thin_out_equal_values([*bundled, *files])
     assert [point.label for point in drawn] == ["1.0", "2.0", "0.1*"]
     assert [point.label for point in omitted] == ["0.2*", "0.3*"]
+
+
+@pytest.mark.parametrize("x", [5.0, 40.0, 72.0, 400.0])
+@pytest.mark.parametrize("bundled_values", [(10.0, 18.0), (17.0, 18.0), (10.0, 12.0, 90.0)])
+def test_bundled_results_fill_a_large_part_of_the_axis(x: float, bundled_values: Sequence[float]) -> None:
+    """Bundled values that differ by less than a factor of 2 need no more space than if they did."""
+    style = choose_curve_styles(["rapf"])[0]
+    points = [ParetoPoint(style, "b", value, 1.0, is_rival=True, is_bundled=True) for value in bundled_values]
+    points.append(ParetoPoint(style, "file", x, 1.0, is_rival=True))
+    drawn, _ = pareto_plots._split_outliers(points)
+    assert drawn[: len(bundled_values)] == points[:-1]
+    (axes,) = draw_pareto_figure(drawn, "m").axes
+    low = min(*bundled_values, max(bundled_values) / 2.0)
+    ends = axes.transData.transform([(low, 1.0), (max(bundled_values), 1.0)])[:, 0]
+    assert ends[1] - ends[0] > 0.3 * axes.bbox.width
 
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))

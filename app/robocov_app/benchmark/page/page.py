@@ -1,7 +1,6 @@
 """The page that compares results of the benchmark: tables and plots for each track."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,8 +25,6 @@ YARDSTICKS = ("rapf", "atlas", "oracle")
 """Controllers with which incomplete entries are compared, over the runs of each entry."""
 _WHOLE_MAP = "whole map"
 """Information of the controllers that do not compete."""
-MAX_INCOMPLETE_TABLES = 10
-"""Maximum number of incomplete entries on each track that are compared with the yardsticks."""
 MAX_PLOTTED_ENTRIES = 10
 """Maximum number of entries in a plot, apart from the bundled ones; those with the highest scores."""
 
@@ -321,17 +318,15 @@ def _build_incomplete_tables(track_ratings: Sequence[Rating], entries: _Entries)
     For comparison, it also contains the ratings of the yardsticks over the runs of the entry.
     """
     yardsticks = [rating for rating in track_ratings if rating.label in entries.yardsticks]
-    incomplete = [rating for rating in track_ratings if not rating.is_complete]
     tables = []
-    for rating in incomplete[:MAX_INCOMPLETE_TABLES]:
+    for rating in track_ratings:
+        if rating.is_complete:
+            continue
         compared = [yardstick.select_runs(rating.run_keys) for yardstick in yardsticks]
         caption = f"{rating.label}, incomplete and not ranked"
         if compared:
             caption += ", and others over the same runs"
         tables.append(_build_rating_table(caption, [rating, *compared], entries))
-    omitted_count = len(incomplete) - len(tables)
-    if omitted_count:
-        tables[-1] = replace(tables[-1], notes=(f"Incomplete entries without a table: {omitted_count}.",))
     return tables
 
 

@@ -1,5 +1,6 @@
 """Pareto plots of the page: the gap of controllers against another quantity."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -68,6 +69,11 @@ _MIN_MEDIAN_GAP = 1.0
 _MAX_RATIO_TO_BUNDLED = 4.0
 """Maximum ratio of a value from a file to the largest one of the bundled entries, or of the smallest one of
 these to it. With larger ratios, a file could squeeze all bundled entries into a small part of a plot."""
+_MIN_BUNDLED_FRACTION = 0.4
+"""Minimum fraction of the horizontal axis that the bundled entries fill when a value from a file is added."""
+_MIN_BUNDLED_RATIO = 2.0
+"""Ratio of the largest to the smallest value of the bundled entries that is assumed if it is smaller, because
+nearly equal bundled values would leave no space for others."""
 _MAX_LABEL_CHARS = 28
 """Maximum length of a label in a plot."""
 _MAX_EQUAL_POINTS = 4
@@ -265,16 +271,36 @@ def _is_far(point: ParetoPoint, bundled: Sequence[ParetoPoint]) -> bool:
         point.x * _MAX_RATIO_TO_BUNDLED < min(values)
         or point.x > _MAX_RATIO_TO_BUNDLED * max(values)
         or point.gap > _MAX_RATIO_TO_BUNDLED * max_gap
+        or _compute_bundled_fraction(point.x, values) < _MIN_BUNDLED_FRACTION
     )
+
+
+def _compute_bundled_fraction(value: float, bundled_values: Sequence[float]) -> float:
+    """Return the fraction of the horizontal axis that bundled values fill when another value is added."""
+    low = min(bundled_values)
+    high = max(bundled_values)
+    low = min(low, high / _MIN_BUNDLED_RATIO)
+    axis_low = min(low, value)
+    axis_high = max(high, value)
+    if axis_low > 0.0 and _needs_log_axis([axis_low, axis_high]):
+        return math.log(high / low) / math.log(axis_high / axis_low)
+    if axis_high == axis_low:
+        return 1.0
+    return (high - low) / (axis_high - axis_low)
+
+
+def _needs_log_axis(values: Sequence[float]) -> bool:
+    """Return whether the positive values of a quantity differ so much that its axis is logarithmic."""
+    positive = [value for value in values if value > 0.0]
+    return bool(positive) and max(positive) > _MIN_LOG_RATIO * min(positive)
 
 
 def _split_zeros(points: Sequence[ParetoPoint]) -> tuple[list[ParetoPoint], list[ParetoPoint]]:
     """Split points into those to draw and those at 0, if the others need a logarithmic axis."""
+    if not _needs_log_axis([point.x for point in points]):
+        return list(points), []
     positive = [point for point in points if point.x > 0.0]
-    values = [point.x for point in positive]
-    if values and max(values) > _MIN_LOG_RATIO * min(values):
-        return positive, [point for point in points if point.x <= 0.0]
-    return list(points), []
+    return positive, [point for point in points if point.x <= 0.0]
 
 
 @plain_style()
@@ -330,7 +356,7 @@ def _draw_pareto_point(axes: Axes, point: ParetoPoint) -> None:
 def _style_pareto_axes(axes: Axes, points: Sequence[ParetoPoint], axis_label: str) -> None:
     """Choose the scales and ticks of the axes; the horizontal scale is logarithmic for a wide range."""
     values = [point.x for point in points]
-    if min(values) > 0.0 and max(values) > _MIN_LOG_RATIO * min(values):
+    if min(values) > 0.0 and _needs_log_axis(values):
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.set_yscale("symlog", linthresh=1.0)  # Linear up to one percent.

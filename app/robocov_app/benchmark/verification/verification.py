@@ -131,6 +131,8 @@ class Verification:
         Number of new maps that were tried.
     new_map_track : str
         Track of the runs on new maps; empty if the result has no runs on generated maps.
+    no_new_maps_reason : str
+        Reason why no new maps were planned; empty if there were some.
     comparison : NewMapComparison or None
         Comparison of gaps on new maps with those on the suite.
     declared_bytes, compressed_bytes : int
@@ -151,6 +153,7 @@ class Verification:
     teams: int = 0
     new_maps: int = 0
     new_map_track: str = ""
+    no_new_maps_reason: str = ""
     comparison: NewMapComparison | None = None
     declared_bytes: int = 0
     compressed_bytes: int = 0
@@ -236,8 +239,8 @@ class Verification:
         lines += self._describe_isolation()
         if self.comparison is not None:
             lines.append(self._describe_new_maps(self.comparison))
-        elif not self.new_maps:
-            lines.append("No new maps tried. They require runs on maps of families that have a generator.")
+        elif self.no_new_maps_reason:
+            lines.append(f"No new maps tried: {self.no_new_maps_reason}.")
         if self.compressed_bytes:
             lines.append(
                 f"Messages: {self.declared_bytes / 1e3:,.0f} kB as the controller declares their sizes, "
@@ -365,6 +368,7 @@ def verify_result(
     map_rng = _create_generator(seed, _MAP_STREAM)
     new_runs = _plan_new_runs(rated, studies, options.new_maps, map_rng)
     verification.new_map_track = new_runs.track
+    verification.no_new_maps_reason = new_runs.absence_reason
     chosen_tasks = {key: tasks[key] for key in sampled} | dict(new_runs.tasks)
     outcomes: dict[TrackRunKey, Outcome | None] = {}
     # A process that is killed may still write to the folder.
@@ -455,6 +459,8 @@ def _index_tasks(studies: Mapping[str, Study]) -> dict[TrackRunKey, Task]:
 class _NewRuns:
     """Runs on new maps under the conditions of one track, with their tasks by key."""
 
+    absence_reason: str = ""
+    """Reason why there are no such runs; empty if there are some."""
     track: str = ""
     maps: Sequence[NewMap] = ()
     tasks: Mapping[TrackRunKey, Task] = field(default_factory=dict)
@@ -463,16 +469,15 @@ class _NewRuns:
 def _plan_new_runs(
     rated: RatedController, studies: Mapping[str, Study], count: int, rng: np.random.Generator
 ) -> _NewRuns:
-    """Sample a track of a result, and new maps of the families on this track.
-
-    There are none for the oracle, which needs their best placements.
-    """
+    """Sample a track of a result, and new maps of the families on this track."""
+    if count == 0:
+        return _NewRuns("--new-maps is 0")
     if rated.controller == ORACLE:
-        return _NewRuns()
+        return _NewRuns("the oracle needs their best placements, which are not known")
     maps_by_track = {track: [study_map.name for study_map in study.maps] for track, study in studies.items()}
     track = choose_track(maps_by_track, count, rng)
     if track is None:
-        return _NewRuns()
+        return _NewRuns("they require runs on maps of families that have a generator")
     families = dict.fromkeys(suite.FAMILY_OF[name] for name in maps_by_track[track])
     new_maps = sample_new_maps(list(families), count, rng)
     stand_in = rated.replace_user_code()
@@ -482,7 +487,7 @@ def _plan_new_runs(
             track, [StudyMap(new_map.name, new_map.environment)], [new_map.start_seed]
         )
         tasks[NEW_MAP, new_map.name, new_map.start_seed] = next(iter(generate_tasks(study)))
-    return _NewRuns(track, new_maps, tasks)
+    return _NewRuns(track=track, maps=new_maps, tasks=tasks)
 
 
 class _RunChecker:
