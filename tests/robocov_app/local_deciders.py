@@ -75,8 +75,9 @@ def run_isolated(
         if snapshots is not None:
             snapshots.append(snapshot)
 
-    outcome = perform(task, watch, team)
     deciders = {robot: LocalDecider() for robot in robots}
-    for robot, decider in deciders.items():
-        team.check_robot(robot, decider)
+    with team:
+        outcome = perform(task, watch, team)
+        for robot, decider in deciders.items():
+            team.check_robot(robot, decider)
     return outcome, team, deciders

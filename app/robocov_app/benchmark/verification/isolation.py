@@ -39,7 +39,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -216,18 +216,23 @@ class _RobotRecord:
         pickle.dump(robot_step, self._file, protocol=pickle.HIGHEST_PROTOCOL)
 
     def read(self) -> Iterator[_RobotStep]:
-        """Yield all steps in order, and remove the file."""
-        with self._file:
-            self._file.seek(0)
-            while True:
-                try:
-                    yield pickle.load(self._file)
-                except EOFError:
-                    return
+        """Yield all steps in order."""
+        self._file.seek(0)
+        while True:
+            try:
+                yield pickle.load(self._file)
+            except EOFError:
+                return
+
+    def close(self) -> None:
+        """Remove the file."""
+        self._file.close()
 
 
 class IsolatedTeam:
     """Controller of a simulation whose decisions are made elsewhere; see the description of this module.
+
+    As a context manager, it removes the records of the robots at the end.
 
     Parameters
     ----------
@@ -294,6 +299,13 @@ class IsolatedTeam:
         self._seen: Observations | None = None
         self._decision: Decision | None = None
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        for record in self._records.values():
+            record.close()
+
     def begin(self, region: Region, team: Team) -> None:
         """Send the process of the team what it knows before the first step, and wait until it is ready."""
         self._substitutes = sample_substitutes(region, len(team), self._rng)
@@ -355,7 +367,7 @@ class IsolatedTeam:
         Parameters
         ----------
         robot : int
-            Row of the robot. A robot can be checked once, after the run.
+            Row of the robot.
         decider : Decider
             Decides for this robot only.
         """

@@ -96,24 +96,25 @@ class RefereeService:
         environment = None
         if run.description.information == "whole map":
             environment = run.task.hide_unknown_density().build_environment().static
-        with ControllerProcess(run.cache_folder) as team_process:
-            isolated_team = IsolatedTeam(
-                run.code,
-                team_process,
-                run.robots,
-                scanning=run.description.scanning,
-                environment=environment,
-                may_send_messages=run.description.information != "own",
-                rng=np.random.default_rng(run.seed),
-            )
-            outcome = perform(run.task, isolated_team.record_step, isolated_team)
+        team_process = ControllerProcess(run.cache_folder)
         processes = [team_process]
-        # If the run failed before the first decision, there is nothing to compare.
-        for robot in run.robots if isolated_team.step_count else ():
-            # Processes that exist at the same time could measure each other's computing times.
-            with ControllerProcess(run.cache_folder) as robot_process:
-                isolated_team.check_robot(robot, robot_process)
-            processes.append(robot_process)
+        with IsolatedTeam(
+            run.code,
+            team_process,
+            run.robots,
+            scanning=run.description.scanning,
+            environment=environment,
+            may_send_messages=run.description.information != "own",
+            rng=np.random.default_rng(run.seed),
+        ) as isolated_team:
+            with team_process:
+                outcome = perform(run.task, isolated_team.record_step, isolated_team)
+            # If the run failed before the first decision, there is nothing to compare.
+            for robot in run.robots if isolated_team.step_count else ():
+                # Processes that exist at the same time could measure each other's computing times.
+                with ControllerProcess(run.cache_folder) as robot_process:
+                    isolated_team.check_robot(robot, robot_process)
+                processes.append(robot_process)
         violations = [action for process in processes for action in process.violations]
         read_files = [file for process in processes for file in process.read_files]
         differences = [f"its controller tried {action}" for action in dict.fromkeys(violations)]

@@ -10,7 +10,8 @@ verification       nothing of the user                         runs to referees
 referee            nothing of the user: simulation, record,    observations to controllers; metrics,
 (one for a run)    metrics, comparison of decisions            differences to the verification
 controller (for    the code of the user, under a guard         forces, goals, messages to the
-team or robot)                                                 referee, as plain numbers and bytes
+team, then for                                                 referee, as plain numbers and bytes
+each robot)
 =================  ==========================================  =====================================
 
 All choices follow from a seed that the verifier draws, so that they cannot be anticipated.
