@@ -142,8 +142,8 @@ def test_messages_of_other_values_are_faults(
     ids=map(str, range(10)),
 )
 def test_descriptions_of_other_values_are_faults(key: str, value: Any) -> None:
-    values = {"label": "Mine", "information": "own", "gains": {"k": 1.0, "mode": "a", "limit": None}}
-    values["scanning"] = None
+    gains = {"k": 1.0, "mode": "a", "limit": None}
+    values = {"label": "Mine", "information": "own", "gains": gains, "scanning": None}
     assert read_description(values).label == "Mine"
     with pytest.raises(ControllerFaultError, match="its process sent an invalid description"):
         read_description({**values, key: value})
