@@ -688,7 +688,9 @@ def _count_edits(first: str, second: str) -> int:
 
 
 def format_bound(bound: float) -> str:
-    """Format a bound of a range with at most ten digits, without an exponent unless it is tiny or huge.
+    """Format a bound of a range without an exponent, unless it is tiny or huge.
+
+    Whole numbers have at most ten digits, others at most eight.
 
     Parameters
     ----------
@@ -703,7 +705,8 @@ def format_bound(bound: float) -> str:
     >>> format_bound(1e6), format_bound(0.5), format_bound(1e-6)
     ('1000000', '0.5', '0.000001')
     """
-    text = f"{bound:.10g}"
+    digits = 10 if float(bound).is_integer() else 8
+    text = f"{bound:.{digits}g}"
     if "e" not in text or not 1e-9 <= abs(bound) <= 1e9:
         return text
     return f"{Decimal(text):f}"

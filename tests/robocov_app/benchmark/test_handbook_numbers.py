@@ -48,13 +48,12 @@ PLAN_TRACKS = ("plans-small", "plans-medium", "plans-large", "plans-crowd")
 PLAN_CONTROLLERS = {
     "plans-small": ("learned", "frontier-median", "greedy-submodular", "local-search"),
     "plans-medium": ("frontier-median", "greedy-submodular", "local-search", "exemplar"),
-    "plans-large": ("voronoi-graph", "local-search", "exemplar"),
-    "plans-crowd": ("exemplar",),
+    "plans-large": ("frontier-median", "greedy-submodular", "voronoi-graph", "local-search", "exemplar"),
+    "plans-crowd": ("voronoi-graph", "local-search", "exemplar"),
 }
 """Controllers on each track of large plans, in addition to those on all of these tracks."""
 PLAN_ROWS = [
-    *product(("atlas", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"), PLAN_TRACKS),
-    *product(("atlas-shared",), PLAN_TRACKS[:3]),
+    *product(("atlas", "atlas-shared", "geodesic-lloyd", "tangentbug", "rapf", "lloyd"), PLAN_TRACKS),
     *((controller, track) for track, names in PLAN_CONTROLLERS.items() for controller in names),
 ]
 """Controllers and tracks with runs on large plans."""
