@@ -710,6 +710,23 @@ def test_followed_edits_repeat_bit_for_bit() -> None:
     np.testing.assert_array_equal(twin.timeline.panes[0].simulation.positions, end_positions)
 
 
+def test_followed_edits_at_time_0_are_repeated() -> None:
+    session = start_session()
+    session.fail_robot(2)
+    session.fail_robot(3)
+    advance_session(session, 10)
+    end = session.timeline.head
+    root = session.timeline.document.get_path(end)[0]
+    session.seek(root, 0)
+    session.timeline.finish_seek()
+    assert session.displayed.numbers == (1, 2, 3)
+    session.timeline.follow(end)
+    assert session.displayed.numbers == (1,)
+    advance_session(session, 10)
+    assert session.timeline.head is end
+    assert session.displayed.numbers == (1,)
+
+
 def test_texts_of_the_lesson_use_the_words_of_the_chart() -> None:
     """A reader of *cost* would look for a chart of the cost, and phones have no chart *below*."""
     assert LESSON is not None

@@ -194,8 +194,12 @@ class Timeline:
         self.is_advancing = False
 
     def follow(self, node: Node | None) -> None:
-        """Repeat the edits on the path to a node when their step is reached; None to stop this."""
+        """Repeat the edits on the path to a node when their step is reached; None to stop this.
+
+        Edits at the present step are repeated at once.
+        """
         self._followed_path = [] if node is None else self.document.get_path(node)
+        self._repeat_followed_edits()
 
     def _repeat_followed_edits(self) -> None:
         """Enter the next nodes of the followed path if they start at the present step."""
