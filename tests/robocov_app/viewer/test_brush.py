@@ -17,10 +17,12 @@ from robocov.mapfile import load_map
 from robocov_app.render.density_shading import get_density_range
 from robocov_app.viewer.costs.costs import Costs
 from robocov_app.viewer.session.editing.map_edits import (
+    DAB_FACTOR,
     MAX_PAINTED_DENSITY,
     MIN_PAINTED_DENSITY,
     PAINTED_RASTER_CELLS,
     build_paintable_raster,
+    paint_density,
 )
 from robocov_app.viewer.tools.brush import BrushTool
 from robocov_app.viewer.tools.tool import ViewerToolOverlay
@@ -73,6 +75,29 @@ def test_the_painted_density_is_limited():
         paint_stroke(brush, session, (5.0, 3.0), (5.2, 3.0))
     _, high = get_density_range(session.displayed.environment)
     assert high == pytest.approx(MAX_PAINTED_DENSITY, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("density", "raised", "lowered"),
+    [
+        (100.0, 100.0, 100.0 / DAB_FACTOR),
+        (0.0004, MIN_PAINTED_DENSITY * DAB_FACTOR, 0.0004),
+        (0.0, MIN_PAINTED_DENSITY * DAB_FACTOR, 0.0),
+    ],
+)
+def test_a_density_outside_the_limits_of_the_brush_is_kept(density, raised, lowered):
+    values = np.full((5, 5), density)
+    values[0, 0] = 0.00012  # so that the density is not 0 everywhere
+    painted_map = HALL.with_density(Raster(values, (0.0, 0.0, 6.0, 4.0)))
+    for lowers, expected in ((False, raised), (True, lowered)):
+        painted = paint_density(painted_map, [(3.0, 2.0)], 0.5, lowers=lowers).values
+        assert painted[2, 2] == pytest.approx(expected, abs=0.5e-3)
+        is_changed = painted != values
+        is_changed[2, 2] = False
+        assert not is_changed.any()
+    assert paint_density(painted_map, [(3.0, 2.0)], 0.5, lowers=True).values[2, 2] == (
+        pytest.approx(lowered, rel=1e-4)
+    )
 
 
 def test_a_stroke_is_undone_and_redone_as_a_whole():

@@ -18,7 +18,9 @@ MIN_SHAPE_SIZE_M = 0.02
 PAINTED_RASTER_CELLS = 96
 """Number of raster cells along the longer side of a map whose density is painted."""
 MIN_PAINTED_DENSITY = 0.05
+"""Density below which the brush lowers no value, and from which it raises lower ones."""
 MAX_PAINTED_DENSITY = 50.0
+"""Density above which the brush raises no value."""
 DAB_FACTOR = 1.15
 """Factor by which a dab of the brush changes the density at its center."""
 _DENSITY_DECIMALS = 3
@@ -191,6 +193,9 @@ def _round_points(points: list[Point]) -> tuple[Point, ...]:
 def paint_density(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
     """Raise or lower the density of a map with a brush.
 
+    The brush raises no value above `MAX_PAINTED_DENSITY`, and lowers none below `MIN_PAINTED_DENSITY`. Values
+    that are already outside these limits are not clipped, and cells that do not change are not rounded.
+
     Parameters
     ----------
     environment : Environment
@@ -212,15 +217,20 @@ def paint_density(environment: Environment, dabs: Sequence[Point], radius: float
     x_min, y_min, x_max, y_max = raster.extent
     x = _compute_cell_centers(x_min, x_max, columns)[None, :]
     y = _compute_cell_centers(y_min, y_max, rows)[:, None]
-    # Each dab multiplies the density by DAB_FACTOR ** (1 - (distance / radius)²)², or divides it.
+    # Each dab multiplies the density by DAB_FACTOR ** (1 - (distance / radius)²)², or divides it by that.
+    # A density of 0 could not be raised, so at least the minimum is multiplied.
     exponent = -np.log(DAB_FACTOR) if lowers else np.log(DAB_FACTOR)
     for center_x, center_y in dabs:
         squared_distances = ((x - center_x) ** 2 + (y - center_y) ** 2) / radius**2
         strengths = np.where(squared_distances < 1.0, (1.0 - np.minimum(squared_distances, 1.0)) ** 2, 0.0)
         changed = np.maximum(values, MIN_PAINTED_DENSITY) * np.exp(exponent * strengths)
-        changed = np.clip(changed, MIN_PAINTED_DENSITY, MAX_PAINTED_DENSITY)
+        if lowers:
+            changed = np.minimum(values, np.maximum(changed, MIN_PAINTED_DENSITY))
+        else:
+            changed = np.maximum(values, np.minimum(changed, MAX_PAINTED_DENSITY))
         values = np.where(strengths > 0.0, changed, values)
-    return Raster(np.round(values, _DENSITY_DECIMALS), raster.extent)
+    is_painted = values != raster.values
+    return Raster(np.where(is_painted, np.round(values, _DENSITY_DECIMALS), values), raster.extent)
 
 
 def _compute_cell_centers(low: float, high: float, count: int) -> FloatArray:
