@@ -65,6 +65,25 @@ def read_solid_area(folder: Path, draw: Draw, **options: Any) -> BaseGeometry:
         (lambda d, m: m.add_lwpolyline([(5, 2), (8, 2), (8, 4), (5, 4), (5, 2)]), box(5, 2, 8, 4)),
         (lambda d, m: m.add_polyline2d([(5, 2), (8, 2), (8, 4), (5, 4)], close=True), box(5, 2, 8, 4)),
         (
+            lambda d, m: m.add_polyline2d(
+                [(5, 0), (5, 4)], dxfattribs={"default_start_width": 0.1, "default_end_width": 0.4}
+            ),
+            box(4.8, 0, 5.2, 4),
+        ),
+        # Polylines in the vertical plane x = 5.
+        (
+            lambda d, m: m.add_lwpolyline(
+                [(2, 1), (8, 1)], dxfattribs={"extrusion": (1, 0, 0), "elevation": 5}
+            ),
+            box(4.95, 2, 5.05, 8),
+        ),
+        (
+            lambda d, m: m.add_polyline2d(
+                [(2, 1), (8, 1)], dxfattribs={"extrusion": (1, 0, 0), "elevation": (0, 0, 5)}
+            ),
+            box(4.95, 2, 5.05, 8),
+        ),
+        (
             lambda d, m: m.add_polyline3d([(5, 2, 1), (8, 2, 1), (8, 4, 1), (5, 4, 1)], close=True),
             box(5, 2, 8, 4),
         ),

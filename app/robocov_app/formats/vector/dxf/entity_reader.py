@@ -7,6 +7,7 @@ import numpy as np
 
 from robocov.errors import MapError, RobocovError, to_one_line
 from robocov.mapfile.models import MAX_COORDINATE_M
+from robocov.optional_imports import import_optional
 from robocov.typing import FloatArray
 from robocov_app.formats.geometry.curves import CURVE_TOLERANCE_M
 from robocov_app.formats.geometry.shapes.collection import Shapes, WallLine
@@ -282,13 +283,12 @@ def _describe_location(entity: Any) -> str:
 
 def _parse_polyline(entity: Any) -> _Polyline | None:
     """Return the data of a polyline, or None if it is a mesh."""
-    plane = entity.ocs()
     if entity.dxftype() == "LWPOLYLINE":
         return _Polyline(
             rows=_to_rows(entity.get_points("xybse")),
             is_closed=bool(entity.closed),
             width=float(entity.dxf.get("const_width", 0.0)),
-            plane=plane,
+            plane=entity.ocs(),
             height=float(entity.dxf.get("elevation", 0.0)),
         )
     if not (entity.is_2d_polyline or entity.is_3d_polyline):
@@ -299,12 +299,19 @@ def _parse_polyline(entity: Any) -> _Polyline | None:
         if not int(attributes.get("flags", 0)) & _SPLINE_FRAME_FLAG:
             edge = [float(attributes.get(key, 0.0)) for key in ("bulge", "start_width", "end_width")]
             rows.append((*attributes.location.vec2, *edge))
+    plane = entity.ocs() if entity.is_2d_polyline else None
+    height = 0.0
+    if plane is not None:
+        # The elevation of an old polyline is a point, whose third coordinate is the height.
+        ezdxf_math = import_optional("ezdxf.math", "dxf")
+        height = float(ezdxf_math.Vec3(entity.dxf.get("elevation", (0.0, 0.0, 0.0))).z)
+    default_widths = [float(entity.dxf.get(f"default_{end}_width", 0.0)) for end in ("start", "end")]
     return _Polyline(
         rows=_to_rows(rows),
         is_closed=bool(entity.is_closed),
-        width=float(entity.dxf.get("default_start_width", 0.0)),
-        plane=plane if entity.is_2d_polyline else None,
-        height=0.0,
+        width=max(default_widths),
+        plane=plane,
+        height=height,
     )
 
 
