@@ -8,7 +8,7 @@ from pathlib import Path
 import pygame
 import pytest
 from driven_window import open_viewer
-from sample_sessions import RAPF, advance_session, start_session
+from sample_sessions import LLOYD, RAPF, advance_session, start_session
 
 from robocov.environment import Environment
 from robocov_app.viewer.session import playback, present, seek
@@ -48,6 +48,24 @@ def play_until_there(session: Session) -> int:
         session.playback.advance(1 / 60)
         frames += 1
     return frames
+
+
+@pytest.mark.parametrize("adds_pane", [False, True])
+def test_a_restart_after_a_long_undo_has_the_scenario_of_the_earlier_run(
+    adds_pane: bool, slow_computer: None
+) -> None:
+    session = build_long_session()
+    session.restart(environment=Environment("square", ((0, 0), (9, 0), (9, 9), (0, 9))), robots=5)
+    for node in session.timeline.document.nodes:
+        node.cached_states = []
+    assert session.undo() is not None
+    assert session.timeline.is_seeking
+    if adds_pane:
+        session.add_pane(LLOYD)
+    else:
+        session.restart(seed=3)
+    scenario = session.timeline.scenario
+    assert (scenario.environment.name, scenario.robots) == ("hall", 3)
 
 
 def test_each_of_two_undos_in_a_row_undoes_one_edit(slow_computer: None) -> None:

@@ -221,9 +221,10 @@ class Session:
         }
         changes = {name: value for name, value in requested.items() if value is not None}
         timeline = self.timeline
+        # The seek in progress may end in a run with another scenario.
+        timeline.finish_seek()
         old = timeline.scenario
         new = _change_scenario(old, changes)
-        timeline.finish_seek()
         node = timeline.document.build_node(
             timeline.head, timeline.step, "begin", _describe_restart(old, new), Restart(new)
         )
@@ -317,6 +318,7 @@ class Session:
 
     def add_pane(self, controller: ControllerChoice) -> None:
         """Restart with an additional controller side by side with the others."""
+        self.timeline.finish_seek()
         require_space_for_pane(len(self.timeline.panes))
         self.restart(controllers=(*self.timeline.scenario.controllers, controller))
 
