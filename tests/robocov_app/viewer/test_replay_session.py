@@ -14,6 +14,7 @@ from session_records import COUNTING, build_record, build_records, have_same_arr
 from robocov.errors import InputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
+from robocov.scenario import Scenario
 from robocov.team import Team
 from robocov.voronoi import WeightedCells
 from robocov_app.runs.saved_runs import SavedRun, build_roster
@@ -198,6 +199,15 @@ def test_a_restart_returns_to_the_start_of_the_record(record: Record) -> None:
     np.testing.assert_array_equal(get_present_positions(session), record.positions[-1])
     session.restart(seed=7)
     expected = HALL.start("corner").sample(4, seed=7, radius=0.1)
+    np.testing.assert_array_equal(get_present_positions(session), expected)
+
+
+def test_a_restart_uses_the_start_of_the_record_even_if_the_map_does_not_define_it() -> None:
+    assert "uniform" not in HALL.starts
+    session = replay(Scenario(HALL, "lloyd", robots=4, start="uniform", seed=1, duration=0.2).run())
+    assert session.timeline.scenario.start == "uniform"
+    session.restart(seed=7)
+    expected = HALL.start("uniform").sample(4, seed=7, radius=0.1)
     np.testing.assert_array_equal(get_present_positions(session), expected)
 
 

@@ -144,11 +144,13 @@ def _describe_run(record: Record) -> Mapping[str, object]:
 def _build_start_scenario(record: Record, controllers: tuple[ControllerChoice, ...]) -> SessionScenario:
     """Build the scenario of several runs from the record of the first run."""
     roster = build_roster(record)
+    # Every map has the start "uniform", even if it does not define it.
+    is_start_available = record.start in {"uniform", *roster.environment.starts}
     return SessionScenario(
         roster.environment,
         controllers,
         len(record.team),
-        start=record.start if record.start in roster.environment.starts else None,
+        start=record.start if is_start_available else None,
         seed=record.seed or 0,
         properties=RobotProperties.from_team(record.team, roster.numbers),
         dt=get_control_period(record),
