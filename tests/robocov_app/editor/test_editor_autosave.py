@@ -107,6 +107,26 @@ def test_changes_during_a_trial_are_in_the_draft(ends, tmp_path):
             assert driver.shapes[-1] == circle
 
 
+def test_a_draft_that_cannot_be_saved_is_reported_once(tmp_path):
+    with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:
+        driver.editor.document.flush()
+        autosaver = driver.editor.document.autosaver
+        autosaver.problem = "drafts cannot be saved: disk full"
+        driver.run_frames(1)
+        assert driver.message == "Drafts cannot be saved: disk full"
+        assert driver.editor.has_error_message
+        driver.editor.show_message("grid 0.5 m")
+        driver.run_frames(2)
+        assert driver.message == "Grid 0.5 m"
+        driver.editor.clear_message()
+        driver.run_frames(2)
+        assert driver.message == ""
+        for problem in ("", "drafts cannot be saved: disk full"):
+            autosaver.problem = problem
+            driver.run_frames(1)
+        assert driver.message == "Drafts cannot be saved: disk full"
+
+
 def test_a_file_can_be_opened_after_leaving_for_it_was_canceled(tmp_path):
     write_sketch(SKETCH, tmp_path / "hall.json")
     with open_editor(tmp_path, drafts=tmp_path / "drafts") as driver:

@@ -154,6 +154,7 @@ class EditorWindow(CommandWindow):
         editor.snapper.waits_for_targets = waits_for_workers
         self.map_pictures = MapPictures(self, lambda: EditorMapPicture(editor, self.canvas))
         self._layout_key: tuple[object, ...] | None = None
+        self._shown_draft_problem = ""
         self._arrange()
         self.canvas.fit()
         editor.request_measurement()
@@ -282,7 +283,7 @@ class EditorWindow(CommandWindow):
             self.team_preview.update()
         if not (self.pointer.is_busy and editor.measurement_worker.is_busy):
             editor.request_measurement()
-        editor.show_message(editor.document.autosaver.problem, is_error=True)
+        self._show_draft_problem()
         if self.file_commands.may_close:
             self.closed = True
             return
@@ -297,6 +298,13 @@ class EditorWindow(CommandWindow):
         if editor.document.history.has_unsaved_changes:
             title = f"● {title}"
         set_title(f"{title} · robocov edit")
+
+    def _show_draft_problem(self) -> None:
+        """Show once why the draft cannot be saved, so that other messages can replace it."""
+        problem = self.editor.document.autosaver.problem
+        if problem != self._shown_draft_problem:
+            self._shown_draft_problem = problem
+            self.editor.show_message(problem, is_error=True)
 
     def _choose_cursor(self) -> CursorShape:
         if not self.canvas.contains(self.pointer.pixel):
