@@ -39,7 +39,7 @@ def command(options: Arguments) -> int:
     from robocov.scenario import format_comparison
     from robocov_app.commands.gain_options import select_gains
     from robocov_app.render.density_text import list_density_lines
-    from robocov_app.runs.artifacts import build_comparison_rows, execute_comparison
+    from robocov_app.runs.artifacts import Ending, build_comparison_rows, execute_comparison
     from robocov_app.runs.saved_runs import name_folders
 
     names = options.controllers
@@ -53,16 +53,19 @@ def command(options: Arguments) -> int:
     }
     settings = options.build_output_settings()
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
-    runs, is_interrupted = execute_comparison(scenarios, out, settings)
+    runs, ending = execute_comparison(scenarios, out, settings)
     rows = build_comparison_rows(runs)
     if not options.json:
         titles, cells = format_comparison([row["label"] for row in rows], rows)
         print_table([(title, RIGHT if title else BOLD) for title in titles], cells)
     notes = [f"note: {row['label']}: {note}" for row in rows for note in row.get("notes", ())]
-    ending = "saved in"
-    if is_interrupted:
-        ending = "Interrupted. Partial results are in"
-    saved = f"{ending} {out}/: {list_files(out)}{options.describe_record()}"
+    is_interrupted = ending is not Ending.COMPLETE
+    message = "saved in"
+    if ending is Ending.RUN_INTERRUPTED:
+        message = "Interrupted. Partial results are in"
+    elif ending is Ending.VIDEO_INTERRUPTED:
+        message = options.describe_interrupted_video()
+    saved = f"{message} {out}/: {list_files(out)}{options.describe_record()}"
     answer = {"out": str(out), "interrupted": is_interrupted, "runs": rows}
     print_answer(options, answer, *list_density_lines(environment), *notes, saved)
     return INTERRUPTED if is_interrupted else 0

@@ -377,6 +377,12 @@ class RunOptions(ScenarioOptions, JsonOption):
             return ""
         return f"; the record has one step in {every}, and its numbers are computed from these"
 
+    def describe_interrupted_video(self) -> str:
+        """Return the start of the message about complete runs whose frames or video were interrupted."""
+        if self.video.video:
+            return "The video is incomplete. Results are in"
+        return "The frames are incomplete. Results are in"
+
     def build_team(self) -> Team:
         """Build the team from the options and, if there is one, the team file.
 

@@ -57,7 +57,7 @@ def command(options: Arguments) -> int:
     if options.map.endswith(_SESSION_SUFFIX):
         return _replay_session(options)
     from robocov.mapfile import load_map
-    from robocov_app.runs.artifacts import execute_run
+    from robocov_app.runs.artifacts import Ending, execute_run
     from robocov_app.runs.saved_runs import name_folders
 
     # Check all input before a folder is created.
@@ -66,11 +66,14 @@ def command(options: Arguments) -> int:
     out = options.out
     if out is None:
         out = Path(f"{Path(options.map).stem}-{name_folders([options.controller])[0]}")
-    run, is_interrupted = execute_run(scenario, out, settings)
-    ending = "saved in"
-    if is_interrupted:
-        ending = f"Interrupted at {run.record.time[-1]:.1f} s. Partial results are in"
-    lines = [*_describe_run(run), f"{ending} {out}/: {list_files(out)}{options.describe_record()}"]
+    run, ending = execute_run(scenario, out, settings)
+    is_interrupted = ending is not Ending.COMPLETE
+    message = "saved in"
+    if ending is Ending.RUN_INTERRUPTED:
+        message = f"Interrupted at {run.record.time[-1]:.1f} s. Partial results are in"
+    elif ending is Ending.VIDEO_INTERRUPTED:
+        message = options.describe_interrupted_video()
+    lines = [*_describe_run(run), f"{message} {out}/: {list_files(out)}{options.describe_record()}"]
     print_answer(options, {"out": str(out), "interrupted": is_interrupted, **run.summary}, *lines)
     return INTERRUPTED if is_interrupted else 0
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +52,25 @@ _JSON_ONLY_COLUMNS = ("label", "gains", "notes")
 """Columns that are only in ``comparison.json``, not in ``comparison.csv``."""
 
 
-def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tuple[Run, bool]:
+class Ending(Enum):
+    """Whether, and when, Ctrl+C ended the execution of runs early.
+
+    Attributes
+    ----------
+    COMPLETE
+        All runs and their files are complete.
+    VIDEO_INTERRUPTED
+        All runs are complete, but Ctrl+C ended the writing of their frames and video early.
+    RUN_INTERRUPTED
+        Ctrl+C ended a run early, or before it was started.
+    """
+
+    COMPLETE = "complete"
+    VIDEO_INTERRUPTED = "video interrupted"
+    RUN_INTERRUPTED = "run interrupted"
+
+
+def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tuple[Run, Ending]:
     """Execute one scenario, and write its results to a folder.
 
     Parameters
@@ -66,8 +86,8 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
     -------
     run : Run
         The run, which has fewer steps if it was interrupted.
-    is_interrupted : bool
-        Whether Ctrl+C ended the run early.
+    ending : Ending
+        Whether Ctrl+C ended the run, or the writing of its video, early.
 
     Raises
     ------
@@ -87,12 +107,12 @@ def execute_run(scenario: Scenario, out: Path, settings: OutputSettings) -> tupl
             run = execute_scenario(scenario, cost, result, settings, interruption)
             save_figures([run], cost, result.staging, settings)
             _save_videos([run], cost, result, settings, interruption)
-    return run, interruption.requested
+    return run, _determine_ending([scenario], [run], settings, interruption)
 
 
 def execute_comparison(
     scenarios: Mapping[str, Scenario], out: Path, settings: OutputSettings
-) -> tuple[dict[str, Run], bool]:
+) -> tuple[dict[str, Run], Ending]:
     """Execute scenarios on one map, and write their results to a folder with a subfolder for each.
 
     Parameters
@@ -109,8 +129,8 @@ def execute_comparison(
     runs : dict of str to Run
         The runs, by the names of their subfolders. If Ctrl+C ended the comparison early, only those that
         were started.
-    is_interrupted : bool
-        Whether Ctrl+C ended the comparison early.
+    ending : Ending
+        Whether Ctrl+C ended the comparison, or the writing of its video, early.
 
     Raises
     ------
@@ -133,7 +153,24 @@ def execute_comparison(
                     break
             save_comparison(runs, cost, result.staging, settings)
             _save_videos(list(runs.values()), cost, result, settings, interruption)
-    return runs, interruption.requested
+    return runs, _determine_ending(scenarios.values(), runs.values(), settings, interruption)
+
+
+def _determine_ending(
+    scenarios: Iterable[Scenario],
+    runs: Iterable[Run],
+    settings: OutputSettings,
+    interruption: Interruption,
+) -> Ending:
+    """Return what Ctrl+C ended early, if anything; `runs` are those of the first scenarios."""
+    if not interruption.requested:
+        return Ending.COMPLETE
+    for scenario, run in zip_longest(scenarios, runs):
+        if run is None or round(run.record.time[-1] / scenario.dt) < scenario.steps:
+            return Ending.RUN_INTERRUPTED
+    if settings.video.has_output:
+        return Ending.VIDEO_INTERRUPTED
+    return Ending.COMPLETE
 
 
 def _save_videos(

@@ -7,14 +7,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_calls import COMMAND, SHORT, read_error, read_json
 from sample_sessions import advance_session, start_session
 from session_records import build_records
 
+from robocov.controllers import Rapf
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.runs import artifacts, video
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="needs a limit on the size of files")
@@ -189,6 +192,75 @@ def test_ctrl_c_keeps_the_finished_part_of_a_video(tmp_path: Path) -> None:
     assert [path.name for path in out.glob(".*")] == [".robocov.json"], "no unfinished file is left"
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(out / "run.mp4"))
     assert frames > 3
+
+
+RUN = ("run", "square", *SHORT)
+COMPARISON = ("compare", "square", "--controllers", "rapf", "lloyd", *SHORT)
+
+
+@pytest.mark.usefixtures("no_figures")
+@pytest.mark.parametrize("command", [RUN, COMPARISON], ids=["run", "compare"])
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [("--frames", "The frames are incomplete."), ("--video", "The video is incomplete.")],
+)
+def test_ctrl_c_during_a_video_does_not_interrupt_the_runs(
+    command: tuple[str, ...],
+    option: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write = video.write_frames_and_video
+
+    def interrupt_and_write(*arguments: Any, **options: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        write(*arguments, **options)
+
+    monkeypatch.setattr(video, "write_frames_and_video", interrupt_and_write)
+    out = tmp_path / "out"
+    assert main([*command, option, "--out", str(out)]) == 130
+    output = capsys.readouterr().out
+    assert f"{message} Results are in {out}" in output
+    assert "Interrupted" not in output and "Partial" not in output
+
+
+@pytest.mark.parametrize("command", [RUN, COMPARISON], ids=["run", "compare"])
+def test_ctrl_c_during_the_last_figures_interrupts_nothing(
+    command: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(artifacts, "save_figures", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+    out = tmp_path / "out"
+    assert main([*command, "--out", str(out)]) == 0
+    assert f"saved in {out}" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("no_figures")
+@pytest.mark.parametrize("command", [RUN, COMPARISON], ids=["run", "compare"])
+def test_ctrl_c_during_a_run_leaves_partial_results(
+    command: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    decide = Rapf.decide
+
+    def interrupt_and_decide(self: Rapf, seen: Any, memory: Any) -> Any:
+        if round(60 * seen.time) == 30:
+            signal.raise_signal(signal.SIGINT)
+        return decide(self, seen, memory)
+
+    monkeypatch.setattr(Rapf, "decide", interrupt_and_decide)
+    out = tmp_path / "out"
+    assert main([*command, "--frames", "--out", str(out)]) == 130
+    output = capsys.readouterr().out
+    assert "Interrupted" in output
+    assert f"Partial results are in {out}" in output
+    assert not (out / "lloyd").exists()
 
 
 @pytest.mark.parametrize("command", ["controllers", "maps", "check rooms", "schema"])
