@@ -21,6 +21,7 @@ from robocov_app.viewer.panel.parameters import list_limit_parameters
 from robocov_app.viewer.session.editing.map_edits import add_obstacle
 from robocov_app.viewer.session.files.session_file import MAX_FILE_SAMPLES
 from robocov_app.viewer.session.past.curves import Curve
+from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 from robocov_app.viewer.session.setup.robot_properties import RobotProperties
 from robocov_app.viewer.window.status import list_facts
 
@@ -194,6 +195,21 @@ def test_the_run_before_a_comparison_stays_until_a_controller_is_chosen(driver: 
     driver.press_key("ctrl+z")
     assert len(driver.session.timeline.panes) == 1
     assert driver.session.displayed.time >= time
+
+
+def test_a_comparison_names_the_controllers_of_the_present(driver: Driver) -> None:
+    advance_session(driver.session, 30)
+    driver.session.set_controller(driver.session.timeline.panes[0], ControllerChoice("lloyd"))
+    advance_session(driver.session, 30)
+    driver.session.show_time(0.0)
+    driver.push_button("pane:add")
+    dialog = driver.window.dialogs.current
+    assert dialog.title.startswith("Compare Lloyd with…")
+    options = dialog.options("")
+    assert (options[-1].text, options[-1].note) == ("Lloyd", "already shown")
+    driver.type("rpf")
+    driver.press_key("return")
+    assert [pane.controller.name for pane in driver.session.timeline.panes] == ["lloyd", "rpf"]
 
 
 def test_controllers_that_are_shown_are_offered_last(driver: Driver) -> None:

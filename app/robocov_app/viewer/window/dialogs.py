@@ -60,7 +60,8 @@ def build_comparison_dialog(viewer: Presenter) -> Choice:
     """
     panes = viewer.session.timeline.panes
     require_space_for_pane(len(panes))
-    choices = [viewer.session.displayed.get_setup(pane).controller for pane in panes]
+    # The panes restart with their present controllers, even if the past with others is displayed.
+    choices = [pane.controller for pane in panes]
     shown_labels = {choice.name: choice.label for choice in choices}
     labels = label_controllers(viewer.controllers, shown_labels)
     descriptions = describe_controllers(viewer.controllers, shown_labels)
