@@ -275,9 +275,12 @@ class FigurePage:
         return x / width, 1.0 - y / height
 
     def add_axes(self, box: PageBox) -> Axes:
-        """Add axes that fill a box, px."""
-        x, y = self.to_figure(box.left, box.bottom)
+        """Add axes that fill a box, px; raise a ParameterError if the page has no space for them."""
         page_width, page_height = self.size
+        if min(box.width, box.height) <= 0.0:
+            expected = "expected a page with space for all maps and curves"
+            raise ParameterError(f"size: {expected}, got {page_width} x {page_height} pixels")
+        x, y = self.to_figure(box.left, box.bottom)
         rectangle = (x, y, box.width / page_width, box.height / page_height)
         return self.figure.add_axes(rectangle, axes_class=PageAxes)
 

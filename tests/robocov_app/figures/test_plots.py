@@ -209,13 +209,23 @@ class TestComparison:
         assert min(text.get_fontsize() * figure.dpi / 72 for text in figure.texts) >= 17
 
 
-@pytest.mark.parametrize(
+PLOTS_OF_A_SIZE = pytest.mark.parametrize(
     "plot",
     [
         pytest.param(plot_trajectories, id="trajectories"),
         pytest.param(lambda record, size: plot_comparison([record] * 3, size=size), id="comparison"),
     ],
 )
+
+
+@PLOTS_OF_A_SIZE
+@pytest.mark.parametrize("size", [(200, 100), (20, 400)])
+def test_a_page_without_space_for_maps_is_rejected(plot, size):
+    with pytest.raises(ParameterError, match=f"size: expected .*, got {size[0]} x {size[1]} pixels"):
+        plot(record_walk(ROOMS, 3), size=size)
+
+
+@PLOTS_OF_A_SIZE
 def test_texts_grow_with_the_page(plot):
     small = plot(record_walk(ROOMS, 3), size=(960, 640))
     large = plot(record_walk(ROOMS, 3), size=(2880, 1920))

@@ -202,6 +202,12 @@ def test_vector_environments_reject_invalid_actions() -> None:
         vector_env.step(np.pad(np.zeros((2, 2, 2)), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan))
 
 
+@pytest.mark.parametrize("num_envs", [0, -1, 2.5, True])
+def test_an_invalid_number_of_environments_is_rejected(num_envs: Any) -> None:
+    with pytest.raises(ParameterError, match="num_envs: expected a whole number of at least 1, got "):
+        CoverageVectorEnv(num_envs, **SMALL)
+
+
 def test_environments_that_share_a_simulation_render_their_own_robots() -> None:
     together = CoverageVectorEnv(2, render_mode="rgb_array", **SMALL)
     alone = CoverageEnv(render_mode="rgb_array", **SMALL)
