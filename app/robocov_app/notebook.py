@@ -397,7 +397,7 @@ def show(
     map: str | Path | Environment | Simulation,  # noqa: A002 - The parameter has this name in all functions.
     *,
     robots: int = DEFAULT_ROBOTS,
-    controllers: Sequence[str] = (DEFAULT_CONTROLLER,),
+    controllers: str | Sequence[str] = (DEFAULT_CONTROLLER,),
     seed: int = 0,
     height: int = 620,
 ) -> LiveWindow | Record:
@@ -410,8 +410,8 @@ def show(
         simulation: see `robocov.Simulation.show` for the state from which it starts.
     robots : int
         Number of robots; ignored for a simulation.
-    controllers : sequence of str
-        Names of the controllers; ignored for a simulation.
+    controllers : str or sequence of str
+        Name of the controller, or names of several; ignored for a simulation.
     seed : int
         Seed of the starting positions; ignored for a simulation.
     height : int, px
@@ -426,16 +426,20 @@ def show(
     Raises
     ------
     ParameterError
-        If a simulation has a controller that is not built in, obstacles that have moved, or no working robot.
+        If there are no controllers, or if a simulation has a controller that is not built in, obstacles that
+        have moved, or no working robot.
     RobocovError
         If the window cannot start.
     """
     has_web = find_spec("websockets") is not None
     if isinstance(map, Simulation):
         return _show_simulation(map, height) if has_web else map.copy().run(FALLBACK_DURATION_S)
+    names = (controllers,) if isinstance(controllers, str) else tuple(controllers)
+    if not any(names):
+        raise ParameterError("controllers: expected at least one, got none")
     if not has_web:
-        return Scenario(map, controllers[0], robots=robots, seed=seed).run()
-    options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
+        return Scenario(map, names[0], robots=robots, seed=seed).run()
+    options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *names]
     if not isinstance(map, Environment):
         return LiveWindow(["demo", str(map), *options], height)
     # The file can be removed afterwards, because the window has read it when this returns.

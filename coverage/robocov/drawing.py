@@ -122,7 +122,7 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has thi
             Number of robots; 6 by default.
         seed : int
             Seed of their starts; 0 by default.
-        controllers : sequence of str
+        controllers : str or sequence of str
             Up to four controllers side by side: names, or ``mine.py:MyController``.
         height : int, px
             Height of the cell.

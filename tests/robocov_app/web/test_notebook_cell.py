@@ -185,6 +185,19 @@ def test_without_the_web_extra_a_replay_continues_a_simulation(monkeypatch):
     assert simulation.show().time[-1] == pytest.approx(61.0)
 
 
+@pytest.mark.parametrize("controllers", ["lloyd", ["lloyd"]])
+def test_a_single_controller_may_be_a_string(controllers, monkeypatch):
+    monkeypatch.setattr("robocov_app.notebook.LiveWindow", lambda arguments, _: arguments)
+    arguments = show("square", controllers=controllers)
+    assert arguments[arguments.index("--controllers") + 1 :] == ["lloyd"]
+
+
+@pytest.mark.parametrize("controllers", ["", [], ()])
+def test_a_window_without_controllers_is_rejected(controllers):
+    with pytest.raises(robocov.ParameterError, match="controllers: expected at least one, got none"):
+        show("square", controllers=controllers)
+
+
 def test_an_unknown_map_is_rejected(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(robocov.RobocovError, match="nowhere"):
