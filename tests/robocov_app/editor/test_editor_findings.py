@@ -9,6 +9,7 @@ import pytest
 from driven_editor import EditorDriver, build_sheet, load_sketch, open_editor
 
 from robocov.environment import CircleObstacle, DiscStart, Gap, PointsStart, PolygonObstacle, WallObstacle
+from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.canvas import list_map_facts
 from robocov_app.editor.canvas.overlay import STEM_PX, build_gap_label
 from robocov_app.editor.model.sketch import Sketch
@@ -103,6 +104,26 @@ def test_a_problem_has_a_badge_and_a_click_shows_it(tmp_path: Path) -> None:
         assert driver.editor.problem is problems[-1]
         point = problems[-1].geometry.representative_point()
         assert driver.window.canvas.contains(driver.find_pixel((point.x, point.y)))
+
+
+def test_the_chosen_problem_is_drawn_even_if_there_are_too_many(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(overlay, "MAX_BADGES", 1)
+    with open_editor(tmp_path, build_sheet(CROSSED, CircleObstacle((30, 30), 1.0))) as driver:
+        driver.window.canvas.fit()
+        driver.run_frames(1)
+        last = driver.editor.problems[-1]
+        point = last.geometry.representative_point()
+        x, y = driver.find_pixel((point.x, point.y))
+        badge = (x, y - STEM_PX)
+        assert driver.window.canvas.find_problem(badge) is None
+        without_badge = draw_without_message(driver)
+        driver.editor.problem = last
+        assert driver.window.canvas.find_problem(badge) is last
+        color = driver.window.theme.error if last.is_error else driver.window.theme.warning
+        assert count_pixels(without_badge, badge, color, 7) < 10
+        assert count_pixels(draw_without_message(driver), badge, color, 7) > 40
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

@@ -241,7 +241,8 @@ class EditorCanvas:
             return None
         reach = BADGE_REACH_PX * self.layout.scale
         pixel = self._to_arena(pixel)
-        for problem, position in overlay.place_badges(self.editor.problems, self.build_view()):
+        drawn_problems = overlay.select_drawn_problems(self.editor.problems, self.editor.problem)
+        for problem, position in overlay.place_badges(drawn_problems, self.build_view()):
             if distance(position, pixel) < reach:
                 return problem
         return None

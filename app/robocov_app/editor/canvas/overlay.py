@@ -524,10 +524,17 @@ def _locate_gap(canvas: Canvas, gap: Gap) -> tuple[FloatArray, FloatArray, Float
     return start, end, normal * GAP_END_HALF_PX * canvas.scale
 
 
+def select_drawn_problems(problems: tuple[Problem, ...], chosen: Problem | None) -> tuple[Problem, ...]:
+    """Return the first `MAX_BADGES` problems, and the chosen one if it is not among them."""
+    if chosen is not None and chosen in problems[MAX_BADGES:]:
+        return (*problems[:MAX_BADGES], chosen)
+    return problems[:MAX_BADGES]
+
+
 def place_badges(problems: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
-    """Return each problem that has a position, with the center of its badge, px; at most `MAX_BADGES`."""
+    """Return each problem that has a position, with the center of its badge, px."""
     badges = []
-    for problem in problems[:MAX_BADGES]:
+    for problem in problems:
         if problem.geometry is not None and not problem.geometry.is_empty:
             point = problem.geometry.representative_point()
             x, y = view.camera.to_pixels(np.array([point.x, point.y])).tolist()
@@ -547,10 +554,11 @@ def draw_problems(
     Warnings have outlines only if chosen or hovered. A single error always has its message.
     """
     noted = (chosen, hovered)
-    for problem in problems[:MAX_BADGES]:
+    drawn_problems = select_drawn_problems(problems, chosen)
+    for problem in drawn_problems:
         if problem.geometry is not None and (problem.is_error or problem in noted):
             _draw_problem_outline(canvas, problem)
-    badges = place_badges(problems, view)
+    badges = place_badges(drawn_problems, view)
     # Earlier problems are drawn on top of later ones.
     for problem, (x, y) in reversed(badges):
         color = get_problem_color(canvas.theme, is_error=problem.is_error)
