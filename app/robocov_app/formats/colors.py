@@ -87,7 +87,10 @@ class ColorKey:
                     other = f"{entries[color]}_color"
                     raise ParameterError(f"{role}_color: {quote(text)} is a color of {other} as well")
         if len(entries) > _MAX_COLORS:
-            raise ParameterError(f"free_color: expected at most {_MAX_COLORS} colors, got {len(entries)}")
+            ((role, _),) = Counter(entries.values()).most_common(1)
+            raise ParameterError(
+                f"{role}_color: expected at most {_MAX_COLORS} colors in all, got {len(entries)}"
+            )
         return cls(tuple(entries.items()), tolerance)
 
     def __bool__(self) -> bool:

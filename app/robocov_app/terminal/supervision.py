@@ -48,7 +48,9 @@ def find_user_controllers(words: Sequence[str]) -> list[str]:
         ``file.py:ClassName``, without duplicates.
     """
     controllers: list[str] = []
-    for word in words:
+    for argument in words:
+        # Of an option like --controller=mine.py:C, only the value matters.
+        word = argument.partition("=")[2] if argument.startswith("--") and "=" in argument else argument
         controllers += _CONTROLLER.findall(word)
         if word.lower().endswith(".toml"):
             with suppress(OSError, ValueError):

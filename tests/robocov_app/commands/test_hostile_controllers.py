@@ -13,6 +13,7 @@ import pytest
 from command_calls import COMMAND
 
 from robocov.text import escape_controls
+from robocov_app.terminal.supervision import find_user_controllers
 
 HEAD = """
 import ctypes, os, signal, sys
@@ -98,6 +99,11 @@ def test_a_comparison_terminated_by_a_controller_is_reported(folder: Path) -> No
     )
     assert result.returncode == 1
     assert TERMINATIONS["os._exit(0)"] in read_error_line(result)
+
+
+@pytest.mark.parametrize("words", [["--controller", "mine.py:Mine"], ["--controller=mine.py:Mine"]])
+def test_the_name_of_an_option_is_not_part_of_the_controller(words: list[str]) -> None:
+    assert find_user_controllers(["run", "square", *words]) == ["mine.py:Mine"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are not supervised there")

@@ -193,7 +193,14 @@ def test_the_nearest_declared_color_counts(tmp_path: Path) -> None:
         ({"solid_color": ("transparent",)}, "solid_color: expected a color name"),
         ({"free_color": ("red",), "ignore_color": ("#f00",)}, "ignore_color: '#f00' is a color of free"),
         ({"color_tolerance": 256.0}, "color_tolerance: expected a number from 0 to 255, got 256"),
-        ({"free_color": tuple(f"#0000{k:02x}" for k in range(33))}, "expected at most 32 colors, got 33"),
+        (
+            {"free_color": tuple(f"#0000{k:02x}" for k in range(33))},
+            "free_color: expected at most 32 colors in all, got 33",
+        ),
+        (
+            {"free_color": ("red",), "solid_color": tuple(f"#0000{k:02x}" for k in range(39))},
+            "solid_color: expected at most 32 colors in all, got 40",
+        ),
     ],
 )
 def test_invalid_colors_are_rejected(options: dict[str, object], message: str) -> None:
