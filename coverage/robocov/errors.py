@@ -690,7 +690,7 @@ def _count_edits(first: str, second: str) -> int:
 def format_bound(bound: float) -> str:
     """Format a bound of a range without an exponent, unless it is tiny or huge.
 
-    Whole numbers have at most ten digits, others at most eight.
+    Bounds from 100,000 to 1e9 have at most ten digits, others at most six.
 
     Parameters
     ----------
@@ -705,7 +705,7 @@ def format_bound(bound: float) -> str:
     >>> format_bound(1e6), format_bound(0.5), format_bound(1e-6)
     ('1000000', '0.5', '0.000001')
     """
-    digits = 10 if float(bound).is_integer() else 8
+    digits = 10 if 1e5 <= abs(bound) <= 1e9 else 6
     text = f"{bound:.{digits}g}"
     if "e" not in text or not 1e-9 <= abs(bound) <= 1e9:
         return text

@@ -241,20 +241,20 @@ class SimulationBatch:
             are scans of all robots if those of any run are due.
         """
         if self._observations is None:
-            is_any_scan_due = any(self._is_scan_due(run) for run in range(len(self)))
+            scanning = self._controller_caller.scanning
+            # Whether the robots of each run scan in this step.
+            self._is_scan_due = [
+                is_scan_due(scanning, self._steps - first_step, self.dt) for first_step in self._first_steps
+            ]
             self._observations = build_observations(
                 world=self._world,
                 sensor=self.sensor,
                 environment=self.environment,
                 neighbors=self._get_joint_graph(),
                 time=self.time,
-                scanning=self._controller_caller.scanning if is_any_scan_due else None,
+                scanning=scanning if any(self._is_scan_due) else None,
             )
         return self._observations
-
-    def _is_scan_due(self, run: int) -> bool:
-        """Return whether the robots of a run scan in this step."""
-        return is_scan_due(self._controller_caller.scanning, self._steps - self._first_steps[run], self.dt)
 
     def observe_run(self, run: int) -> Observations:
         """Return the current observations of the robots of one run, as `Simulation.observe` does.
@@ -276,7 +276,7 @@ class SimulationBatch:
         run = self._require_run(run)
         observations = self.observe()
         rows = self._rows[run]
-        scans = observations.scans if self._is_scan_due(run) else None
+        scans = observations.scans if self._is_scan_due[run] else None
         if scans is not None:
             scans = Scans(scans.distances[rows], scans.is_hit[rows])
         return replace(
