@@ -135,7 +135,7 @@ def show(map: Any, **options: Any) -> Any:  # noqa: A002 - The parameter has thi
     Raises
     ------
     RobocovError
-        If the window cannot start.
+        If an option cannot be used, or the window cannot start.
 
     See Also
     --------

@@ -690,7 +690,7 @@ def _count_edits(first: str, second: str) -> int:
 def format_bound(bound: float) -> str:
     """Format a bound of a range without an exponent, unless it is tiny or huge.
 
-    Bounds from 100,000 to 1e9 have at most ten digits, others at most six.
+    Bounds from 100,000 to 1e9 are rounded to ten significant digits, others to six.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ class RangeSensor:
         for row, (position, limit) in enumerate(zip(positions.tolist(), limits.tolist(), strict=True)):
             nearest = self._space.point_query_nearest(tuple(position), limit, _EVERYTHING)
             if nearest is not None:
-                # pymunk returns no point if the position is exactly on a surface.
+                # pymunk returns nan if the position is exactly on a surface.
                 points[row] = position if math.isnan(nearest.point.x) else nearest.point
         points.setflags(write=False)
         return points

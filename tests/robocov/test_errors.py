@@ -60,7 +60,7 @@ def test_transposed_letters_are_one_edit(name: str, similar_names: list[str]) ->
         (1e12, "1e+12"),
     ],
 )
-def test_bounds_have_no_exponents(bound: float, text: str) -> None:
+def test_only_tiny_and_huge_bounds_have_exponents(bound: float, text: str) -> None:
     assert errors.format_bound(bound) == text
 
 

@@ -31,8 +31,8 @@ _SQUARES_PER_SIDE = 20
 """Number of squares along a side; one measurement is stored for each square."""
 _BASIS_WIDTH = 0.8
 """Standard deviation of a basis function, relative to the distance to the next one."""
-_TIME_DIGITS = 9
-"""Number of decimal places to which the time between two plans, s, is rounded."""
+_TIME_DECIMALS = 9
+"""Number of decimal places to which the time between two plans, in seconds, is rounded."""
 _NOISE_VARIANCE = 1e-3
 """Variance of a measurement, relative to that of the prior."""
 
@@ -249,8 +249,8 @@ class Adaptive(BaseController):
         elapsed = time - plan_time
         if not 0.0 < elapsed < np.inf:
             return self.period
-        # Rounding errors of the times must not matter.
-        return round(elapsed, _TIME_DIGITS)
+        # Rounded, because the times contain rounding errors that depend on the step.
+        return round(elapsed, _TIME_DECIMALS)
 
     def _learn_by_gaussian_process(self, seen: Observations, memory: AdaptiveMemory) -> AdaptiveMemory:
         """Return the memory after each robot has measured, with estimates from all known measurements."""

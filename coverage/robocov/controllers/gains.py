@@ -318,13 +318,14 @@ def _to_gain(dataclass_field: Field[Any]) -> Gain | Option | None:
 def get_gain_values(controller: Any) -> dict[str, Value]:
     """Return the values of the gains of a controller, in the order of their declaration.
 
-    Numbers of NumPy, which a user's controller may have, are converted to those of Python.
+    NumPy numbers, which a user's controller may contain, are converted to Python numbers.
     """
-    values: dict[str, Value] = {}
-    for name in get_gains(controller):
-        value = getattr(controller, name)
-        values[name] = value.item() if isinstance(value, np.generic) else value
-    return values
+    return {name: to_plain_value(getattr(controller, name)) for name in get_gains(controller)}
+
+
+def to_plain_value(value: Any) -> Any:
+    """Convert a NumPy number to a Python number, which JSON can represent; return anything else unchanged."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def validate_gains(controller: Any) -> None:

@@ -112,8 +112,9 @@ def get_recorded_name(controller: Controller) -> str:
     Returns
     -------
     str
-        The name of its class if a built-in controller of another class has the same name. A subclass of a
-        built-in controller inherits such a name, and a record must not be repeated with the built-in one.
+        The attribute ``name``, or the name of the class if a built-in controller of another class has that
+        name. A subclass of a built-in controller inherits its name, but its records must not be repeated with
+        the built-in controller.
     """
     kind = type(unwrap_controller(controller))
     is_other_kind = controller.name in CONTROLLERS and CONTROLLERS[controller.name] is not kind

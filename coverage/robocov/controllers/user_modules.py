@@ -293,9 +293,10 @@ class _ModuleCollector:
     def _add_module(self, name: str, locations: Sequence[str] | None) -> list[str]:
         """Add one module; return the names of the modules that it imports."""
         self._locations[name] = []
-        # In a folder, only the last part of the name is looked up. With the full name, Python would look for
-        # the imported parent of a package without ``__init__.py``, which has not been imported.
-        spec = PathFinder.find_spec(name if locations is None else name.rpartition(".")[2], locations)
+        # In a folder, only the last part of the name is looked up. For the full name, Python would need the
+        # parent package, which has not been imported.
+        lookup_name = name if locations is None else name.rpartition(".")[2]
+        spec = PathFinder.find_spec(lookup_name, locations)
         if spec is None or not _is_own(spec):
             return []
         self._locations[name] = list(spec.submodule_search_locations or ())

@@ -1,4 +1,4 @@
-"""Sums of Gaussians, and their integrals over polygons in closed form.
+"""Sums of Gaussians, and their integrals over polygons.
 
 Let g = exp(-|q|²/2) be the standard Gaussian, whose center is the origin. Let d be the signed distance of an
 edge from the center along the outward normal n, and let s run from s₁ to s₂ along the edge in its direction
@@ -90,7 +90,8 @@ class Gaussian:
     sigma : float or None, m
         Standard deviation in all directions, from 1e-100 to 1e100.
     covariance : 2 x 2 nested tuples or None, m²
-        Covariance S, a symmetric and positive definite matrix: an alternative to `sigma`.
+        Covariance S, a symmetric and positive definite matrix with variances from 1e-200 to 1e200: an
+        alternative to `sigma`.
 
     Raises
     ------
@@ -125,10 +126,10 @@ class Gaussian:
                 f"sigma: expected a number from {_MIN_SIGMA_M:g} to {_MAX_SIGMA_M:g}, "
                 f"got {quote(self.sigma)} m"
             )
-        if self.covariance is not None and not _is_positive_definite(self.covariance):
+        if self.covariance is not None and not _is_valid_covariance(self.covariance):
             raise ParameterError(
-                "covariance: expected a symmetric, positive definite 2 x 2 matrix, "
-                f"got {quote(self.covariance)} m²"
+                "covariance: expected a symmetric, positive definite 2 x 2 matrix with variances from 1e-200 "
+                f"to 1e200, got {quote(self.covariance)} m²"
             )
 
     @property
@@ -178,14 +179,16 @@ class Gaussian:
 
     def _find_small_cells(self, edges: CellEdges, cell_count: int) -> BoolArray:
         """Return whether each cell is much smaller than the standard deviation, (n,)."""
-        is_large_edge = compute_lengths(self._standardize(edges.starts)) > _SMALL_CELL_SIZE
-        return np.asarray(np.bincount(edges.cells, is_large_edge, minlength=cell_count) == 0.0)
+        is_far = compute_lengths(self._standardize(edges.starts)) > _SMALL_CELL_SIZE
+        far_counts = np.bincount(edges.cells, is_far, minlength=cell_count)
+        return np.asarray(far_counts == 0)
 
     def _compute_moments_by_quadrature(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
         """Compute the moments of each cell as sums over the triangles between its generator and its edges."""
         nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_ORDER)
         fractions = 0.5 * (nodes + 1.0)
-        # Points t (start + s (end - start)) on a triangle, whose area element is |start x end| t ds dt.
+        # Points t (start + s (end - start)) of a triangle. The area element, with a sign, is
+        # (start x end) t ds dt.
         s, t = np.meshgrid(fractions, fractions)
         weight_grid = 0.25 * np.outer(weights, weights) * t
         along = s[..., None] * (edges.ends - edges.starts)[:, None, None]
@@ -255,7 +258,8 @@ class Gaussian:
 class Gaussians(Density):
     """A density that is the sum of Gaussians and a constant.
 
-    Its integrals over cells are computed in closed form, with the error function and Owen's T function.
+    Its integrals over cells are computed in closed form, with the error function and Owen's T function, or
+    numerically for cells much smaller than a standard deviation.
 
     Parameters
     ----------
@@ -323,7 +327,7 @@ class Gaussians(Density):
         return total
 
     def compute_moments(self, edges: CellEdges, origins: FloatArray) -> FloatArray:
-        """Compute the mass, first moments and polar moment of each cell in closed form.
+        """Compute the mass, first moments and polar moment of each cell.
 
         Parameters
         ----------
@@ -372,7 +376,7 @@ def _integrate_along_edges(starts: FloatArray, ends: FloatArray) -> _StandardMom
     mass = np.arctan(ratio2) - np.arctan(ratio1) - 2.0 * np.pi * (owens_t(d, ratio2) - owens_t(d, ratio1))
     # If the line of an edge passes through the center, the integrand is zero.
     mass[~has_distance] = 0.0
-    # Far from the center, squares may overflow to infinity. The exponential is then zero, which is correct.
+    # Far from the center, the exponential underflows to zero, which is correct.
     peak = np.exp(-0.5 * d * d)
     e0 = peak * np.sqrt(np.pi / 2.0) * (erf(s2 / np.sqrt(2.0)) - erf(s1 / np.sqrt(2.0)))
     e1 = peak * (np.exp(-0.5 * s1 * s1) - np.exp(-0.5 * s2 * s2))
@@ -389,8 +393,8 @@ def _integrate_along_edges(starts: FloatArray, ends: FloatArray) -> _StandardMom
     return contributions
 
 
-def _is_positive_definite(matrix: Matrix) -> bool:
-    """Return whether a matrix is symmetric, positive definite, and not nearly singular."""
+def _is_valid_covariance(matrix: Matrix) -> bool:
+    """Return whether a matrix is symmetric, positive definite, not nearly singular, and within the limits."""
     (a, b), (c, d) = matrix
     is_symmetric = b == c
     min_variance = _MIN_SIGMA_M**2

@@ -92,11 +92,9 @@ class WeightedArea:
         ParameterError
             If a ring has fewer than three vertices, or a coordinate is not finite.
         """
-        for ring in (self.vertices, *self.holes):
-            if len(ring) < 3 or not np.isfinite(ring).all():
-                raise ParameterError(
-                    f"vertices: expected at least 3 points with finite coordinates, got {quote(ring)}"
-                )
+        _require_ring("vertices", self.vertices)
+        for number, hole in enumerate(self.holes):
+            _require_ring(f"holes[{number}]", hole)
         return shapely.Polygon(self.vertices, self.holes)
 
 
@@ -165,12 +163,14 @@ class WeightedPolygons(Density):
         Raises
         ------
         ParameterError
-            If the edges of an area cross each other.
+            If an area is not a valid polygon, for example because its edges cross.
         """
         for number, area in enumerate(self.areas):
             if not area.polygon.is_valid:
                 reason = shapely.is_valid_reason(area.polygon)
-                raise ParameterError(f"areas[{number}]: expected edges that do not cross, got {reason}")
+                raise ParameterError(
+                    f"areas[{number}]: expected a valid polygon, got one with an error: {reason}"
+                )
         jumps_by_ring = [np.empty((0, _JUMP_COLUMNS))]
         covered = shapely.MultiPolygon()
         # The last area is on top, and covers the others.
@@ -223,10 +223,16 @@ class WeightedPolygons(Density):
         return moments
 
 
+def _require_ring(name: str, ring: Ring) -> None:
+    """Raise a ParameterError unless a ring has at least three vertices, and all coordinates are finite."""
+    if len(ring) < 3 or not np.isfinite(ring).all():
+        raise ParameterError(f"{name}: expected at least 3 points with finite coordinates, got {quote(ring)}")
+
+
 def _build_jumps(points: FloatArray, step: float) -> FloatArray:
     """Return the jumps across the edges of a closed ring with an area on its left, (k, 5).
 
-    The ring leads counter-clockwise around the area, or clockwise around a hole in it. The density in the
+    The ring runs counter-clockwise around the area, or clockwise around a hole in it. The density in the
     area exceeds that outside by `step`. A jump runs from the lower to the upper end of its edge, and contains
     the change of the density from its left side to its right side: -step if the area is on the left, and
     +step if it is on the right.
@@ -237,7 +243,7 @@ def _build_jumps(points: FloatArray, step: float) -> FloatArray:
     is_falling = starts[:, 1:] > ends[:, 1:]
     low_ends = np.where(is_falling, ends, starts)
     high_ends = np.where(is_falling, starts, ends)
-    # The inside of the ring lies to the left of a rising edge.
+    # The area lies to the left of a rising edge.
     signed_steps = np.where(is_falling, 1.0, -1.0) * step
     return np.hstack([low_ends, high_ends, signed_steps])
 

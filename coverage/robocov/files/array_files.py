@@ -79,7 +79,8 @@ def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) ->
     Raises
     ------
     InputError
-        If the file is damaged or too large, or contains duplicate entries or Python objects.
+        If the file is damaged or too large, uses an unsupported compression method, or contains duplicate
+        entries or Python objects.
     """
     try:
         file_size = file.seek(0, io.SEEK_END)
@@ -98,7 +99,7 @@ def read_arrays(file: BinaryIO, source_name: str, max_bytes: int = MAX_BYTES) ->
 
 
 def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, max_bytes: int) -> None:
-    """Raise ValueError if entries are too large, have the same name, or use an unusual compression."""
+    """Raise ValueError if entries are too large, have the same name, or use an unsupported compression."""
     # The sizes in the entries can be trusted: `zipfile` never decompresses more than the size in an entry.
     total_size = sum(entry.file_size for entry in entries)
     max_size = min(max_bytes, max(_RATIO_EXEMPT_BYTES, _MAX_COMPRESSION_RATIO * file_size))
@@ -108,7 +109,7 @@ def _require_reasonable_entries(entries: list[zipfile.ZipInfo], file_size: int, 
         )
     for entry in entries:
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"entry {entry.filename!r} has an unsupported compression")
+            raise ValueError(f"entry {entry.filename!r} uses an unsupported compression method")
     for name, count in Counter(entry.filename.removesuffix(".npy") for entry in entries).items():
         if count > 1:
             raise ValueError(f"duplicate entry {name!r}")

@@ -44,7 +44,7 @@ def open_private_folder(folder: Path) -> Path | None:
     -------
     Path or None
         The folder. None if it cannot be created or written to, belongs to another user, is writable by other
-        users, or lies in a folder in which all users may replace it.
+        users, or has a parent folder whose entries all users may replace.
     """
     # An error only means that the folder cannot be used.
     with suppress(OSError):

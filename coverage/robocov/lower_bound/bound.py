@@ -44,8 +44,8 @@ _FIRST_SMOOTHING = 0.0025
 """Smoothing in the search before the first proof, as a fraction of the cost per robot. It is halved before
 each later proof."""
 
-_FINAL_SMOOTHING = 0.25
-"""Upper limit of the smoothing in the last search for prices, as a fraction of the requested precision."""
+_MAX_FINAL_SMOOTHING = 0.25
+"""The search ends at the latest when the smoothing is at most this fraction of the requested precision."""
 
 _RELATIVE_TOLERANCE = 0.3
 """Tolerance of a proof, as a fraction of the smoothing."""
@@ -257,7 +257,7 @@ def _search_best_proof(dual: _Dual, precision: float, report: Callable[[float], 
     best: _Proof | None = None
     smoothing = _FIRST_SMOOTHING
     # The smoothing is halved after each round, until it is at most the final one.
-    halving_count = math.ceil(math.log2(smoothing / (_FINAL_SMOOTHING * precision)))
+    halving_count = math.ceil(math.log2(smoothing / (_MAX_FINAL_SMOOTHING * precision)))
     round_count = 1 + max(0, halving_count)
     for k in range(round_count):
         fraction = _PROGRESS_BEFORE_SEARCH + (1.0 - _PROGRESS_BEFORE_SEARCH) * k / round_count

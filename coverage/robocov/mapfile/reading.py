@@ -68,8 +68,9 @@ def load_map(source: str | Path) -> Environment:
     """
     path = find_map_file(source)
     content = read_bytes(path)
-    text = content.lstrip(_BLANK_BYTES)
-    if path.suffix.lower() != ".json" and text and not text.startswith(b"{"):
+    stripped = content.lstrip(_BLANK_BYTES)
+    # The parser reports an empty file.
+    if path.suffix.lower() != ".json" and stripped and not stripped.startswith(b"{"):
         raise MapError(
             f"{to_one_line(str(path))}: expected a robocov map, got a file in another format. "
             "Convert it with `robocov import`."

@@ -224,7 +224,7 @@ class Results:
         """Find the folder of a run; raise InputError if there is no such folder, or the run failed."""
         name = self._find_run_name(run)
         folder = self.folder / RUNS_FOLDER / name
-        # Other names could lead out of the folder of the sweep.
+        # A name with a separator, or "..", could lead out of the folder of the sweep.
         is_plain_name = name not in ("", "..") and Path(name).name == name
         if not is_plain_name or not folder.is_dir():
             raise InputError(f"{self.folder}: there is no run {quote(name)}")

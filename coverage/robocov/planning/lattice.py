@@ -385,7 +385,7 @@ def find_clear_lines(
     frame : Frame
         Position of these cells.
     ignored_length : float, m
-        Points of a line that are closer to the position are not tested.
+        Points of a line within this distance of the position are not tested.
 
     Returns
     -------

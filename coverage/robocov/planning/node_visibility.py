@@ -61,8 +61,8 @@ class NodeVisibility:
         is_obstructing : (h, w) bool array
             For example `MapWindow.is_blocked` or `MapWindow.is_near_wall`.
         ignored_length : float, m
-            Points of a line that are closer to the position are not tested. Routes start at the position of a
-            robot, which may itself be too close to a wall.
+            Points of a line within this distance of the position are not tested. Routes start at the position
+            of a robot, which may itself be too close to a wall.
 
         Returns
         -------

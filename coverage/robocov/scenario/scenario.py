@@ -13,7 +13,6 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from robocov.conditions import PARAMETERS as CONDITION_PARAMETERS
@@ -25,7 +24,7 @@ from robocov.controllers import (
     get_recorded_name,
     make_controller,
 )
-from robocov.controllers.gains import Value, get_gain_values
+from robocov.controllers.gains import Value, get_gain_values, to_plain_value
 from robocov.controllers.individual import require_controller, unwrap_controller
 from robocov.controllers.user_modules import ControllerSource, provide_modules
 from robocov.defaults import DEFAULT_CONTROLLER, DEFAULT_DT_S, DEFAULT_DURATION_S, DEFAULT_ROBOTS
@@ -247,7 +246,8 @@ class Scenario:
         ----------
         **changes
             Parameters of `Scenario`. A new controller has its default gains unless `gains` is given
-            as well. A new number of robots discards the team, and needs new `starts` if these were given.
+            as well. A new number of robots replaces the team with one that has the default
+            properties, and requires new `starts` if these were given.
 
         Returns
         -------
@@ -577,7 +577,7 @@ class Scenario:
         Raises
         ------
         InputError
-            If the file cannot be read or used. The message names the file and the key.
+            If the file cannot be read or used. The message names the file and the value.
         """
         path = Path(path)
         document = parse_json(read_bytes(path), str(path))
@@ -683,7 +683,7 @@ def _describe_controller(
             # This checks the name and the gains. A controller in a file ("file:class") is only checked when
             # it is needed, because that runs the code of the file.
             make_controller(controller, gains)
-        plain_gains = {name: _to_plain_value(value) for name, value in (gains or {}).items()}
+        plain_gains = {name: to_plain_value(value) for name, value in (gains or {}).items()}
         _require_finite_gains(plain_gains)
         return {"controller": controller, "gains": plain_gains, "_controller_object": None}
     if gains:
@@ -705,19 +705,16 @@ def _require_finite_gains(gains: Mapping[str, Value]) -> None:
             raise ParameterError(f"gains: {name}: expected a finite number, got {quote(value)}")
 
 
-def _to_plain_value(value: Any) -> Any:
-    """Convert a number of NumPy to one of Python, for JSON; return anything else unchanged."""
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _load_environment(content: str | dict[str, Any], source_name: str, folder: Path | None) -> Environment:
     """Return the map of a document, which contains the map itself, its name, or the path of its file."""
     if not isinstance(content, str):
         return from_json(content, f"{source_name}: map", folder)
     if folder is not None and content not in list_bundled_maps():
+        is_file = False
         with suppress(OSError):  # The name may be too long for a file.
-            if (folder / content).is_file():
-                return load_map(folder / content)
+            is_file = (folder / content).is_file()
+        if is_file:
+            return load_map(folder / content)
     try:
         path = find_map_file(content)
     except MapError as error:

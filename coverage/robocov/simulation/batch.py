@@ -135,7 +135,7 @@ class SimulationBatch:
             self._complete_joint_graph = Neighbors.combine(self._complete_graphs)
         # Step in which each run started, or was restarted.
         self._first_steps = [0] * run_count
-        # Runs that were restarted scan in other steps than the others.
+        # Controllers that scan decide for each run separately, because a restarted run scans in other steps.
         self._decides_jointly = (
             robot_count <= MAX_JOINT_TEAM_SIZE
             and not has_memory(self.controller)
@@ -156,6 +156,8 @@ class SimulationBatch:
         """Discard the observations and the decision of the previous step."""
         self._graphs: list[Neighbors] | None = None
         self._observations: Observations | None = None
+        # Whether the robots of each run scan in this step.
+        self._scanning_runs: list[bool] = []
         self._decision: _BatchDecision | None = None
 
     def _begin_run(self) -> Any:
@@ -237,13 +239,12 @@ class SimulationBatch:
         Returns
         -------
         Observations
-            Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run. There
-            are scans of all robots if those of any run are due.
+            Row ``r * n + i`` belongs to robot i of run r. Robots communicate only within their own run. If
+            any run is due to scan, the observations contain scans of all robots.
         """
         if self._observations is None:
             scanning = self._controller_caller.scanning
-            # Whether the robots of each run scan in this step.
-            self._is_scan_due = [
+            self._scanning_runs = [
                 is_scan_due(scanning, self._steps - first_step, self.dt) for first_step in self._first_steps
             ]
             self._observations = build_observations(
@@ -252,7 +253,7 @@ class SimulationBatch:
                 environment=self.environment,
                 neighbors=self._get_joint_graph(),
                 time=self.time,
-                scanning=scanning if any(self._is_scan_due) else None,
+                scanning=scanning if any(self._scanning_runs) else None,
             )
         return self._observations
 
@@ -276,7 +277,7 @@ class SimulationBatch:
         run = self._require_run(run)
         observations = self.observe()
         rows = self._rows[run]
-        scans = observations.scans if self._is_scan_due[run] else None
+        scans = observations.scans if self._scanning_runs[run] else None
         if scans is not None:
             scans = Scans(scans.distances[rows], scans.is_hit[rows])
         return replace(

@@ -427,8 +427,8 @@ class Simulation:
         """Show the simulation in an interactive window, or in a cell of a notebook.
 
         The window does not change this simulation. It starts at 0 s with the current positions, velocities
-        and headings of the robots, which fail and join when they would in this simulation. Memories and
-        messages of the robots start empty, and the random numbers for noise and message loss start from the
+        and headings of the robots. Robots fail and join when they would in this simulation. They start
+        without memories or messages, and the random numbers for noise and message loss start again from the
         first step.
 
         Parameters
@@ -526,17 +526,18 @@ class Simulation:
         """Return a changed copy of the simulation, which continues from the current state.
 
         The memory of the robots and the controller messages are dropped if the controller or the number of
-        robots changes. All messages are dropped if the conditions or the number of robots change. Otherwise,
-        the memory of a built-in controller is updated with the new properties of the robots. It is not
-        adapted to another boundary.
+        robots changes. All messages are dropped if the conditions or the number of robots change. If the
+        memory is kept and is a dataclass with a field ``team``, as that of built-in controllers, it receives
+        the new properties of the robots. Maps, plans and routes that were computed with the old ones stay
+        until the controller computes new ones. The memory is not adapted to a new boundary.
 
         Parameters
         ----------
         environment, controller, team, conditions
             See `Simulation`. By default they do not change.
         positions, velocities, steering : (n, 2) arrays or None
-            See `TeamState`. By default they do not change. If the number of robots changes, positions and
-            velocities have no default.
+            See `TeamState`. By default they do not change. If the number of robots changes, positions
+            and velocities must be given.
 
         Returns
         -------

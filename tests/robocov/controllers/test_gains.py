@@ -144,12 +144,12 @@ def test_a_controller_without_gains_takes_none() -> None:
         instantiate_controller(Plain, {"k": 1.0})
 
 
-def test_names_of_gains_that_are_no_strings_are_rejected() -> None:
+def test_gain_names_that_are_not_strings_are_rejected() -> None:
     with pytest.raises(ParameterError, match="gains: expected names as keys, got 3"):
         make_controller("rapf", {3: 1.0})  # type: ignore[dict-item]
 
 
 @pytest.mark.parametrize("gains", [3, ["k_rep"], "k_rep"])
-def test_gains_that_are_no_mapping_are_rejected(gains: object) -> None:
+def test_gains_that_are_not_a_mapping_are_rejected(gains: object) -> None:
     with pytest.raises(ParameterError, match="gains: expected a mapping of names to values, got"):
         make_controller("rapf", gains)  # type: ignore[arg-type]

@@ -105,7 +105,7 @@ def test_an_archive_is_read_after_its_directory_is_rewritten() -> None:
         (patch_directory(TWO, compress_type=99), "compression"),
         (
             patch_directory(TWO, compress_type=zipfile.ZIP_LZMA),
-            "entry 'b.npy' has an unsupported compression",
+            "entry 'b.npy' uses an unsupported compression method",
         ),
         (patch_directory(TWO, filename="a"), "duplicate entry 'a'"),
         (TWO.replace(b", }", b", y", 1), "EOF in multi-line statement"),

@@ -176,7 +176,7 @@ def test_mistakes_in_a_file_have_line_and_column():
     assert str(caught.value).startswith(f"mine.json:{caught.value.line}:")
 
 
-def test_a_raster_on_a_flat_boundary_is_reported_as_a_mistake_of_the_boundary():
+def test_a_raster_on_a_flat_boundary_is_reported_as_an_error_in_the_boundary():
     document = build_document({"kind": "raster", "rows": [[1, 2], [3, 4]]})
     document["boundary"] = [[0, 0], [0, 4], [0, 8]]
     with pytest.raises(MapError, match=r"boundary: expected a width and a height above 0, got 0 m x 8 m"):

@@ -266,8 +266,8 @@ def test_summaries_contain_the_metrics_of_a_run(record: Record) -> None:
         "path_length_m": compute_path_lengths(record.positions, record.traveled).tolist(),
         "stuck_robots": count_stuck_robots(record.time, record.positions, record.goals),
     }
-    resting = replace(record, positions=np.repeat(record.positions[:1], len(record), axis=0))
-    assert summarize(resting, history)["settled_at_s"] == 0.0
+    settled = replace(record, positions=np.repeat(record.positions[:1], len(record), axis=0))
+    assert summarize(settled, history)["settled_at_s"] == 0.0
     assert summary["contacts"] > 0
     assert -2e-3 < summary["min_clearance_m"] < 1e-3
 

@@ -78,7 +78,7 @@ def test_a_subclass_of_a_built_in_controller_is_not_recorded_as_that_controller(
         rc.Scenario.from_record(record)
 
 
-def test_gains_of_a_controller_may_be_numbers_of_numpy(tmp_path: Path) -> None:
+def test_gains_of_a_controller_may_be_numpy_numbers(tmp_path: Path) -> None:
     scenario = rc.Scenario(ROOM, Homing(np.float32(0.5)), robots=2, duration=0.1)  # type: ignore[arg-type]
     scenario.save(tmp_path / "scenario.json")
     assert scenario.run().gains == {"pull": 0.5}

@@ -156,21 +156,21 @@ class ExploringLloyd(BaseController):
         measurements = memory.measurements
         measurement_exchange = memory.measurement_exchange
         if seen.has_known_uniform_density:
-            # φ is 1 everywhere, since a factor changes no centroid. The density may change later, so this is
-            # not remembered.
-            known_values = np.ones_like(measurements)
+            # A uniform φ can be taken as 1, because a constant factor does not change the centroids. These
+            # values are not stored, because the density may change later.
+            values = np.ones_like(measurements)
         else:
             measurements = _measure(seen, memory)
             measurement_exchange = measurement_exchange.start_period(measurements)
-            known_values = measurements
+            values = measurements
         sightings = memory.sightings.update(seen, memory.team)
         robots, other_positions = sightings.list_pairs()
         is_own = find_own_samples(grid.centers, seen.positions, robots, other_positions) & grid.is_inside
         goals = np.empty_like(seen.positions)
         viewpoints = np.empty_like(memory.viewpoints)
         for robot in range(len(goals)):
-            is_unknown = is_own[robot] & np.isnan(known_values[robot])
-            masses = self._estimate_masses(known_values[robot])
+            is_unknown = is_own[robot] & np.isnan(values[robot])
+            masses = self._estimate_masses(values[robot])
             viewpoints[robot] = NO_SQUARE
             if masses[is_unknown].sum() > self.exploration * masses[is_own[robot]].sum():
                 viewpoints[robot] = _choose_viewpoint(

@@ -28,7 +28,7 @@ _MIN_PROGRESS_M = 0.05
 _BLOCK = np.ones((3, 3), dtype=bool)
 """A cell and its eight neighbors."""
 _BLOCK_RADIUS = 1.5
-"""Distance to all eight neighbors of a cell, rounded up, in cells."""
+"""Radius, in cells, within which all eight neighbors of a cell lie: the square root of 2, rounded up."""
 
 
 @dataclass(frozen=True)

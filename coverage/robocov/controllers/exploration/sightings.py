@@ -69,10 +69,15 @@ class Sightings:
         positions = self.positions.copy()
         times = self.times.copy()
         pairs = seen.find_neighbors()
-        positions[pairs.robots, pairs.neighbors] = seen.positions[pairs.robots] - pairs.offsets
-        times[pairs.robots, pairs.neighbors] = seen.time
+        report_times = np.full(len(pairs.robots), seen.time)
         if seen.report_ages is not None:
-            times[pairs.robots, pairs.neighbors] -= seen.report_ages
+            report_times -= seen.report_ages
+        # The report of another robot may be newer than that of the neighbor itself.
+        is_newer = report_times >= times[pairs.robots, pairs.neighbors]
+        robots = pairs.robots[is_newer]
+        neighbors = pairs.neighbors[is_newer]
+        positions[robots, neighbors] = seen.positions[robots] - pairs.offsets[is_newer]
+        times[robots, neighbors] = report_times[is_newer]
         distances = np.sqrt(((positions - seen.positions[:, None]) ** 2).sum(axis=2))
         is_silent = seen.time - times > MAX_SILENCE_S
         certain_ranges = CERTAIN_RANGE_FRACTION * team.communication_range
