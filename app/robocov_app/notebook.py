@@ -421,13 +421,13 @@ def show(
     -------
     LiveWindow or Record
         The window or, if ``robocov[web]`` is not installed, the record of a run of one minute under the first
-        controller. For a simulation, it is the record of its next minute.
+        controller. For a simulation, the record of its next minute.
 
     Raises
     ------
     ParameterError
-        If there are no controllers, or if a simulation has a controller that is not built in, obstacles that
-        have moved, or no working robot.
+        If there are no controllers, or if the window cannot show a simulation, because its controller is not
+        built in, its obstacles have moved, or no robot works.
     RobocovError
         If the window cannot start.
     """

@@ -87,7 +87,8 @@ class ColorKey:
                     other = f"{entries[color]}_color"
                     raise ParameterError(f"{role}_color: {quote(text)} is a color of {other} as well")
         if len(entries) > _MAX_COLORS:
-            ((role, _),) = Counter(entries.values()).most_common(1)
+            counts = Counter(entries.values())
+            role = max(counts, key=counts.__getitem__)
             raise ParameterError(
                 f"{role}_color: expected at most {_MAX_COLORS} colors in all, got {len(entries)}"
             )

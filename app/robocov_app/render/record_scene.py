@@ -85,7 +85,7 @@ def select_robots(snapshot: Snapshot, robots: IntArray) -> Snapshot:
     Returns
     -------
     Snapshot
-        Its cells are not selected. Scans are dropped.
+        Its cells remain those of the whole snapshot. Scans are dropped.
     """
     seen = snapshot.seen
     decision = snapshot.decision

@@ -157,7 +157,7 @@ class Autosaver:
         Returns
         -------
         bool
-            Whether no draft is waiting to be written.
+            False if a draft is still waiting, or could not be written.
         """
         with self._changed:
             self._skips_pause = True

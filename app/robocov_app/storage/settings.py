@@ -106,9 +106,9 @@ def save_changed_settings(
 ) -> Iterator[None]:
     """Save the settings that change while the block runs; save nothing if it raises.
 
-    Other settings keep the values that they have in the file at the end, because another window may have
-    saved them. If the file cannot be read then, it is renamed to end in `BACKUP_SUFFIX`. Without changes, an
-    existing file stays as it is.
+    Other settings keep the values in the file at that time, because another window may have saved them. If
+    the file cannot be read, `BACKUP_SUFFIX` is appended to its name first. Without changes, an existing file
+    stays as it is.
 
     Parameters
     ----------

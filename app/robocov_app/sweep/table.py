@@ -209,7 +209,7 @@ class Table:
         return self
 
     def __exit__(self, error_type: type[BaseException] | None, *_: object) -> None:
-        """Replace earlier files, unless there was an exception or the earlier table has more rows."""
+        """Replace earlier files, unless there was an exception, or this table is incomplete and shorter."""
         with self._stack:
             if error_type is not None:
                 return

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PIPED_TABLE_COLUMNS = 140
 """Width in characters of a table that is written to a file or a pipe."""
 MAX_FILE_STEM_CHARS = 64
-"""Maximum length of a file name that is made from another name, apart from a number and the extension."""
+"""Maximum length of a file name that is derived from another name, without a number and the extension."""
 BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
 """Look of a bold column of `print_table`."""
 RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
@@ -74,7 +74,7 @@ def print_answer(options: Any, answer: Any, *lines: str, indent: int | None = No
 
 
 def clean_file_stem(name: str, default: str) -> str:
-    """Convert a name to the stem of a file name that is valid on all systems, and within its folder.
+    """Convert a name to the stem of a file name, without separators and special characters.
 
     Parameters
     ----------
@@ -92,7 +92,8 @@ def clean_file_stem(name: str, default: str) -> str:
     >>> clean_file_stem("Floor 1/2", "map"), clean_file_stem("../escaped", "map"), clean_file_stem(" ", "map")
     ('Floor-1-2', 'escaped', 'map')
     """
-    return re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FILE_STEM_CHARS] or default
+    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:MAX_FILE_STEM_CHARS]
+    return stem.rstrip(".-") or default
 
 
 def find_free_path(folder: Path, stem: str, suffix: str) -> Path:

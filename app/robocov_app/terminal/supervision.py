@@ -49,8 +49,10 @@ def find_user_controllers(words: Sequence[str]) -> list[str]:
     """
     controllers: list[str] = []
     for argument in words:
+        word = argument
         # Of an option like --controller=mine.py:C, only the value matters.
-        word = argument.partition("=")[2] if argument.startswith("--") and "=" in argument else argument
+        if argument.startswith("--") and "=" in argument:
+            word = argument.partition("=")[2]
         controllers += _CONTROLLER.findall(word)
         if word.lower().endswith(".toml"):
             with suppress(OSError, ValueError):

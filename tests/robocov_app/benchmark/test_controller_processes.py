@@ -1,4 +1,4 @@
-"""Processes of controllers: nothing that they send, read or withhold harms a verification or escapes it."""
+"""Processes of controllers cannot disrupt or evade a verification by what they send, read or withhold."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def test_a_process_that_does_not_answer_is_ended(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(controller_process, "DESCRIPTION_LIMIT_S", 0.3)
     with (
         ControllerProcess(tmp_path) as process,
-        pytest.raises(ControllerFaultError, match=r"its process does not answer within 0\.3 s"),
+        pytest.raises(ControllerFaultError, match=r"its process did not answer within 0\.3 s"),
     ):
         process.describe(CODE)
 
@@ -223,7 +223,7 @@ def check_run(folder: Path) -> RunCheck:
 
 
 def test_only_one_process_of_a_controller_exists_at_a_time(process_log: list[str], tmp_path: Path) -> None:
-    """Otherwise, each process would see how long the others take, which could contain what they know."""
+    """Otherwise, each process could measure how long the others take, which could reveal what they know."""
     check = check_run(tmp_path)
     names = ("team", "robot 2", "robot 4")
     assert process_log == [f"{name} {event}" for name in names for event in ("starts", "ends")]

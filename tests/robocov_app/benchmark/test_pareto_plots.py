@@ -75,7 +75,8 @@ def test_omitted_points_are_named_with_the_value_by_which_they_were_grouped() ->
     equal = [ParetoPoint(style, label, x, 1.0, is_rival=True) for label, x in values.items()]
     _, omitted = thin_out_equal_values(equal)
     assert pareto_plots._describe_omitted_points(omitted, []) == (
-        "Not drawn, because a controller with the same value (1200) has no larger gap: b; c; d; e."
+        "Not drawn, because the gap of another controller with the same value (1200) is no larger: "
+        "b; c; d; e."
     )
 
 
@@ -119,7 +120,7 @@ def test_files_with_equal_values_do_not_remove_bundled_results() -> None:
 @pytest.mark.parametrize("x", [5.0, 40.0, 72.0, 400.0])
 @pytest.mark.parametrize("bundled_values", [(10.0, 18.0), (17.0, 18.0), (10.0, 12.0, 90.0)])
 def test_bundled_results_fill_a_large_part_of_the_axis(x: float, bundled_values: Sequence[float]) -> None:
-    """Bundled values that differ by less than a factor of 2 need no more space than if they did."""
+    """Bundled values with a ratio below 2 are treated as if the ratio were 2."""
     style = choose_curve_styles(["rapf"])[0]
     points = [ParetoPoint(style, "b", value, 1.0, is_rival=True, is_bundled=True) for value in bundled_values]
     points.append(ParetoPoint(style, "file", x, 1.0, is_rival=True))

@@ -69,10 +69,10 @@ TURNED = '<orientation method="uniform" min="0,0,0" max="360,0,0"/>'
 TILTED = '<orientation method="gaussian" mean="0,0,0" std_dev="0,20,0"/>'
 
 
-def distribute(position: str, quantity: int, thing: str, orientation: str = ALIKE) -> str:
+def distribute(position: str, quantity: int, entity: str, orientation: str = ALIKE) -> str:
     return (
         f"<distribute>{position}{orientation}"
-        f'<entity quantity="{quantity}" max_trials="100">{thing}</entity></distribute>'
+        f'<entity quantity="{quantity}" max_trials="100">{entity}</entity></distribute>'
     )
 
 

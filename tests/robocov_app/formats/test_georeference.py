@@ -55,7 +55,7 @@ def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, p
 def test_wide_coordinates_are_meters() -> None:
     meters, (note,) = project_points([[0, 0], [20, 10]], may_be_degrees=True)
     assert meters.tolist() == [[0, 0], [20, 10]]
-    assert note == "coordinates are in meters, because in degrees the map would exceed 10 km"
+    assert note == "coordinates treated as meters, because in degrees the map would exceed 10 km"
     assert project_points([[500, 0], [520, 10]], may_be_degrees=True)[0][0, 0] == 500.0
     assert project_points([[0, 0], [20, 10]])[1] == []
     assert project_points([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]

@@ -278,7 +278,7 @@ def test_the_message_says_that_the_process_of_a_run_was_killed(
     saver.save(start_session(RAPF), tmp_path)
     saver.finish()
     target = tmp_path / "hall-rapf-1"
-    reason = "the process has ended (killed by signal 9 (SIGKILL))"
+    reason = "the process has ended: killed by signal 9 (SIGKILL)"
     assert saver.poll() == [(f"run not saved: {target}/: {reason}", True)]
     assert not target.exists()
 

@@ -75,7 +75,7 @@ def test_the_cell_works_in_a_page_of_another_site(tmp_path, monkeypatch):
 
 @pytest.fixture
 def shown_simulations(monkeypatch):
-    """Simulations of the windows that are shown, which are opened in this process."""
+    """Simulations of all shown windows, whose sessions are opened in this process."""
     simulations = []
 
     def open_session(arguments, height):

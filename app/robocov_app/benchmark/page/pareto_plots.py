@@ -72,7 +72,7 @@ these to it. With larger ratios, a file could squeeze all bundled entries into a
 _MIN_BUNDLED_FRACTION = 0.4
 """Minimum fraction of the horizontal axis that the bundled entries fill when a value from a file is added."""
 _MIN_BUNDLED_RATIO = 2.0
-"""Ratio of the largest to the smallest value of the bundled entries that is assumed if it is smaller, because
+"""Minimum ratio of the largest to the smallest bundled value. Smaller ratios count as this one, because
 nearly equal bundled values would leave no space for others."""
 _MAX_LABEL_CHARS = 28
 """Maximum length of a label in a plot."""
@@ -171,11 +171,12 @@ def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[
         Points far from all others.
     """
     sentences = []
-    for value in dict.fromkeys(_round_value(point) for point in omitted):
+    for value in dict.fromkeys(_format_value(point) for point in omitted):
         # Some labels contain commas.
-        labels = "; ".join(point.label for point in omitted if _round_value(point) == value)
+        labels = "; ".join(point.label for point in omitted if _format_value(point) == value)
         sentences.append(
-            f"Not drawn, because a controller with the same value ({value}) has no larger gap: {labels}."
+            f"Not drawn, because the gap of another controller with the same value ({value}) is no larger: "
+            f"{labels}."
         )
     if outliers:
         labels = "; ".join(point.label for point in outliers)
@@ -183,9 +184,10 @@ def _describe_omitted_points(omitted: Sequence[ParetoPoint], outliers: Sequence[
     return " ".join(sentences)
 
 
-def _round_value(point: ParetoPoint) -> str:
-    """Return the value of the quantity with three digits; points for which it is the same count as equal."""
-    return f"{float(f'{point.x:.3g}'):g}"
+def _format_value(point: ParetoPoint) -> str:
+    """Format the value of a point with three significant digits. Points with the same text count as equal."""
+    rounded = float(f"{point.x:.3g}")
+    return f"{rounded:g}"
 
 
 def _shorten_label(label: str, *, is_bundled: bool) -> str:
@@ -217,7 +219,7 @@ def thin_out_equal_values(
     """
     points_by_value: dict[str, list[ParetoPoint]] = {}
     for point in points:
-        points_by_value.setdefault(_round_value(point), []).append(point)
+        points_by_value.setdefault(_format_value(point), []).append(point)
     omitted: list[ParetoPoint] = []
     for equal_points in points_by_value.values():
         omitted += _list_superfluous_points(equal_points)

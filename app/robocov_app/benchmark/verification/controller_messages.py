@@ -41,8 +41,7 @@ READING = "reading"
 VIOLATION = "violation"
 """Kind of a message from a process: a forbidden action of its controller."""
 MAX_TEXT_CHARS = 4096
-"""Maximum length of a text that is accepted from a process, such as an error or a path. No path on Linux is
-longer."""
+"""Maximum length of text accepted from a process, such as an error or a path. No path on Linux is longer."""
 KEPT: Any = None
 """Value in place of the region or the density in a `Step` if the process already has it."""
 _PAYLOAD_PROTOCOL = 4

@@ -49,13 +49,14 @@ CACHE_PREFIX = "robocov-verify-"
 _MAX_VIOLATIONS = 20
 """Maximum number of violations that are listed."""
 MAX_READ_FILES = 20
-"""Maximum number of files that a controller may read. Reading more is a violation, so that none is hidden."""
+"""Maximum number of files that a controller may read. Reading more is a violation, so that no file goes
+unreported."""
 DESCRIPTION_LIMIT_S = 120.0
-"""Maximum time in which a controller describes itself."""
+"""Maximum time for a controller to describe itself."""
 ANSWER_LIMIT_S = 600.0
-"""Maximum time of a single step, in which a controller may compile its functions."""
+"""Maximum time for the setup or one step, including the compilation of the controller's functions."""
 _POLL_INTERVAL_S = 0.2
-"""Time between two checks whether a process is late."""
+"""Time between two checks of whether a process is late."""
 Measure: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
 """Returns the density at points that robots measure, as the function of a `DensitySensor`."""
 
@@ -96,7 +97,7 @@ class _Watchdog:
     Attributes
     ----------
     limit_s : float
-        Time in which the current answer is expected.
+        Time limit for the current answer.
     is_late : bool
         Whether the process was killed because it did not answer in time.
     """
@@ -111,12 +112,12 @@ class _Watchdog:
         threading.Thread(target=self._watch, daemon=True).start()
 
     def expect_answer(self, limit_s: float) -> None:
-        """Start to wait for an answer."""
+        """Start the time limit for the next answer."""
         self.limit_s = limit_s
         self._deadline = time.monotonic() + limit_s
 
     def accept_answer(self) -> None:
-        """Stop waiting, because the answer has arrived."""
+        """Stop the time limit, because the answer has arrived."""
         self._deadline = math.inf
 
     def end(self) -> None:
@@ -135,14 +136,14 @@ class _Watchdog:
 class ControllerProcess:
     """A process that executes a controller, and from which only plain values are accepted.
 
-    As a context manager, it ends the process.
+    As a context manager, it ends the process on exit.
 
     Parameters
     ----------
     folder : Path
         Folder for the machine code that processes compile. Each process has its own subfolder.
     is_cancelled : callable, optional
-        Returns whether the answers of the process are no longer needed, and it is killed.
+        Returns whether the answers of the process are no longer needed. The process is then killed.
 
     Attributes
     ----------
@@ -265,16 +266,18 @@ class ControllerProcess:
         except (EOFError, OSError):
             raise ControllerFaultError(self._describe_end()) from None
         except DamagedMessageError as error:
-            raise ControllerFaultError(
-                self._describe_end() if self._watchdog.is_late else str(error)
-            ) from None
+            reason = str(error)
+            if self._watchdog.is_late:
+                # The killed process may have left a part of a message.
+                reason = self._describe_end()
+            raise ControllerFaultError(reason) from None
         if not isinstance(message, tuple) or not message or not isinstance(message[0], str):
             raise ControllerFaultError("its process sent an invalid message")
         return message
 
     def _describe_end(self) -> str:
         if self._watchdog.is_late:
-            return f"its process does not answer within {self._watchdog.limit_s:g} s"
+            return f"its process did not answer within {self._watchdog.limit_s:g} s"
         return "its process ended"
 
     def _add_violation(self, action: str) -> None:
@@ -325,15 +328,15 @@ def _create_cache(folder: Path) -> Path:
 
 
 def _require_text(values: list[Any]) -> str:
-    """Return the only value, which must be a text; a process may send anything else."""
-    if len(values) != 1 or not _is_short_text(values[0]):
+    """Return the only value, which must be a string of limited length; a process may send anything."""
+    if len(values) != 1 or not _is_short_string(values[0]):
         raise ControllerFaultError(
-            f"its process sent an invalid message: expected a text of at most {MAX_TEXT_CHARS} characters"
+            f"its process sent an invalid message: expected a string of at most {MAX_TEXT_CHARS} characters"
         )
     return str(values[0])
 
 
-def _is_short_text(value: Any) -> bool:
+def _is_short_string(value: Any) -> bool:
     return isinstance(value, str) and len(value) <= MAX_TEXT_CHARS
 
 
@@ -385,7 +388,7 @@ def read_description(values: Any) -> Description:
     """
     try:
         label = values["label"]
-        if not _is_short_text(label):
+        if not _is_short_string(label):
             raise ParameterError(f"label: expected at most {MAX_TEXT_CHARS} characters, got {quote(label)}")
         information: Information = values["information"]
         if information not in get_args(Information):
@@ -400,17 +403,17 @@ def read_description(values: Any) -> Description:
 
 
 def _require_gains(gains: Any) -> None:
-    """Raise ParameterError unless the values are gains: finite numbers, short texts or None, by name."""
+    """Raise ParameterError unless the values are gains: finite numbers, short strings or None, by name."""
     if not isinstance(gains, Mapping):
         raise ParameterError(f"gains: expected values by name, got {quote(gains)}")
     for name, value in gains.items():
-        if not _is_short_text(name):
+        if not _is_short_string(name):
             raise ParameterError(
                 f"gains: expected names of at most {MAX_TEXT_CHARS} characters, got {quote(name)}"
             )
-        if value is not None and not _is_short_text(value) and not _is_finite_number(value):
+        if value is not None and not _is_short_string(value) and not _is_finite_number(value):
             raise ParameterError(
-                f"gains: {quote(name)}: expected a finite number, a text of at most {MAX_TEXT_CHARS} "
+                f"gains: {quote(name)}: expected a finite number, a string of at most {MAX_TEXT_CHARS} "
                 f"characters or None, got {quote(value)}"
             )
 

@@ -142,7 +142,7 @@ class _Connection:
         return receive(self._source)
 
     def send_text(self, kind: str, text: str) -> None:
-        """Send a message with a text of any length, of which the verification receives the beginning."""
+        """Send text, cut to the length that the verification accepts."""
         self.send(kind, " ".join(text.split())[:MAX_TEXT_CHARS])
 
     def send(self, kind: str, *values: Any) -> None:

@@ -110,8 +110,8 @@ _FUNCTIONS_WITHOUT_EVENTS = {
     "_tkinter": ("create",),
 }
 """Functions by module that a controller must not call, and that cause no audit event in some versions of
-Python. Each reads or changes something that another process can see, gives access to functions that do, or
-starts a thread, which would act while the controller is not called. Modules that are not installed are
+Python. Each reads or changes something that another process can see, gives access to such functions, or
+starts a thread, which could run between the calls of the controller. Modules that are not installed are
 skipped."""
 _LOOKUP_FUNCTIONS = ("access", "lstat", "open", "readlink", "stat")
 """Functions of the module os that look up a path. Audit events do not contain their argument ``dir_fd``, and

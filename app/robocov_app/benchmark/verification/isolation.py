@@ -1,4 +1,4 @@
-"""A team controlled by a separate process, and robots that decide again with their own observations only.
+"""A team controlled by a separate process, and robots whose decisions are repeated in processes of their own.
 
 During a verification, the code of a controller is never in the process that simulates the run, records it and
 computes its metrics. That process, the referee, calls an `IsolatedTeam`, which asks other processes for
@@ -9,10 +9,10 @@ decisions:
 - After the run, a new process for each robot that is checked receives the recorded observations of this
   robot, one step after the other. Its decisions must be the same as those for the team, bit for bit.
 
-Only one of these processes exists at a time, so none can learn from the time or the processor load of another
-one. No process receives the observations of a step before it has decided on the previous step, so none can
-infer from later observations what the team did. If the decisions of a robot are the same in all steps, the
-run would have been the same if a separate process had controlled this robot.
+Only one of these processes exists at a time, so none can learn anything from the timing or the processor load
+of another. No process receives the observations of a step before it has decided on the previous step, so none
+can infer from later observations what the team did. If the decisions of a robot are the same in all steps,
+the run would have been the same if a separate process had controlled this robot.
 
 The input of a process depends on the information that the controller declares:
 
@@ -201,7 +201,7 @@ class _RobotStep:
 
 
 class _RobotRecord:
-    """All steps of a robot, in a temporary file, because messages with maps may need much memory."""
+    """All steps of a robot, in a temporary file, because messages with maps may need a lot of memory."""
 
     def __init__(self) -> None:
         self._encoder = StepEncoder()
@@ -257,8 +257,8 @@ class IsolatedTeam:
         The first difference of each robot, and messages that the robots must not send.
     step_count : int
         Number of steps in which the team has decided.
-    checked_robots : int
-        Number of robots of which at least one decision was compared.
+    checked_robot_count : int
+        Number of robots with at least one compared decision.
     declared_bytes : int
         Total size of the messages of all robots, as their controller declares it.
     compressed_bytes : int
@@ -282,7 +282,7 @@ class IsolatedTeam:
         self.scanning = scanning
         self.differences: list[str] = []
         self.step_count = 0
-        self.checked_robots = 0
+        self.checked_robot_count = 0
         self.declared_bytes = 0
         self.compressed_bytes = 0
         self._may_send_messages = may_send_messages
@@ -345,7 +345,7 @@ class IsolatedTeam:
         assert self._seen is not None
         assert self._decision is not None
         self.step_count += 1
-        # The log of the measurements of all robots would need much memory.
+        # The log of the measurements of all robots would need a lot of memory.
         sensor = self._seen.density_sensor
         self._sensors.append(None if sensor is None else sensor.copy_without_log())
         for robot, record in self._records.items():
@@ -360,7 +360,7 @@ class IsolatedTeam:
             )
 
     def check_robot(self, robot: int, decider: Decider) -> None:
-        """Let a robot decide again in all recorded steps, and note its first different decision.
+        """Repeat the decisions of a robot in all recorded steps, and note the first one that differs.
 
         Decisions of a failed robot have no effect and are not compared.
 
@@ -391,7 +391,8 @@ class IsolatedTeam:
                     break
         except RobocovError as error:
             self.differences.append(f"robot {robot + 1} in a separate process: {error}")
-        self.checked_robots += is_compared
+        if is_compared:
+            self.checked_robot_count += 1
 
     def _describe_knowledge(self) -> str:
         if self._environment is None:

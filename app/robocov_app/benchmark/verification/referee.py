@@ -65,7 +65,7 @@ class RunCheck:
         Outcome of the repeated run; None if its process ended, or if the referees were killed before it
         started.
     robots : int
-        Number of robots of which at least one decision was repeated in a process of its own.
+        Number of robots with at least one decision that was repeated in a separate process.
     differences : list of str
         Everything that is not as expected, apart from the metrics of the run.
     read_files : list of str
@@ -109,8 +109,11 @@ class RefereeService:
         ) as isolated_team:
             with team_process:
                 outcome = perform(run.task, isolated_team.record_step, isolated_team)
+            checked_robots = run.robots
             # If the run failed before the first decision, there is nothing to compare.
-            for robot in run.robots if isolated_team.step_count else ():
+            if isolated_team.step_count == 0:
+                checked_robots = ()
+            for robot in checked_robots:
                 # Processes that exist at the same time could measure each other's computing times.
                 with ControllerProcess(run.cache_folder) as robot_process:
                     isolated_team.check_robot(robot, robot_process)
@@ -123,7 +126,7 @@ class RefereeService:
         files = {name: data for name, data in outcome.files.items() if name == EFFORT_FILE}
         return RunCheck(
             replace(outcome, files=files),
-            robots=isolated_team.checked_robots,
+            robots=isolated_team.checked_robot_count,
             steps=isolated_team.step_count,
             differences=differences,
             read_files=list(dict.fromkeys(read_files)),

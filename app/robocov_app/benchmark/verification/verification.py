@@ -131,7 +131,7 @@ class Verification:
     new_maps : int
         Number of new maps that were tried.
     new_map_track : str
-        Track of the runs on new maps; empty if the result has no runs on generated maps.
+        Track of the runs on new maps; empty if none were planned.
     no_new_maps_reason : str
         Reason why no new maps were planned; empty if there were some.
     comparison : NewMapComparison or None

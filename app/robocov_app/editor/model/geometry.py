@@ -131,7 +131,7 @@ def format_length(meters: float) -> str:
 
 
 def format_compared_lengths(first: float, second: float) -> tuple[str, str]:
-    """Format two lengths in m so that different lengths have different texts, if 6 decimals suffice.
+    """Format two lengths, m, with as many decimals (3 to 6) as are needed to tell them apart.
 
     Examples
     --------

@@ -79,7 +79,7 @@ def convert_to_meters(
     if scale not in (None, 1.0):
         shapes.notes.append(f"a unit is {scale:g} m")
     elif may_be_degrees and units is None:
-        shapes.notes.append("coordinates are in meters, because in degrees the map would exceed 10 km")
+        shapes.notes.append("coordinates treated as meters, because in degrees the map would exceed 10 km")
     if crs is not None:
         shapes.notes.append(f"coordinates of {crs} used without conversion")
     meters_per_unit = get_or_default(scale, 1.0)

@@ -93,7 +93,7 @@ def _distribute(element: Element, shapes: Shapes) -> None:
 
 
 def _parse_common_angles(element: Element) -> FloatArray:
-    """Return the angles of all entities of a <distribute> about z, y and x, (3,) degrees; nan if random."""
+    """Return the angles of all entities of a <distribute>, (3,) degrees about z, y and x; nan if random."""
     method = element.attributes.get("method", "")
     if method == "constant":
         return element.parse_numbers("values", count=3)

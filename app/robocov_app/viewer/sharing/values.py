@@ -1,4 +1,4 @@
-"""Numbers and texts in commands and in Python: as short as possible, but exact."""
+"""Numbers and strings in commands and in Python: as short as possible, but exact."""
 
 import math
 

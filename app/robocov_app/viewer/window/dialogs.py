@@ -60,7 +60,7 @@ def build_comparison_dialog(viewer: Presenter) -> Choice:
     """
     panes = viewer.session.timeline.panes
     require_space_for_pane(len(panes))
-    # The panes restart with their present controllers, even if the past with others is displayed.
+    # The panes restart with their present controllers, even if the displayed past has others.
     choices = [pane.controller for pane in panes]
     shown_labels = {choice.name: choice.label for choice in choices}
     labels = label_controllers(viewer.controllers, shown_labels)

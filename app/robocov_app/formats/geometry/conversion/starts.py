@@ -61,8 +61,8 @@ def find_widest_point(
     tolerance : float, m
         Accuracy of the distance: no other point is farther from the walls by more than this.
     sufficient : float, m
-        The search ends as soon as it finds a point at this distance from the walls, and skips areas without
-        such a point; the returned point is then not the farthest one.
+        The search stops at the first point at this distance from the walls, and ignores areas without such a
+        point. The returned point is then not necessarily the farthest.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def require_clearance(parts: list[Polygon], conversion: Conversion) -> None:
     """Raise MapError if no part of the free space is wide enough for a robot to start in."""
     clearance = conversion.clearance
     for part in parts:
-        if _limit_distance(part) >= clearance:
+        if _compute_distance_bound(part) >= clearance:
             _, distance = find_widest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
             if distance >= clearance:
                 return
@@ -138,15 +138,15 @@ def _find_max_distance(parts: list[Polygon]) -> float:
     """Return the distance of the widest point of all parts from its walls, m."""
     max_distance = 0.0
     for part in parts:
-        if _limit_distance(part) > max_distance:
+        if _compute_distance_bound(part) > max_distance:
             mean_width = part.area / part.length
             _, distance = find_widest_point(part, mean_width / _STEPS_PER_WIDTH)
             max_distance = max(max_distance, distance)
     return max_distance
 
 
-def _limit_distance(part: Polygon) -> float:
-    """Return the radius of the disc of the same area, m: no point of a part is farther from its walls."""
+def _compute_distance_bound(part: Polygon) -> float:
+    """Return an upper bound on the distance of points from the walls, m: the radius of a disc of its area."""
     return math.sqrt(part.area / math.pi)
 
 

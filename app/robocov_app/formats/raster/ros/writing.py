@@ -96,7 +96,7 @@ def _quote_image_name(path: Path, image: Path) -> str:
         raise OutputError(f"{to_one_line(path)}: {quote(image.name)}: expected a name in UTF-8") from None
     if _PLAIN_NAME.fullmatch(image.name):
         return image.name
-    # YAML does not join the surrogate pairs that JSON has for characters beyond U+FFFF.
+    # JSON escapes characters beyond U+FFFF as surrogate pairs, which YAML does not combine.
     quoted = yaml.safe_dump(image.name, default_style='"', allow_unicode=True, width=_MAX_LINE_CHARACTERS)
     return quoted.rstrip("\n")
 

@@ -302,7 +302,7 @@ def _parse_polyline(entity: Any) -> _Polyline | None:
     plane = entity.ocs() if entity.is_2d_polyline else None
     height = 0.0
     if plane is not None:
-        # The elevation of an old polyline is a point, whose third coordinate is the height.
+        # The elevation of an old-style polyline is a point. Its z coordinate is the height.
         ezdxf_math = import_optional("ezdxf.math", "dxf")
         height = float(ezdxf_math.Vec3(entity.dxf.get("elevation", (0.0, 0.0, 0.0))).z)
     default_widths = [float(entity.dxf.get(f"default_{end}_width", 0.0)) for end in ("start", "end")]

@@ -18,7 +18,7 @@ MIN_SHAPE_SIZE_M = 0.02
 PAINTED_RASTER_CELLS = 96
 """Number of raster cells along the longer side of a map whose density is painted."""
 MIN_PAINTED_DENSITY = 0.05
-"""Density below which the brush lowers no value, and from which it raises lower ones."""
+"""Lowest density to which the brush lowers values, and from which it starts to raise lower ones."""
 MAX_PAINTED_DENSITY = 50.0
 """Density above which the brush raises no value."""
 DAB_FACTOR = 1.15
@@ -193,8 +193,9 @@ def _round_points(points: list[Point]) -> tuple[Point, ...]:
 def paint_density(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
     """Raise or lower the density of a map with a brush.
 
-    The brush raises no value above `MAX_PAINTED_DENSITY`, and lowers none below `MIN_PAINTED_DENSITY`. Values
-    that are already outside these limits are not clipped, and cells that do not change are not rounded.
+    The brush raises no value above `MAX_PAINTED_DENSITY`, and lowers none below `MIN_PAINTED_DENSITY`.
+    Raising does not change values above the maximum, and lowering does not change values below the minimum.
+    Raising a value below the minimum starts from the minimum. Cells that do not change are not rounded.
 
     Parameters
     ----------

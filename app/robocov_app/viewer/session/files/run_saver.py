@@ -148,7 +148,7 @@ class RunSaver:
         if status == 0:
             self._messages.append((f"run saved: {job.target}/ (record, cost, figures)", False))
             return
-        reason = f"the process has ended ({describe_status(status)})"
+        reason = f"the process has ended: {describe_status(status)}"
         # A process that was killed has not reported why.
         if lines and status > 0:
             reason = lines[-1].removeprefix("robocov: error: ")

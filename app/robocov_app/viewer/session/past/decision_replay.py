@@ -145,7 +145,10 @@ def _build_radio(setup: PaneSetup, dt: float) -> Radio:
 
 
 def get_sensor(environment: Environment, time: float) -> RangeSensor:
-    """Return the range sensor on a map, with moving obstacles at their places at a time, in s."""
+    """Return the range sensor on a map, with moving obstacles at their positions at a time, in s.
+
+    The sensor is cached: the next call for the same map changes its time.
+    """
     sensor = _build_sensor(environment)
     sensor.set_time(time)
     return sensor

@@ -177,13 +177,13 @@ class SessionScenario:
         )
 
 
-def _drop_steering(scenario: SessionScenario, serialize: Any) -> dict[str, Any]:
-    """Serialize a scenario, but omit the steering if there is none."""
+def _omit_missing_steering(scenario: SessionScenario, serialize: Any) -> dict[str, Any]:
+    """Serialize a scenario without the key of the steering if there is none, as in earlier versions."""
     content: dict[str, Any] = serialize(scenario)
     if scenario.steering is None:
         del content["start_steering"]
     return content
 
 
-FileScenario: TypeAlias = Annotated[SessionScenario, WrapSerializer(_drop_steering)]
-"""The scenario in a session file."""
+FileScenario: TypeAlias = Annotated[SessionScenario, WrapSerializer(_omit_missing_steering)]
+"""A scenario as it is stored in a session file."""
