@@ -32,14 +32,17 @@ def test_a_new_document_has_a_boundary_and_no_changes(tmp_path: Path) -> None:
     assert document.suggest_path(tmp_path) == tmp_path / "untitled-1.json"
 
 
-def test_a_map_with_a_raster_and_a_flat_boundary_can_be_opened(tmp_path: Path) -> None:
+@pytest.mark.parametrize("boundary", [(), ((0.0, 0.0), (0.0, 4.0), (0.0, 8.0))], ids=["empty", "flat"])
+def test_a_map_with_a_raster_and_a_boundary_without_extent_can_be_opened(
+    tmp_path: Path, boundary: tuple[tuple[float, float], ...]
+) -> None:
     path = tmp_path / "flat.json"
     content = json.loads(dump_map(load_map("rooms")))
-    content["boundary"] = [[0, 0], [0, 4], [0, 8]]
+    content["boundary"] = boundary
     content["density"] = {"kind": "raster", "rows": [[1, 2], [3, 4]]}
     path.write_text(json.dumps(content))
     document = Document.open_file(path, None)
-    assert document.history.sketch.boundary == ((0.0, 0.0), (0.0, 4.0), (0.0, 8.0))
+    assert document.history.sketch.boundary == boundary
     assert not document.would_replace_valid_map(path)
 
 

@@ -118,7 +118,7 @@ def build_sketch(document: Any, source_name: str = "map", folder: Path | None = 
         schema = reader.read_text(members["$schema"], ("$schema",))
     density = None
     if members.get("density") is not None:
-        extent = boundary if boundary is not None and _has_extent(boundary) else _EXTENT_WITHOUT_BOUNDARY
+        extent = boundary if boundary and _has_extent(boundary) else _EXTENT_WITHOUT_BOUNDARY
         density = parse_density(members["density"], extent, source_name, folder)
     return Sketch(
         name=reader.read_text(members.get("name", ""), ("name",)),
