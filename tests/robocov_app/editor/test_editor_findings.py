@@ -14,6 +14,7 @@ from robocov_app.editor.canvas.canvas import list_map_facts
 from robocov_app.editor.canvas.overlay import STEM_PX, build_gap_label
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.settings import LAYERS
+from robocov_app.editor.ui import map_facts
 from robocov_app.look.theme import DARK, LIGHT, Theme
 from robocov_app.toolkit.sentence_case import to_sentence_case
 
@@ -52,6 +53,8 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
         # A passage that is narrower than a robot by less than a micrometer is wide enough.
         driver.run_command("radius 0.0750004")
         assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
+        texts = {fact.label: fact.text for fact in map_facts.list_map_facts(driver.editor)}
+        assert texts["Passage"] == "0.150 m ≥ 0.150 m"
         driver.run_command("radius 0.1")
         driver.press_key("alt+1")
         assert count_pixels(draw_without_message(driver), at, amber, 6) == 0
@@ -68,6 +71,7 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
         (0.199998, 0.1, "passage 0.199998 m < 0.200000 m"),
         (1.3 - 1.1, 0.1, "passage 0.200 m ≥ 0.200 m"),
         (0.1, 0.1 / 2, "passage 0.100 m ≥ 0.100 m"),
+        (0.15, 0.0750004, "passage 0.150 m ≥ 0.150 m"),
         (5.0, 0.02, "passage 5.000 m ≥ 0.040 m"),
     ],
 )

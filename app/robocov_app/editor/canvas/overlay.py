@@ -15,7 +15,7 @@ from robocov.typing import FloatArray
 from robocov_app.editor.canvas.outlines import build_outline
 from robocov_app.editor.canvas.sheet_view import View, compute_pixel_box
 from robocov_app.editor.model.geometry import distance, format_compared_lengths, format_length
-from robocov_app.editor.model.measurement import is_too_narrow
+from robocov_app.editor.model.measurement import compute_shown_width, is_too_narrow
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.handles import KNOB_HEIGHT_PX, Handle
@@ -494,11 +494,12 @@ def build_gap_label(gap: Gap, radius: float) -> str:
     -------
     str
     """
-    width = format_length(gap.width)
+    shown_width = compute_shown_width(gap, radius)
+    width = format_length(shown_width)
     diameter = format_length(2 * radius)
     has_one_unit = width.split()[1] == diameter.split()[1]
     if width == diameter or not has_one_unit:
-        width, diameter = format_compared_lengths(gap.width, 2 * radius)
+        width, diameter = format_compared_lengths(shown_width, 2 * radius)
     sign = "<" if is_too_narrow(gap, radius) else "≥"
     return f"passage {width} {sign} {diameter}"
 

@@ -107,6 +107,16 @@ def is_too_narrow(gap: Gap, radius: float) -> bool:
     return gap.width < 2.0 * radius - _FIT_TOLERANCE_M
 
 
+def compute_shown_width(gap: Gap, radius: float) -> float:
+    """Return the width of a gap, m, for a text that compares it with the diameter of robots with a radius, m.
+
+    A gap that is wide enough only because of the tolerance is shown as wide as a robot.
+    """
+    if is_too_narrow(gap, radius):
+        return gap.width
+    return max(gap.width, 2.0 * radius)
+
+
 def _count_vertices(sketch: Sketch) -> int:
     return sum(len(points) for owner in sketch.owners for _, points, _ in sketch.list_rings(owner))
 

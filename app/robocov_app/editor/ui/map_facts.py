@@ -6,7 +6,7 @@ from robocov.errors import format_count
 from robocov_app.editor.editor import Editor
 from robocov_app.editor.edits import density
 from robocov_app.editor.model.geometry import format_compared_lengths, format_point
-from robocov_app.editor.model.measurement import Measurement, is_too_narrow
+from robocov_app.editor.model.measurement import Measurement, compute_shown_width, is_too_narrow
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.team import Team
 
@@ -82,7 +82,8 @@ def _describe_gap(measurement: Measurement | None) -> str:
     gap = measurement.gap
     if gap is None:
         return "none"
-    width, diameter = format_compared_lengths(gap.width, 2 * measurement.radius)
+    shown_width = compute_shown_width(gap, measurement.radius)
+    width, diameter = format_compared_lengths(shown_width, 2 * measurement.radius)
     sign = "<" if is_too_narrow(gap, measurement.radius) else "≥"
     return f"{width} {sign} {diameter}"
 
