@@ -132,6 +132,19 @@ def test_bundled_results_fill_a_large_part_of_the_axis(x: float, bundled_values:
     assert ends[1] - ends[0] > 0.3 * axes.bbox.width
 
 
+@pytest.mark.parametrize(("x", "is_drawn"), [(0.01, False), (5.0, True), (12.0, True)])
+def test_a_bundled_value_of_zero_fills_no_part_of_a_logarithmic_axis(x: float, is_drawn: bool) -> None:
+    style = choose_curve_styles(["rapf"])[0]
+    points = [
+        ParetoPoint(style, "b", value, 1.0, is_rival=True, is_bundled=True) for value in (0.0, 10.0, 18.0)
+    ]
+    file_point = ParetoPoint(style, "file", x, 1.0, is_rival=True)
+    drawn, outliers = pareto_plots._split_outliers([*points, file_point])
+    assert (file_point in drawn) == is_drawn
+    assert (file_point in outliers) == (not is_drawn)
+    assert drawn[: len(points)] == points
+
+
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
 def test_no_point_dominates_the_pareto_front(points: list[tuple[int, int]]) -> None:
     front = {points[k] for k in find_pareto_front(points)}

@@ -279,6 +279,10 @@ def _is_far(point: ParetoPoint, bundled: Sequence[ParetoPoint]) -> bool:
 
 def _compute_bundled_fraction(value: float, bundled_values: Sequence[float]) -> float:
     """Return the fraction of the horizontal axis that bundled values fill when another value is added."""
+    positive = [other for other in bundled_values if other > 0.0]
+    if _needs_log_axis([*positive, value]):
+        # Points at 0 are not drawn on a logarithmic axis.
+        bundled_values = positive
     low = min(bundled_values)
     high = max(bundled_values)
     low = min(low, high / _MIN_BUNDLED_RATIO)
