@@ -236,6 +236,13 @@ def test_unreachable_regions_are_noted() -> None:
     assert build_environment(build_foreign_map(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
 
 
+def test_a_map_that_is_barely_wide_enough_is_not_rejected() -> None:
+    """The search for a position with enough clearance is less accurate than the one for the message."""
+    environment, _ = build_environment(build_foreign_map(CORRIDOR), Shaping(radius=0.1715), "plan")
+    assert environment.free_area == pytest.approx(CORRIDOR.area)
+    assert "uniform" in environment.starts
+
+
 @pytest.mark.parametrize(
     ("parts", "shaping", "expected"),
     [

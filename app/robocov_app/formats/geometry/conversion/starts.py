@@ -125,8 +125,12 @@ def require_clearance(parts: list[Polygon], conversion: Conversion) -> None:
             _, distance = find_widest_point(part, clearance / _STEPS_PER_CLEARANCE, clearance)
             if distance >= clearance:
                 return
+    max_distance = _find_max_distance(parts)
+    if max_distance >= clearance:
+        # The first search may end just below the clearance; this one has a finer tolerance.
+        return
     radius = clearance / (1 + MIN_START_GAP_RADII)
-    max_radius = _find_max_distance(parts) / (1 + MIN_START_GAP_RADII)
+    max_radius = max_distance / (1 + MIN_START_GAP_RADII)
     reason = f"no position has enough clearance for a robot of radius {radius:g} m"
     raise MapError(
         f"{conversion.source_name}: {reason} (the widest is for one of {max_radius:.3g} m): "
