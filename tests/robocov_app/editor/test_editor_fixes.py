@@ -83,6 +83,33 @@ def test_a_fix_solves_its_problem(sketch, kind, words):
     assert len(after) < len(before)
 
 
+@pytest.mark.parametrize(
+    ("obstacle", "wall", "words"),
+    [
+        # The wall ends next to the boundary, at 45 degrees to it.
+        (None, WallObstacle(((6.0, 0.35), (8.0, 2.35)), 0.1), "wall 1 shortened by 0.12 m"),
+        (None, WallObstacle(((8.0, 2.35), (6.0, 0.35)), 0.1), "wall 1 shortened by 0.12 m"),
+        # A corner of the wall is next to one of the polygon.
+        (
+            PolygonObstacle(((5.0, 1.0), (6.0, 3.0), (7.0, 1.0))),
+            WallObstacle(((6.0, 3.5), (8.0, 5.5)), 0.6),
+            "wall 2 shortened by 0.044 m",
+        ),
+    ],
+    ids=["boundary", "boundary, last end", "corner"],
+)
+def test_a_gap_at_the_end_of_an_oblique_wall_is_widened_enough(obstacle, wall, words):
+    radius = 0.2
+    sketch = build_hall(wall) if obstacle is None else build_hall(obstacle, wall)
+    before = measure(sketch, radius)
+    problem = next(each for each in before.problems if each.kind == "narrow")
+    change = find_fix(sketch, problem, radius)
+    assert words in change.description
+    after = measure(change.sketch, radius)
+    assert "narrow" not in [each.kind for each in after.problems]
+    assert after.gap.width >= 2 * radius
+
+
 def test_all_unreachable_areas_are_filled_at_once():
     frame = PolygonObstacle(BOX, (((3.0, 3.0), (5.0, 3.0), (5.0, 5.0), (3.0, 5.0)),))
     fork = ((8.0, 0.0), (8.0, 3.0), (8.2, 3.0), (8.2, 0.2), (8.5, 0.2), (8.5, 3.0), (9.0, 0.0))

@@ -161,9 +161,10 @@ def _widen_gap(request: FixRequest) -> Change:
     for side in sides:
         shortened = _shorten_wall(side, missing)
         if shortened is not None:
+            wall, length = shortened
             key = side.item.key
-            description = f"{format_numbered_name(sketch, key)} shortened by {missing:.2g} m"
-            return Change(sketch.with_objects({key: shortened}), Selection.of(key), description)
+            description = f"{format_numbered_name(sketch, key)} shortened by {length:.2g} m"
+            return Change(sketch.with_objects({key: wall}), Selection.of(key), description)
     movable = _drop_obstacles_at_both_ends(sides)
     require(movable and gap.length > 0.0, "no obstacle next to the passage can be moved")
     item, end, opposite_end = min(movable, key=lambda side: side.item.geometry.area)
@@ -193,34 +194,59 @@ def _drop_obstacles_at_both_ends(sides: list[_GapSide]) -> list[_GapSide]:
     return [side for side in sides if len(ends_by_key[side.item.key]) == 1]
 
 
-def _shorten_wall(side: _GapSide, length: float) -> WallObstacle | None:
-    """Shorten a wall by a length, m, at the end next to a gap; return None if that does not widen the gap."""
+def _shorten_wall(side: _GapSide, missing: float) -> tuple[WallObstacle, float] | None:
+    """Shorten a wall at the end next to a gap so that the gap becomes wider.
+
+    The result is None if the obstacle is not such a wall, or if the wall is too short.
+
+    Parameters
+    ----------
+    side : _GapSide
+        The obstacle, which is not always a wall.
+    missing : float
+        Width that the gap lacks, m.
+
+    Returns
+    -------
+    wall : WallObstacle
+        The shortened wall.
+    length : float
+        Length that was removed, m. It is larger than the missing width if the wall is oblique to the gap.
+    """
     wall = side.item.shape
     if not isinstance(wall, WallObstacle) or len(wall.points) < 2:
         return None
     line = LineString(wall.points)
-    # For each end: the points in order from that end, and the part of the line that remains after shortening.
-    spans = (
-        (wall.points, length, line.length),
-        (wall.points[::-1], 0.0, line.length - length),
-    )
-    for points, low, high in spans:
+    if line.length <= wall.width:
+        return None
+    for points, is_reversed in ((wall.points, False), (wall.points[::-1], True)):
         is_near = math.dist(points[0], side.end) <= wall.width / 2 + MAX_SAGITTA_M
-        if is_near and high - low > wall.width and _continues_wall(side, points):
-            return replace(wall, points=tuple(map(round_point, substring(line, low, high).coords)))
+        alignment = _compute_gap_alignment(side, points)
+        if not is_near or alignment < MIN_GAP_ALIGNMENT:
+            continue
+        # The wall's end moves along the wall. Only the component of this shift along the gap widens the gap.
+        length = missing / alignment
+        remaining_length = line.length - length
+        if remaining_length > wall.width:
+            low = 0.0 if is_reversed else length
+            remaining_part = substring(line, low, low + remaining_length)
+            return replace(wall, points=tuple(map(round_point, remaining_part.coords))), length
     return None
 
 
-def _continues_wall(side: _GapSide, points: Sequence[Point]) -> bool:
-    """Return whether a gap continues a wall beyond the first of its points, instead of being at its side.
+def _compute_gap_alignment(side: _GapSide, points: Sequence[Point]) -> float:
+    """Return the cosine of the angle between a gap and a wall that continues beyond the first of its points.
 
-    This is also true of a gap of length 0, which has no direction.
+    It is 1 for a gap of length 0, which has no direction.
     """
     wall_end = points[0]
     previous = next(point for point in points if point != wall_end)
     outward = np.subtract(wall_end, previous) / math.dist(wall_end, previous)
     across = np.subtract(side.opposite_end, side.end)
-    return bool(outward @ across >= MIN_GAP_ALIGNMENT * math.dist(side.opposite_end, side.end))
+    gap_length = math.dist(side.opposite_end, side.end)
+    if gap_length == 0.0:
+        return 1.0
+    return float(outward @ across) / gap_length
 
 
 def _get_owner(request: FixRequest) -> Owner:
