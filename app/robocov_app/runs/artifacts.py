@@ -24,7 +24,7 @@ from robocov.kernel_compilation import compile_kernels
 from robocov.metrics import compute_relative_excess
 from robocov.scenario import Scenario
 from robocov_app.runs.cost import build_cost, refine_cost_for_figures
-from robocov_app.runs.execution import Run, execute_scenario
+from robocov_app.runs.execution import Run, execute_scenario, is_partial_record
 from robocov_app.runs.saved_runs import COMPARISON_FORMAT, COMPARISON_VERSION
 from robocov_app.runs.settings import OutputSettings
 from robocov_app.terminal.interruption import Interruption
@@ -166,7 +166,7 @@ def _determine_ending(
     if not interruption.requested:
         return Ending.COMPLETE
     for scenario, run in zip_longest(scenarios, runs):
-        if run is None or round(run.record.time[-1] / scenario.dt) < scenario.steps:
+        if run is None or is_partial_record(run.record, scenario):
             return Ending.RUN_INTERRUPTED
     if settings.video.has_output:
         return Ending.VIDEO_INTERRUPTED

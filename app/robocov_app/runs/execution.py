@@ -85,7 +85,9 @@ def execute_scenario(
     record.save(result.staging / subfolder)
     # The simulation takes longest, so its record is saved before the evaluation starts.
     result.save_progress()
-    run = evaluate_record(record, cost, interruption, quiet=settings.hide_progress)
+    run = evaluate_record(
+        record, cost, is_partial=is_partial_record(record, scenario), quiet=settings.hide_progress
+    )
     save_numbers(run, result.staging / subfolder, settings.lattice)
     result.save_progress()
     return run
@@ -110,7 +112,12 @@ def _simulate(scenario: Scenario, settings: OutputSettings, interruption: Interr
         return scenario.run(simulation, every=settings.record_every, on_step=report_step)
 
 
-def evaluate_record(record: Record, cost: CoverageCost, interruption: Interruption, *, quiet: bool) -> Run:
+def is_partial_record(record: Record, scenario: Scenario) -> bool:
+    """Return whether a record has fewer steps than its scenario because the run was interrupted."""
+    return round(float(record.time[-1]) / scenario.dt) < scenario.steps
+
+
+def evaluate_record(record: Record, cost: CoverageCost, *, is_partial: bool, quiet: bool) -> Run:
     """Compute the coverage cost along a record, and its summary.
 
     Parameters
@@ -119,8 +126,9 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
         The run.
     cost : CoverageCost
         Cost of the record's map.
-    interruption : Interruption
-        If an interruption was requested, fewer steps are evaluated.
+    is_partial : bool
+        Whether the results are partial because of an interruption. Then fewer steps are evaluated, so that
+        the command ends soon.
     quiet : bool
         Whether to hide progress.
 
@@ -130,7 +138,7 @@ def evaluate_record(record: Record, cost: CoverageCost, interruption: Interrupti
     """
     rate = DEFAULT_RATE_HZ
     end = float(record.time[-1])
-    if interruption.requested and end > 0:
+    if is_partial and end > 0:
         rate = min(rate, MAX_SAMPLES_AFTER_INTERRUPTION / end)
     samples = len(select_sampled_steps(record, rate))
     with show_progress("coverage cost", samples, quiet=quiet) as update:

@@ -17,7 +17,7 @@ from session_records import build_records
 from robocov.controllers import Rapf
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs import artifacts, video
+from robocov_app.runs import artifacts, execution, video
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="needs a limit on the size of files")
@@ -237,6 +237,26 @@ def test_ctrl_c_during_the_last_figures_interrupts_nothing(
     out = tmp_path / "out"
     assert main([*command, "--out", str(out)]) == 0
     assert f"saved in {out}" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_ctrl_c_after_the_last_step_does_not_limit_the_samples_of_the_cost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save = Record.save
+
+    def interrupt_and_save(self: Record, *arguments: Any, **options: Any) -> None:
+        if not arguments[1:]:  # the record without a summary, which is saved before the evaluation
+            signal.raise_signal(signal.SIGINT)
+        save(self, *arguments, **options)
+
+    monkeypatch.setattr(execution, "MAX_SAMPLES_AFTER_INTERRUPTION", 3)
+    monkeypatch.setattr(Record, "save", interrupt_and_save)
+    out = tmp_path / "out"
+    assert main([*RUN, "--out", str(out)]) == 0
+    output = capsys.readouterr().out
+    assert f"saved in {out}" in output and "Interrupted" not in output
+    assert len((out / "cost.csv").read_text().splitlines()) > 10
 
 
 @pytest.mark.usefixtures("no_figures")

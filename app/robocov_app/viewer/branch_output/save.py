@@ -134,8 +134,10 @@ class _BranchWriter:
     def _evaluate(self, record: Record, cost: CoverageCost) -> Run:
         """Evaluate the cost of a record. As in the window, failed robots are not obstacles for the cost."""
         bare = replace(record, environment=cost.environment)
-        history = evaluate_record(bare, cost, self.interruption, quiet=self.settings.hide_progress).history
-        return Run(record, history, summarize(record, history))
+        run = evaluate_record(
+            bare, cost, is_partial=self.interruption.requested, quiet=self.settings.hide_progress
+        )
+        return Run(record, run.history, summarize(record, run.history))
 
     def _write_cost_table(self, costs: list[PartCost]) -> None:
         """Write the costs of all parts to one table, with times measured from the start of the branch."""
