@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from property_examples import count_examples
 
@@ -42,6 +42,7 @@ def observe(
 
 @settings(max_examples=count_examples(40))
 @given(seed=st.integers(0, 2**32), n=st.integers(1, 12), radius=st.floats(0.05, 8.0))
+@example(seed=854, n=5, radius=0.3125)
 def test_moments_of_limited_cells_agree_with_shapely(seed: int, n: int, radius: float) -> None:
     """Shapely intersects cells with a polygon of 4096 sides."""
     positions = np.random.default_rng(seed).uniform((1, 1), (10, 7), size=(n, 2))
@@ -53,9 +54,12 @@ def test_moments_of_limited_cells_agree_with_shapely(seed: int, n: int, radius: 
         if limited_cell.is_empty:  # a robot outside the region
             assert area[i] == 0.0
             continue
-        assert area[i] == pytest.approx(limited_cell.area, rel=2e-6)
+        # The area between the polygon and the circle. It matters most for thin parts of discs.
+        missing_area = 1e-6 * radius**2
+        assert area[i] == pytest.approx(limited_cell.area, rel=2e-6, abs=missing_area)
         centroid = limited_cell.centroid.coords[0]
-        np.testing.assert_allclose(positions[i] + offsets[i], centroid, atol=3e-6 * radius)
+        tolerance = radius * (3e-6 + missing_area / limited_cell.area)
+        np.testing.assert_allclose(positions[i] + offsets[i], centroid, atol=tolerance)
 
 
 @given(seed=st.integers(0, 2**32), distance=st.floats(0.1, 3.0))
