@@ -180,7 +180,7 @@ class Decider(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _RobotStep:
-    """What a robot has observed and decided in a step.
+    """The observations and the decision of a robot in a step.
 
     Attributes
     ----------
