@@ -246,6 +246,17 @@ def test_a_restart_returns_to_the_initial_velocities_of_the_same_robots() -> Non
     assert not get_present_velocities(session).any()
 
 
+def test_a_restart_returns_to_the_initial_headings_of_unicycles() -> None:
+    team = Team.homogeneous(4, kinematics="unicycle")
+    starts = HALL.start("uniform").sample(4, seed=3, radius=0.1)
+    steering = [[2.0, 0.0], [-2.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    record = Scenario(HALL, RAPF.build(), team=team, starts=starts, steering=steering, duration=0.5).run()
+    session = replay(record)
+    session.restart()
+    advance_session(session, 30)
+    np.testing.assert_array_equal(get_present_positions(session), record.positions[-1])
+
+
 def test_a_record_of_every_fourth_step_is_continued_with_its_control_period(record: Record) -> None:
     arrays = {name: getattr(record, name)[::4] for name in THINNED_ARRAYS}
     coarse = replace(record, dt=record.dt * 4, session={"control_dt_s": record.dt}, **arrays)

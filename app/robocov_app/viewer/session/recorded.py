@@ -156,6 +156,7 @@ def _build_start_scenario(record: Record, controllers: tuple[ControllerChoice, .
         dt=get_control_period(record),
         given_starts=np.array(record.positions[0]),
         velocities=np.array(record.velocities[0]),
+        steering=None if record.steering is None else np.array(record.steering[0]),
         conditions=record.conditions,
     )
 
