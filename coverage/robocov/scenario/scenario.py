@@ -393,12 +393,15 @@ class Scenario:
         Raises
         ------
         ParameterError
-            If `every` is not a whole number of at least 1.
+            If `simulation` is not a `Simulation`, or `every` is not a whole number of at least 1.
         RobocovError
             If the run cannot start, or the controller fails.
         """
         if not is_number(every, Integral) or every < 1:
             raise ParameterError(f"every: expected a whole number of at least 1, got {quote(every)}")
+        if simulation is not None and not isinstance(simulation, Simulation):
+            expected = "expected a Simulation (the duration is an attribute of the scenario)"
+            raise ParameterError(f"simulation: {expected}, got {quote(simulation)}")
         modules = {} if self.source is None else self.source.modules
         with provide_modules(modules):
             if simulation is None:

@@ -120,6 +120,12 @@ def test_a_record_is_thinned_and_a_run_is_stopped() -> None:
     assert len(scenario.run(every=7)) == 6
 
 
+def test_a_duration_is_not_a_simulation() -> None:
+    expected = r"simulation: expected a Simulation \(the duration is an attribute of the scenario\), got 30.0"
+    with pytest.raises(ParameterError, match=expected):
+        rc.Scenario(ROOM, robots=1).run(30.0)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("every", [0, -2, 1.5, None])
 def test_the_interval_of_recorded_steps_is_a_positive_whole_number(every: object) -> None:
     with pytest.raises(ParameterError, match="every: expected a whole number of at least 1, got"):
