@@ -106,6 +106,26 @@ def test_the_area_without_robots_is_cut_off() -> None:
     assert describe_passage_changes(before, after, RADIUS, both) == "the team is split into 2 groups"
 
 
+def test_a_robot_next_to_a_closed_gap_belongs_to_one_side() -> None:
+    """The free positions on both sides of a short gap are less than a diameter apart."""
+    before = build_room()
+    after = before
+    for ends in (((5.0, 0.0), (5.0, 2.905)), ((5.0, 3.095), (5.0, 6.0))):
+        after = add_obstacle(after, WallObstacle(ends, 0.02))
+    near_left = [(4.955, 3.0)]
+    near_both = [(4.955, 3.0), (5.045, 3.0)]
+    cut_off = "about 30 m² cut off; a passage of 19 cm, too narrow for a robot"
+    split = "the team is split into 2 groups; a passage of 19 cm, too narrow for a robot"
+    assert describe_passage_changes(before, after, RADIUS, near_left) == cut_off
+    assert describe_passage_changes(before, after, RADIUS, near_both) == split
+
+
+def test_a_map_without_space_for_robots_is_split_into_no_groups() -> None:
+    before = build_room()
+    after = add_obstacle(before, WallObstacle(((0.0, 3.0), (10.0, 3.0)), 5.7))
+    assert "groups" not in describe_passage_changes(before, after, RADIUS, [(1.0, 0.1)])
+
+
 @pytest.mark.parametrize(
     ("end", "description", "is_cut_off"),
     [

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from robocov.environment import Environment, Point, find_narrow_gaps
-from robocov.typing import FloatArray
+from robocov.typing import BoolArray, FloatArray, IntArray
 
 _WIDTH_TOLERANCE = 1e-6
 """Relative amount by which a gap may be narrower than a robot and still count as wide enough."""
@@ -36,15 +36,15 @@ def describe_passage_changes(
     """
     positions = shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
     descriptions = []
-    for components in _split_components(before, after, radius):
-        has_robots = np.array(
-            [(shapely.distance(positions, component) <= radius).any() for component in components],
-            dtype=bool,
-        )
-        if has_robots.sum() > 1:
-            descriptions.append(f"the team is split into {has_robots.sum()} groups")
-        is_reachable = has_robots
-        if not has_robots.any():
+    components_after = _find_center_components(after, radius)
+    is_occupied = _find_occupied_components(components_after, positions, radius)
+    for indices in _split_components(before, components_after, radius):
+        components = components_after[indices]
+        is_reachable = is_occupied[indices]
+        group_count = is_reachable.sum()
+        if group_count > 1:
+            descriptions.append(f"the team is split into {group_count} groups")
+        elif group_count == 0:
             # Without robots, the largest component counts as the reachable one.
             areas = shapely.area(components)
             is_reachable = areas == areas.max(initial=0.0)
@@ -63,23 +63,33 @@ def _format_area(area: float) -> str:
     return f"{area:.{digits}f} m²"
 
 
-def _split_components(before: Environment, after: Environment, radius: float) -> list[np.ndarray]:
-    """Return the components into which an edit splits each component of the free positions.
+def _find_occupied_components(components: np.ndarray, positions: np.ndarray, radius: float) -> BoolArray:
+    """Return which components of the free positions contain a robot.
+
+    A robot close to a wall may be outside all components, and close to several: it belongs to the nearest.
+    """
+    is_occupied = np.zeros(len(components), dtype=bool)
+    if len(components) > 0:
+        distances = shapely.distance(components[:, None], positions)
+        is_inside = distances.min(axis=0) <= radius
+        is_occupied[distances.argmin(axis=0)[is_inside]] = True
+    return is_occupied
+
+
+def _split_components(before: Environment, components_after: np.ndarray, radius: float) -> list[IntArray]:
+    """Return into which components an edit splits each component of the free positions.
 
     Returns
     -------
-    list of arrays of polygons
-        For each component before the edit, the components of it that remain after the edit.
+    list of arrays of int
+        For each component before the edit, the indices of the components of it that remain after the edit.
     """
     components_before = _find_center_components(before, radius)
-    components_after = _find_center_components(after, radius)
     tree = shapely.STRtree(components_before)
     after_indices, before_indices = tree.query(
         shapely.point_on_surface(components_after), predicate="intersects"
     )
-    return [
-        components_after[after_indices[before_indices == index]] for index in range(len(components_before))
-    ]
+    return [after_indices[before_indices == index] for index in range(len(components_before))]
 
 
 def _find_center_components(environment: Environment, radius: float) -> np.ndarray:
