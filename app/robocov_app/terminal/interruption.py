@@ -43,6 +43,19 @@ def note_interrupts() -> Iterator[None]:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@contextmanager
+def suppress_controller_errors() -> Iterator[None]:
+    """Suppress all exceptions of a user's controller in the context, but not the user's Ctrl+C.
+
+    A controller may raise any exception, even `SystemExit` or a `KeyboardInterrupt` of its own.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt) and was_interrupted():
+            raise
+
+
 class Interruption:
     """Context in which the first Ctrl+C or SIGTERM only sets a flag, and a second one ends the command.
 

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.interruption import Interruption, note_interrupts, suppress_controller_errors
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 
@@ -33,3 +33,18 @@ def test_other_threads_leave_signals_alone() -> None:
     thread.start()
     thread.join()
     assert seen == [False]
+
+
+class OddError(BaseException):
+    pass
+
+
+@pytest.mark.parametrize("error", [ValueError, SystemExit, GeneratorExit, KeyboardInterrupt, OddError])
+def test_errors_of_controllers_are_suppressed(error: type[BaseException]) -> None:
+    with note_interrupts(), suppress_controller_errors():
+        raise error
+
+
+def test_ctrl_c_in_a_controller_is_not_suppressed(interruptible: None) -> None:
+    with pytest.raises(KeyboardInterrupt), note_interrupts(), suppress_controller_errors():
+        signal.raise_signal(signal.SIGINT)

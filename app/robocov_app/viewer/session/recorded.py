@@ -1,7 +1,6 @@
 """Sessions whose past is a saved run, or the runs of a comparison side by side."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -15,6 +14,7 @@ from robocov.observation import Decision
 from robocov.record import Record
 from robocov.simulation.sensing import get_known_map
 from robocov_app.runs.saved_runs import SavedRun, build_roster
+from robocov_app.terminal.interruption import suppress_controller_errors
 from robocov_app.viewer.session.document import SessionDocument
 from robocov_app.viewer.session.pane import STEPS_BETWEEN_SENSED_POINTS, Pane
 from robocov_app.viewer.session.pane_group import AutomaticEvent, PaneGroup, keeps_a_robot
@@ -277,8 +277,8 @@ def _recompute_memories(record: Record, choice: ControllerChoice) -> list[Any]:
     decision that differs from the record.
     """
     memories: list[Any] = []
-    # A user's controller may raise any exception, and a missing one cannot be built.
-    with suppress(BaseException):
+    # A missing controller cannot be built.
+    with suppress_controller_errors():
         controller = choice.build()
         if not has_memory(controller):
             return [None] * len(record)

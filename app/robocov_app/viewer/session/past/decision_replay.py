@@ -21,6 +21,7 @@ from robocov.sensor import RangeSensor
 from robocov.simulation.sensing import get_known_map
 from robocov.voronoi import partition_by_travel_time
 from robocov.world.obstacle_pieces import build_moving_obstacles, build_solid_pieces
+from robocov_app.terminal.interruption import suppress_controller_errors
 from robocov_app.viewer.session.past.states import PaneSetup, PaneState
 
 RECORD_TOLERANCE = 1e-9
@@ -42,7 +43,9 @@ def rebuild_snapshot(state: PaneState, time: float, dt: float = DEFAULT_DT_S) ->
     Returns
     -------
     Snapshot
-        Observations and decision; all forces are zero if the controller raises.
+        Observations and decision. If the state has a recorded decision, and the controller raises or decides
+        differently, the decision is the recorded one. Without a record, all forces are zero if the controller
+        raises.
     """
     seen = _observe(state, time)
     perception = _build_perception(state.setup, dt)
@@ -98,7 +101,7 @@ def _decide(seen: Observations, state: PaneState) -> Decision:
     controller = _build_controller(state.setup)
     if controller is None:
         return no_forces
-    try:
+    with suppress_controller_errors():
         # The controller may change its memory in place, but this state may be displayed again.
         memory = deepcopy(state.memory)
         if memory is None:
@@ -106,8 +109,6 @@ def _decide(seen: Observations, state: PaneState) -> Decision:
         decision = controller.decide(seen, memory)
         if _is_usable(decision, seen.positions.shape):
             return decision
-    except BaseException:  # A user's controller may raise anything.
-        return no_forces
     return no_forces
 
 

@@ -1,6 +1,5 @@
 """Memories and messages of robots at each state of a record, which are recomputed: files lack them."""
 
-from contextlib import suppress
 from copy import deepcopy
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ from robocov.conditions.communication import Inbox
 from robocov.controllers import has_memory
 from robocov.record import Record
 from robocov.simulation import Simulation, TeamState
+from robocov_app.terminal.interruption import suppress_controller_errors
 from robocov_app.viewer.session.setup.controller_choice import ControllerChoice
 
 _MAX_ROBOTS_WITH_MESSAGES = 30
@@ -38,8 +38,8 @@ _UNKNOWN = Knowledge(None, None)
 def recompute_knowledge(record: Record, choice: ControllerChoice, dt: float) -> list[Knowledge]:
     """Simulate a recorded run again, and return what the robots remember at each recorded state.
 
-    Nothing is known from the first state on that differs from the record, for example because the controller
-    has changed since then, or is missing.
+    The knowledge is unknown from the first state that differs from the record, for example because the
+    controller has changed since then, and at all states if the controller is missing.
 
     Parameters
     ----------
@@ -56,8 +56,8 @@ def recompute_knowledge(record: Record, choice: ControllerChoice, dt: float) -> 
         One for each state of the record.
     """
     known: list[Knowledge] = []
-    # A user's controller may raise any exception, and a missing one cannot be built.
-    with suppress(BaseException):
+    # A missing controller cannot be built.
+    with suppress_controller_errors():
         controller = choice.build()
         needs_memory = has_memory(controller)
         needs_messages = record.conditions is not None and record.conditions.uses_messages
