@@ -110,9 +110,13 @@ def check_actions(actions: Any, count: int) -> FloatArray:
     Raises
     ------
     ParameterError
-        If the shape is wrong, or a number is not finite.
+        If the actions are not numbers, have the wrong shape, or are not finite.
     """
-    array = np.asarray(actions, dtype=np.float64)
+    try:
+        array = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        expected = f"expected actions of shape {(count, 2)}"
+        raise ParameterError(f"{expected}, got {quote(actions)}") from error
     if array.shape != (count, 2):
         raise ParameterError(f"expected actions of shape {(count, 2)}, got {array.shape}")
     is_finite = np.isfinite(array).all(axis=1)

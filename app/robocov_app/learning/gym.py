@@ -252,10 +252,13 @@ class CoverageVectorEnv(SyncVectorEnv):
             If there are not as many rows as environments, or if the actions of an environment have the wrong
             shape or are not finite.
         """
-        if len(actions) != self.num_envs:
-            raise ParameterError(
-                f"actions: expected one array for each of {self.num_envs} environments, got {len(actions)}"
-            )
+        expected = f"expected one array for each of {self.num_envs} environments"
+        try:
+            count = len(actions)
+        except TypeError as error:
+            raise ParameterError(f"actions: {expected}, got {quote(actions)}") from error
+        if count != self.num_envs:
+            raise ParameterError(f"actions: {expected}, got {count}")
         # This step only resets these environments, and ignores their actions.
         is_reset_only = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         checked = np.zeros((self.num_envs, self.task.robots, 2))

@@ -124,10 +124,18 @@ def test_steps_before_a_reset_and_invalid_actions_are_rejected() -> None:
     env.reset(seed=0)
     with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \(6,\)"):
         env.step(np.zeros(6))
+    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"):
+        env.step([[1, 2], [3]])
+    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got 'ab'"):
+        env.step("ab")
     vector_env = CoverageVectorEnv(num_envs=2, **SMALL)
     vector_env.reset(seed=0)
     with pytest.raises(ParameterError, match="expected one array for each of 2 environments, got 1"):
         vector_env.step(np.zeros((1, 3, 2)))
+    with pytest.raises(ParameterError, match="actions: expected one array for each of 2 environments, got 3"):
+        vector_env.step(3)
+    with pytest.raises(ParameterError, match=r"expected actions of shape \(3, 2\), got \[\[1, 2\], \[3\]\]"):
+        vector_env.step([np.zeros((3, 2)), [[1, 2], [3]]])
 
 
 @pytest.mark.parametrize(
