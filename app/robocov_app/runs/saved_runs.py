@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -181,7 +180,8 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        A different, valid folder name for each controller.
+        A different, valid folder name for each controller. The names differ in more than upper and lower
+        case, which many file systems do not distinguish.
 
     Examples
     --------
@@ -189,12 +189,16 @@ def name_folders(controllers: Sequence[str]) -> list[str]:
     ['rapf', 'Mine', 'Mine-2']
     """
     folders: list[str] = []
+    used_names = set()
     for controller in controllers:
-        name = controller.rpartition(":")[2]
-        stem = clean_file_stem(name, "controller")
-        same_stem = re.compile(re.escape(stem) + r"(-\d+)?")
-        number = 1 + sum(same_stem.fullmatch(folder) is not None for folder in folders)
-        folders.append(stem if number == 1 else f"{stem}-{number}")
+        stem = clean_file_stem(controller.rpartition(":")[2], "controller")
+        folder = stem
+        number = 1
+        while folder.casefold() in used_names:
+            number += 1
+            folder = f"{stem}-{number}"
+        used_names.add(folder.casefold())
+        folders.append(folder)
     return folders
 
 
