@@ -50,7 +50,7 @@ def decode_netpbm(data: bytes, source_name: str, key: ColorKey) -> Brightness:
     if data[1:2] in b"56":  # P5 and P6 are binary, P2 and P3 are text
         levels: Any = _decode_raw(data, header, source_name)
     else:
-        levels = _parse_plain(data[header.end :], header.level_count, source_name)
+        levels = _parse_plain(data, header, source_name)
     highest = int(levels.max())
     if highest > maximum:
         expected = f"expected pixels of at most {maximum} (the maximum in the header)"
@@ -142,11 +142,14 @@ def _decode_raw(data: bytes, header: _Header, source_name: str) -> Any:
     return np.frombuffer(data, raw, count, start).astype(raw.newbyteorder("="), copy=False)
 
 
-def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16]:
-    """Parse `count` levels that are written as text, piece by piece to limit the memory."""
+def _parse_plain(data: bytes, header: _Header, source_name: str) -> NDArray[np.uint16]:
+    """Parse levels that are written as text, piece by piece to limit the memory."""
+    text = data[header.end :]
+    count = header.level_count
+    expected = f"expected {count // header.channels} pixels"
     min_bytes = 2 * count - 1  # one digit for each level, with blanks between them
     if len(text) < min_bytes:
-        raise MapError(f"{source_name}: expected {count} pixels, got only {len(text)} bytes")
+        raise MapError(f"{source_name}: {expected}, got only {len(text)} bytes")
     if b"#" in text:
         text = re.sub(rb"#[^\r\n]*", b" ", text)
     values = np.empty(count, np.uint16)
@@ -162,7 +165,7 @@ def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16
         numbers = files.parse_integers(piece, " ")
         position = next_piece
         if numbers is None:
-            raise MapError(f"{source_name}: expected {count} whole numbers as pixels, got other text")
+            raise MapError(f"{source_name}: expected {count} whole numbers, got other text")
         numbers = numbers[: count - parsed_count]
         invalid = numbers[(numbers < 0) | (numbers > _MAX_LEVEL)]
         if len(invalid):
@@ -173,5 +176,5 @@ def _parse_plain(text: bytes, count: int, source_name: str) -> NDArray[np.uint16
         values[parsed_count : parsed_count + len(numbers)] = numbers
         parsed_count += len(numbers)
     if parsed_count < count:
-        raise MapError(f"{source_name}: expected {count} pixels, got {parsed_count}")
+        raise MapError(f"{source_name}: {expected}, got {parsed_count // header.channels}")
     return values
