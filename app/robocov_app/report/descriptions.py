@@ -113,11 +113,19 @@ def _describe_costs(environment: Environment, history: CostHistory) -> list[str]
     subject = "The mean distance to the nearest robot"
     if describe_density(environment):
         subject += ", weighted by φ,"
-    verb = "falls" if final < first else "goes"
-    sentences = [f"{subject} {verb} from {first:.3f} m to {final:.3f} m."]
+    sentences = [f"{subject} {_describe_change(first, final, 'm')}."]
     if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
         first, final = history.mean_time[[0, -1]]
-        sentences.append(
-            f"The mean travel time of the first to arrive goes from {first:.3f} s to {final:.3f} s."
-        )
+        change = _describe_change(first, final, "s")
+        sentences.append(f"The mean travel time of the first robot to arrive {change}.")
     return sentences
+
+
+def _describe_change(first: float, final: float, unit: str) -> str:
+    """Describe a change of a value, rounded to three decimals."""
+    first_text = f"{first:.3f} {unit}"
+    final_text = f"{final:.3f} {unit}"
+    if first_text == final_text:
+        return f"stays at {final_text}"
+    verb = "falls" if final < first else "rises"
+    return f"{verb} from {first_text} to {final_text}"

@@ -217,6 +217,26 @@ def test_gains_are_chosen_from_other_seeds_if_there_is_only_one_map() -> None:
     assert "lowest median from the others" in note
 
 
+def test_starts_and_seeds_on_one_map_are_counted_as_cases() -> None:
+    runs = [run for run in build_tuning_study() if run.map == "m0"]
+    note = choose_compared_groups(build_result(runs)).note
+    assert "Chosen: RAPF k 2 on 3 of 3 cases." in note
+
+
+def test_the_note_says_how_many_sets_of_gains_it_does_not_list() -> None:
+    """For seed s, the set of gains s is chosen: only for this set, its worst seed does not count."""
+    distances = (9.0, 1.0, 1.0, 5.0, 5.0)
+    runs = []
+    for seed in range(5):
+        for value in range(5):
+            final = distances[(seed - value) % 5]
+            runs.append(build_run("rapf", seed, final, gains=(("k", float(value)),)))
+        runs.append(build_run("rpf", seed, 2.0))
+    note = choose_compared_groups(build_result(runs)).note
+    assert note.count(" of 5 cases") == 3
+    assert note.endswith(", and 2 other sets.")
+
+
 def test_gains_are_not_chosen_if_there_is_only_one_case() -> None:
     runs = [run for run in build_tuning_study() if (run.map, run.seed) == ("m0", 2)]
     note = choose_compared_groups(build_result(runs)).note

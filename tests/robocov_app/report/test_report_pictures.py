@@ -14,6 +14,7 @@ from reported_results import HOSTILE, build_history, build_record
 
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
+from robocov.metrics import CostHistory
 from robocov_app.report.pictures import MAX_ROBOTS, PictureFrame, _format_path, draw_map, draw_run
 
 
@@ -92,6 +93,23 @@ def test_every_image_has_a_description() -> None:
     hidden = parse_svg(draw_run(record, None, is_hidden=True))
     assert hidden.get("aria-hidden") == "true"
     assert hidden.get("aria-label") is None
+
+
+@pytest.mark.parametrize(
+    ("first", "final", "change"),
+    [
+        (0.50003, 0.50001, "stays at 0.500 m"),
+        (0.5, 0.499, "falls from 0.500 m to 0.499 m"),
+        (0.5, 0.501, "rises from 0.500 m to 0.501 m"),
+    ],
+)
+def test_the_described_change_agrees_with_the_rounded_costs(first, final, change) -> None:
+    costs = np.array([first, final])
+    history = CostHistory(np.array([0.0, 6.0]), costs, costs, 0.0 * costs, costs)
+    description = parse_svg(draw_run(build_record(), history)).get("aria-label")
+    assert f"The mean distance to the nearest robot {change}." in description
+    arrival = f"The mean travel time of the first robot to arrive {change.replace(' m', ' s')}."
+    assert description.endswith(arrival)
 
 
 def test_names_are_escaped() -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from robocov.errors import format_count
 from robocov_app.figures.statistics import group_by
 from robocov_app.look.curve_styles import CurveStyle, choose_curve_styles
 from robocov_app.report.analysis.groups import (
@@ -164,10 +165,21 @@ def _tune(variants: Sequence[RunGroup], tuning: _Tuning) -> tuple[RunGroup, str]
         labels.append(best.label)
     first_label = variants[0].runs[0].label
     group = RunGroup(first_label + TUNED_SUFFIX, variants[0].controller, None, tuple(runs))
-    counts = Counter(labels).most_common(_MAX_LISTED_GAINS)
-    unit = "maps" if tuning.has_several_maps else "starts"
-    choice = ", ".join(f"{label} on {count} of {len(tuning.folds)} {unit}" for label, count in counts)
-    return group, choice
+    return group, _describe_choice(labels, tuning)
+
+
+def _describe_choice(labels: Sequence[str], tuning: _Tuning) -> str:
+    """Describe how often each set of gains was chosen, given the label of the set chosen for each fold."""
+    counts = Counter(labels)
+    unit = "maps" if tuning.has_several_maps else "cases"
+    parts = [
+        f"{label} on {count} of {len(tuning.folds)} {unit}"
+        for label, count in counts.most_common(_MAX_LISTED_GAINS)
+    ]
+    unlisted = len(counts) - len(parts)
+    if unlisted > 0:
+        parts.append(f"and {format_count(unlisted, 'other set')}")
+    return ", ".join(parts)
 
 
 def _rate_elsewhere(variant: RunGroup, fold: _Fold, tuning: _Tuning) -> tuple[float, ...]:

@@ -128,8 +128,8 @@ def build_metric_plots(
     Returns
     -------
     list of PagePlot
-        Empty for a sweep, if there are too many runs or robots, or if trajectories are unknown. Mean times
-        are plotted only if they are known, and connectivity only if it changes.
+        Empty if the result is a sweep, has too many runs or robots, or lacks trajectories. Mean times are
+        plotted only if they are known, and connectivity only if it changes.
     """
     if result.kind == "sweep" or not _are_measurable(runs):
         return []
