@@ -10,12 +10,14 @@ _VALUE_CHARACTERS = frozenset("0123456789.,-+@<*/%°×x; ")
 _UNIT_CHARACTERS = frozenset("mcm'\"rad")  # only after the first character
 _INVALID_FIRST_CHARACTERS = frozenset("x×*/ ;%")
 _INVALID_FIRST_CHARACTERS_WHEN_IDLE = frozenset("x×*/ ;%,-+@<°")
+_SYMBOLS = frozenset(".,-+@<*/%°×;")
+"""Characters of a value for which some keyboards need Alt, Option or AltGr."""
 _COMMAND_MODIFIERS = pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
 
 
 def edit_typed_value(editor: Editor, event: pygame.event.Event) -> bool:
     """Edit the value that is being typed for the tool with a key; return whether the key was used."""
-    if not _accepts_text(editor) or event.mod & _COMMAND_MODIFIERS:
+    if not _accepts_text(editor) or _is_command(event):
         return False
     text = editor.typed
     key = get_key_name(event)
@@ -33,6 +35,17 @@ def edit_typed_value(editor: Editor, event: pygame.event.Event) -> bool:
         editor.typed = (text + event.unicode)[:MAX_TYPED_CHARACTERS]
         return True
     return False
+
+
+def _is_command(event: pygame.event.Event) -> bool:
+    """Return whether a key is pressed with a modifier of commands, rather than to type a symbol."""
+    modifiers = event.mod & _COMMAND_MODIFIERS
+    if event.unicode in _SYMBOLS:
+        modifiers &= ~pygame.KMOD_ALT
+        if event.mod & pygame.KMOD_RALT:
+            # Windows reports AltGr as the left Ctrl and the right Alt key.
+            modifiers &= ~pygame.KMOD_LCTRL
+    return bool(modifiers)
 
 
 def _accepts_text(editor: Editor) -> bool:
