@@ -107,7 +107,7 @@ def plot_environment(
     Raises
     ------
     ParameterError
-        If the axes or the theme cannot be used.
+        If the axes, the theme or the size cannot be used.
     """
     from robocov_app.figures.map_pages import plot_environment as plot_map
 
@@ -204,7 +204,7 @@ def plot_history(
     Raises
     ------
     ParameterError
-        If the axes or the theme cannot be used, or the history has no finite value.
+        If the axes, the theme or the size cannot be used, or the history has no finite value.
     """
     from robocov_app.figures.cost_curves import plot_cost
     from robocov_app.figures.curves import TimeCurve
@@ -247,7 +247,7 @@ def plot_result(
     Raises
     ------
     ParameterError
-        If the axes or the theme cannot be used, or the result has no map.
+        If the axes, the theme or the size cannot be used, or the result has no map.
     """
     from robocov_app.figures.coverage import DistanceSnapshot, plot_coverage, plot_distances
 
@@ -304,7 +304,7 @@ def plot_comparison(
     Raises
     ------
     ParameterError
-        If axes are given.
+        If axes are given, or the size cannot be used.
     """
     from robocov_app.figures import comparisons
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from robocov.errors import ParameterError, quote
 from robocov_app.figures.curves import CurveMargins, TimeCurve, add_curve_axes, draw_curves
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, check_not_empty, get_figure
+from robocov_app.figures.page import TITLE_SIZE_PT, FigurePage, check_not_empty, get_figure, require_page_size
 from robocov_app.look.theme import LIGHT, Theme, get_theme
 
 _MARGINS = CurveMargins(left=52, top=86, bottom=56, right=52)
@@ -75,6 +75,7 @@ def _check_curve(curve: TimeCurve) -> None:
 
 def _create_page(curves: Sequence[TimeCurve], theme: Theme, size: tuple[int, int], title: str) -> Axes:
     """Create a page with only curves, whose texts can be larger than on pages with maps."""
+    require_page_size(size)
     width, height = size
     reference_width, reference_height = _REFERENCE_SIZE_PX
     fitting_scale = min(width / reference_width, height / reference_height)

@@ -43,6 +43,7 @@ from robocov_app.figures.page import (
     PagePanel,
     ValueAxis,
     check_not_empty,
+    require_page_size,
     to_plot_color,
 )
 from robocov_app.figures.run_titles import build_run_title
@@ -181,9 +182,11 @@ def plot_coverage(
     Raises
     ------
     ParameterError
-        If there are no snapshots.
+        If there are no snapshots, or the size is not that of a figure.
     """
     check_not_empty("snapshots", snapshots)
+    if size is not None:
+        require_page_size(size)
     if curves and size is not None and (size[0] < MIN_SIZE_PX[0] or size[1] < MIN_SIZE_PX[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
     theme = get_theme(theme)

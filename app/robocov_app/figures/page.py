@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -14,7 +15,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from robocov.errors import ParameterError
+from robocov.errors import ParameterError, is_number, quote
 from robocov.typing import FloatArray
 from robocov_app.figures.files import render_png
 from robocov_app.look.axes import MAX_VALUE_INTERVALS, TICK_FACTORS, VALUE_MARGIN, choose_value_limits
@@ -36,6 +37,8 @@ PlotColor: TypeAlias = tuple[float, float, float]
 _Anchor: TypeAlias = Literal["upper left", "upper center", "center right"]
 _FULL_SCALE_SIZE_PX = (960, 640)
 """Page size at scale 1, at which texts have their nominal size at 100 dots per inch."""
+MAX_PAGE_SIDE_PX = 2**23 - 1
+"""Maximum width and height of a figure of matplotlib."""
 _MIN_SCALE = 0.8
 _MAX_SCALE = 6.0
 # Lengths at scale 1, px.
@@ -145,7 +148,8 @@ def set_value_limits(
     ----------
     axis : matplotlib.axis.Axis
     values : (m,) array
-        Plotted values, finite. Without any, the axis begins at its origin and has a length of 1.
+        Plotted values, finite; ignored if `value_axis` has a range. Without values and a range, the range
+        starts at the origin and has a length of 1.
     value_axis : ValueAxis
     margin : float
         Free space on both sides, as a fraction of the range.
@@ -229,6 +233,25 @@ class _LegendExtent(NamedTuple):
     height: float
 
 
+def require_page_size(size: Any) -> None:
+    """Raise a ParameterError unless a size is a width and a height, px, that a figure can have.
+
+    Parameters
+    ----------
+    size : object
+        The size to check.
+
+    Raises
+    ------
+    ParameterError
+        If `size` is anything but two numbers of pixels.
+    """
+    is_pair = isinstance(size, Sequence | np.ndarray) and len(size) == 2
+    if not is_pair or not all(is_number(side) and 1 <= side <= MAX_PAGE_SIDE_PX for side in size):
+        expected = f"expected width and height from 1 to {MAX_PAGE_SIDE_PX} pixels"
+        raise ParameterError(f"size: {expected}, got {quote(size)}")
+
+
 class FigurePage:
     """A figure on which positions are in pixels from the top left.
 
@@ -249,9 +272,15 @@ class FigurePage:
     content_width : float, px
         Width between the margins.
     figure : matplotlib.figure.Figure
+
+    Raises
+    ------
+    ParameterError
+        If the size is not that of a figure; see `require_page_size`.
     """
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
+        require_page_size(size)
         width, height = size
         if scale is None:
             full_width, full_height = _FULL_SCALE_SIZE_PX
@@ -445,7 +474,7 @@ class FigurePage:
     def draw_footer(
         self, handles: Sequence[Artist], boxes: Sequence[PageBox], zoom: float, start: float = 0
     ) -> None:
-        """Draw the scale bar below the left edge of the maps, and the legend next to the bar or below it.
+        """Draw the scale bar below the maps, at their left edge, and the legend next to the bar or below it.
 
         Parameters
         ----------

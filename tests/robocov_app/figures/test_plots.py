@@ -225,6 +225,25 @@ def test_a_page_without_space_for_maps_is_rejected(plot, size):
         plot(record_walk(ROOMS, 3), size=size)
 
 
+INVALID_SIZES = pytest.mark.parametrize(
+    "size", [(0, 0), (-1, 300), (10**9, 500), (float("nan"), 500), (500,), "ab", 500]
+)
+INVALID_SIZE_MESSAGE = "size: expected width and height from 1 to 8388607 pixels, got"
+
+
+@PLOTS_OF_A_SIZE
+@INVALID_SIZES
+def test_a_size_that_no_figure_can_have_is_rejected(plot, size):
+    with pytest.raises(ParameterError, match=INVALID_SIZE_MESSAGE):
+        plot(record_walk(ROOMS, 3), size=size)
+
+
+@INVALID_SIZES
+def test_a_size_that_no_figure_of_costs_can_have_is_rejected(size):
+    with pytest.raises(ParameterError, match=INVALID_SIZE_MESSAGE):
+        plot_cost(build_curves(1.0), size=size)
+
+
 @PLOTS_OF_A_SIZE
 def test_texts_grow_with_the_page(plot):
     small = plot(record_walk(ROOMS, 3), size=(960, 640))
