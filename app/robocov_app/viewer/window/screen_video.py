@@ -13,6 +13,7 @@ from robocov_app.runs.encoding import Frame, build_encoder_command
 
 VIDEO_FPS = 30
 _FRAME_TOLERANCE = 1e-6  # a frame that is due up to rounding errors is added
+_MAX_FRAME_REPEATS = VIDEO_FPS  # one second; a longer stall of the window is shortened in the video
 MAX_WAITING_FRAMES = 45  # frames that wait for the encoder; further ones are dropped
 
 
@@ -35,9 +36,9 @@ class ScreenVideo:
     path : Path
         File of the video.
     frame_count : int
-        Number of frames written.
+        Number of frames passed to the encoder.
     skipped_count : int
-        Number of dropped frames.
+        Number of frames dropped because the encoder was too slow.
 
     Raises
     ------
@@ -71,14 +72,17 @@ class ScreenVideo:
         return self.frame_count / VIDEO_FPS
 
     def add(self, screen: pygame.Surface, seconds: float) -> None:
-        """Add the frame that the window has shown for a time, s, as often as the frame rate requires."""
+        """Add the frame that the window has shown for a time, s, as often as the frame rate requires.
+
+        A frame is added for one second at most, so that a stall of the window does not fill the queue.
+        """
         self._due_frames += seconds * VIDEO_FPS
         count = int(self._due_frames + _FRAME_TOLERANCE)
         self._due_frames -= count
         if count <= 0:
             return
         data = self._fit(screen)
-        for _ in range(min(count, VIDEO_FPS)):
+        for _ in range(min(count, _MAX_FRAME_REPEATS)):
             try:
                 self._queue.put(data, block=self._waits)
                 self.frame_count += 1
