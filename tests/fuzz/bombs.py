@@ -230,7 +230,7 @@ BOMBS: dict[str, tuple[Callable[[], Case], Job, str]] = {
     "osm: entities": (
         _build_case("a.osm", lambda: _build_entities("osm")),
         Job("import", "osm"),
-        "no document type",
+        "document type declarations",
     ),
     "geojson: collections": (_build_case("a.geojson", _build_collections), _READ, "nested too deeply"),
     "geojson: records": (_build_case("a.geojsonl", lambda: _POINT * 600_000), _READ, "expected at most"),

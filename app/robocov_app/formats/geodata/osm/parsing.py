@@ -61,7 +61,9 @@ class _XmlReader:
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start_element
         self.parser.EndElementHandler = self._end_element
-        self.parser.StartDoctypeDeclHandler = lambda *_: self._raise_error("expected no document type")
+        self.parser.StartDoctypeDeclHandler = lambda *_: self._raise_error(
+            "document type declarations are not supported"
+        )
         try:
             self.parser.Parse(content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
